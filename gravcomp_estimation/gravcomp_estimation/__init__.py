@@ -1,0 +1,1 @@
+"""The sense of gravity: nodes imu_estimator and imu_replay."""

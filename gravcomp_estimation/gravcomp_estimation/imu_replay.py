@@ -1,0 +1,149 @@
+"""Node imu_replay: plays a recording's IMU samples into the graph, at its own times or faster, with /clock.
+
+Published reliably and without limit of history: who subscribes the same way, as imu_estimator does, misses nothing, and is
+waited for when it is slower.
+"""
+
+import time
+
+from gravcomp_node import ManagedNode, run
+from gravcomp_node.managed_node import OK
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.node import NodeNameNonExistentError
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import Imu, Temperature
+
+from gravcomp.config import ConfigError
+from gravcomp.graph.parameters.imu_replay import ImuReplayParameters
+from gravcomp.recordings import RecordingError, read_recording
+from gravcomp_estimation import messages
+from gravcomp_estimation.stream import LOSSLESS
+
+TICK = 0.002  # s
+LONGEST_TICK = 0.05  # s of publishing before signals and services get their turn
+# What discovery tells of a subscriber that has just come is not always right, and matching takes its time.
+SETTLE = 1.0  # s
+CLOCK_QOS = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
+# ROS takes time zero for 'not set': a recording without absolute times starts one second later.
+EARLIEST_NS = 1_000_000_000
+
+
+class ImuReplay(ManagedNode):
+    """Plays a recording into imu/data_raw and imu/temperature, with /clock."""
+
+    name = "imu_replay"
+    parameters_class = ImuReplayParameters
+
+    def configure(self) -> None:
+        parameters = self.parameters
+        if not parameters.file:
+            raise ConfigError("imu_replay: the parameter file is empty; a rosbag2 folder or an .npz file in BROAD's layout is needed")
+        try:
+            recording = read_recording(parameters.file, parameters.topic or None)
+        except RecordingError as error:
+            raise ConfigError(str(error)) from error
+        shift = max(0, EARLIEST_NS - int(recording.stamp_ns[0]))
+        # In the order of their stamps; a temperature before the sample of the same stamp.
+        self._events = [(s + shift, 1, i) for i, s in enumerate(recording.stamp_ns.tolist())]
+        if recording.temperature is not None:
+            self._events += [(s + shift, 0, i) for i, s in enumerate(recording.temperature_stamp_ns.tolist())]
+            self._temperatures = recording.temperature.tolist()
+            self._events.sort(key=lambda event: event[:2])
+        self._gyro, self._accel = recording.gyro.tolist(), recording.accel.tolist()
+        self._round_ns = int(recording.duration * 1e9 + 1e9 / recording.rate)
+        self._imu = self.create_publisher(Imu, "imu/data_raw", LOSSLESS)
+        self._temperature = self.create_publisher(Temperature, "imu/temperature", LOSSLESS)
+        self._clock_publisher = self.create_publisher(ClockMessage, "/clock", CLOCK_QOS) if parameters.clock else None
+
+    def activate(self) -> None:
+        self._next = 0
+        self._shift_ns = 0
+        self._begin: float | None = None  # monotonic, s
+        self._waiting_since = time.monotonic()
+        self._awaited_since: float | None = None
+        self._ended: float | None = None
+        self._timer = self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.report(OK, f"waiting for a subscriber of {self._imu.topic_name}")
+
+    def deactivate(self) -> None:
+        self.destroy_timer(self._timer)
+
+    def cleanup(self) -> None:
+        for publisher in (self._imu, self._temperature, self._clock_publisher):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        if self._ended is not None:
+            # A moment for those who still compute what they were sent.
+            if self.parameters.exit_at_end and now - self._ended > 1.0:
+                self.finished = True
+            return
+        if self._begin is None:
+            if not self._awaited():
+                self._awaited_since = None
+            elif self._awaited_since is None:
+                self._awaited_since = now
+            settled = self._awaited_since is not None and now - self._awaited_since >= SETTLE
+            if not settled and now - self._waiting_since < self.parameters.wait_for_subscribers:
+                return
+            self._begin = now
+            self.get_logger().info(f"playing {len(self._gyro)} samples of {self.parameters.file}")
+            self.report(OK, f"playing {self.parameters.file}")
+        first_ns = self._events[0][0]
+        while self._next < len(self._events):
+            stamp = self._events[self._next][0]
+            due = self._begin + (stamp + self._shift_ns - first_ns) * 1e-9 / self.parameters.rate if self.parameters.rate else 0.0
+            if due > time.monotonic() or time.monotonic() - now > LONGEST_TICK:
+                return
+            if not self._publish(*self._events[self._next]):
+                return
+            self._next += 1
+            if self._next == len(self._events) and self.parameters.loop:
+                self._next = 0
+                self._shift_ns += self._round_ns
+        self._imu.wait_for_all_acked(Duration(seconds=5.0))
+        self._ended = time.monotonic()
+        self.get_logger().info("the recording has ended")
+        self.report(OK, "the recording has ended")
+
+    def _awaited(self) -> bool:
+        """Someone is there who takes every sample, and every node that was named has begun."""
+        taken = self.get_subscriptions_info_by_topic(self._imu.topic_name)
+        reliable = any(s.qos_profile.reliability == ReliabilityPolicy.RELIABLE for s in taken)
+        return reliable and all(map(self._has_begun, self.parameters.wait_for))
+
+    def _has_begun(self, node: str) -> bool:
+        """Nodes subscribe to what they work on when they become active."""
+        try:
+            subscribed = self.get_subscriber_names_and_types_by_node(node, self.get_namespace())
+        except NodeNameNonExistentError:
+            return False
+        return any(topic not in ("/clock", "/parameter_events") for topic, _ in subscribed)
+
+    def _publish(self, stamp: int, kind: int, index: int) -> bool:
+        """Publish one event; False: the subscriber is slower, try again."""
+        stamp += self._shift_ns
+        frame = self.parameters.imu_frame
+        try:
+            if kind == 1:
+                self._imu.publish(messages.raw_imu(stamp, frame, self._gyro[index], self._accel[index]))
+            else:
+                reading = Temperature(header=messages.header(stamp, frame), temperature=self._temperatures[index])
+                self._temperature.publish(reading)
+        except RCLError:
+            return False
+        if self._clock_publisher is not None:
+            clock = ClockMessage()
+            clock.clock.sec, clock.clock.nanosec = divmod(stamp, 1_000_000_000)
+            self._clock_publisher.publish(clock)
+        return True
+
+
+def main() -> int:
+    """Entry point."""
+    return run(ImuReplay)

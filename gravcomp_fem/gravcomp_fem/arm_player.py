@@ -1,0 +1,187 @@
+"""arm_player: an arm that is not there, carrying the virtual robot through five poses twice: with released cables, then compensated.
+
+It gives what an arm gives, joint_states and robot_description, turns the virtual robot's base as the arm's flange turns, and judges by the
+virtual robot's truth. The loop takes nothing of it. A pass begins when the controller has agreed to it and the bridge follows; how much of
+what was measured the bridge followed is among the figures, because a robot whose motors hold compensates nothing.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, QuaternionStamped
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from gravcomp.arm.chain import Chain
+from gravcomp.arm.tour import FIVE_POSES, Tour
+from gravcomp.config import ConfigError
+from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
+from gravcomp.virtual.motion import quaternion
+from gravcomp_msgs.msg import CableState
+from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
+from gravcomp_node.managed_node import OK
+
+_RATE = 100.0  # Hz, of the joints
+_PASSES = ("released", "compensated")
+_ASK_AGAIN = 1.0  # s, when the controller did not agree or did not answer
+
+
+class ArmPlayer(ManagedNode):
+    """Plays an arm's tour and measures the tip error at each pose."""
+
+    name = "arm_player"
+    parameters_class = ArmPlayerParameters
+
+    def configure(self) -> None:
+        try:
+            text = Path(self.parameters.urdf).read_text(encoding="utf-8")
+        except OSError as error:
+            raise ConfigError(f"arm_player: urdf '{self.parameters.urdf}' cannot be read: {error.strerror}") from error
+        self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, self.parameters.urdf)
+        poses = np.array(list(FIVE_POSES.values()))
+        if len(self._chain.moving) != poses.shape[1]:
+            raise ConfigError(f"{self.parameters.urdf}: {len(self._chain.moving)} joints move '{self._chain.tip}'; the tour is for {poses.shape[1]}")
+        self._tour = Tour(poses, self.parameters.travel, self.parameters.hold)
+        self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
+        self._base = self.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
+        self._description = self.create_publisher(String, "robot_description", LATCHED)
+        self._description.publish(String(data=text))
+        self._relax = self.create_client(Trigger, "inverse_controller/relax")
+        self._enable = self.create_client(SetBool, "inverse_controller/enable")
+
+    def activate(self) -> None:
+        self._ready: float | None = None  # s, since when arm, robot and services are there
+        self._begin: float | None = None  # s, of the pass
+        self._pass = 0
+        self._agreed = self._measuring = False
+        self._asked = -_ASK_AGAIN
+        self._phase = ""
+        self._tip: np.ndarray | None = None
+        self._bridge: CableState | None = None
+        self._errors = {name: [[] for _ in FIVE_POSES] for name in _PASSES}
+        self._followed: dict[str, list[bool]] = {name: [] for name in _PASSES}
+        self._disagreement: list[float] = []
+        self._inputs = [
+            self.create_subscription(PoseStamped, "truth/tip", self._on_truth, SENSOR),
+            self.create_subscription(CableState, "cable/state", self._on_bridge, COMMAND),
+            self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QoSProfile(depth=50)),
+        ]
+        self._ticks = self.create_timer(1.0 / _RATE, self._tick)
+
+    def deactivate(self) -> None:
+        self.destroy_timer(self._ticks)
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+
+    def _tick(self) -> None:
+        now = self.get_clock().now().nanoseconds * 1e-9
+        time = 0.0 if self._begin is None else now - self._begin
+        if time >= self._tour.duration:
+            self._pass, self._begin, self._agreed, self._measuring, time = self._pass + 1, None, False, False, 0.0
+            if self._pass == len(_PASSES):
+                self._write("done", self._figures())
+                self.finished = True
+                return
+        self._move(self._tour.positions(time))
+        if self._begin is None:
+            self._prepare(now)
+            return
+        pose = self._tour.at_rest(time, self.parameters.hold - self.parameters.measured)
+        self._measuring = pose is not None
+        if pose is not None:
+            target = np.array([0.0, 0.0, self.robot_file.robot.length])
+            name = _PASSES[self._pass]
+            self._errors[name][pose].append(float(np.linalg.norm(self._tip - target)))
+            self._followed[name].append(self._bridge.state == CableState.ACTIVE)
+
+    def _prepare(self, now: float) -> None:
+        """Begin the pass as soon as everything is there, has rested for a while, and agrees."""
+        there = self._tip is not None and self._bridge is not None and self._relax.service_is_ready() and self._enable.service_is_ready()
+        if not there:
+            self._tell("waiting for the truth")
+            return
+        # At rest for a while, as one starts an arm: the estimator finds gravity and the gyroscope's bias.
+        self._ready = now if self._ready is None else self._ready
+        if now - self._ready < self.parameters.wait:
+            self._tell("at rest")
+        elif not self._agreed:
+            self._ask(now)
+        elif self._bridge.state != CableState.ACTIVE:
+            self._tell(f"waiting for the bridge: {self._bridge.message}")
+        else:
+            self._begin = now
+            self._tell(_PASSES[self._pass])
+
+    def _ask(self, now: float) -> None:
+        if now - self._asked < _ASK_AGAIN:
+            return
+        self._asked = now
+        client, request = (self._relax, Trigger.Request()) if self._pass == 0 else (self._enable, SetBool.Request(data=True))
+        client.call_async(request).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future) -> None:
+        answer = future.result()
+        self._agreed = answer.success
+        if not answer.success:
+            self._tell(f"waiting for the controller: {answer.message}")
+
+    def _move(self, positions: np.ndarray) -> None:
+        joints = JointState(name=list(self._chain.moving), position=positions.tolist())
+        joints.header.stamp = self.get_clock().now().to_msg()
+        self._joints.publish(joints)
+        base = QuaternionStamped()
+        base.header.stamp, base.header.frame_id = joints.header.stamp, self.parameters.world_frame
+        rotation = self._chain.pose(dict(zip(joints.name, positions)))[:3, :3]
+        q = base.quaternion
+        q.x, q.y, q.z, q.w = map(float, quaternion(rotation))
+        self._base.publish(base)
+
+    def _on_truth(self, message: PoseStamped) -> None:
+        p = message.pose.position
+        self._tip = np.array([p.x, p.y, p.z])
+
+    def _on_bridge(self, message: CableState) -> None:
+        self._bridge = message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self.get_namespace().rstrip('/')}/arm_gravity" and self._measuring:
+                self._disagreement += [float(pair.value) for pair in status.values if pair.key == "angle_deg"]
+
+    def _figures(self) -> dict:
+        means = {name: [1e3 * float(np.mean(e)) if e else float("nan") for e in errors] for name, errors in self._errors.items()}
+        rms = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in means.items()}
+        return {
+            "inclination_deg": list(FIVE_POSES),
+            **{f"tip_error_{name}_mm": [round(v, 3) for v in values] for name, values in means.items()},
+            **{f"tip_error_{name}_rms_mm": round(value, 3) for name, value in rms.items()},
+            "ratio": round(rms["released"] / rms["compensated"], 2),
+            "followed_percent": {name: round(100.0 * float(np.mean(f)), 1) if f else 0.0 for name, f in self._followed.items()},
+            "arm_and_imu_disagree_by_deg": round(max(self._disagreement), 2) if self._disagreement else None,
+        }
+
+    def _tell(self, phase: str) -> None:
+        if phase != self._phase:
+            self._phase = phase
+            self.report(OK, phase)
+            self._write(phase, {})
+
+    def _write(self, phase: str, figures: dict) -> None:
+        if not self.parameters.result_file:
+            return
+        partial = Path(self.parameters.result_file + ".partial")
+        partial.write_text(json.dumps({"phase": phase, "figures": figures}))
+        partial.replace(self.parameters.result_file)
+
+
+def main() -> int:
+    return run(ArmPlayer)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

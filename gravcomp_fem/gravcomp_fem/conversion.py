@@ -1,0 +1,145 @@
+"""Between the core's shapes and the messages that carry them."""
+
+from array import array
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseArray
+from std_msgs.msg import Header
+
+from gravcomp.inverse import Target, TargetError, bend_target
+from gravcomp.simulation import Response, Shape
+from gravcomp.view.backbone import Backbone
+from gravcomp_msgs.msg import Deformation, ShapeTarget
+
+
+def deformation_message(shape: Shape, header: Header) -> Deformation:
+    """The message of a shape; `header` carries the stamp of the IMU sample and the base frame."""
+    message = Deformation(header=header, status=int(shape.status), message=shape.message, model=shape.model)
+    message.tip = pose_message(shape.tip_position, shape.tip_orientation)
+    message.gravity.x, message.gravity.y, message.gravity.z = map(float, shape.gravity)
+    message.backbone_station = doubles(shape.backbone_station)
+    message.backbone_position = doubles(shape.backbone_position)
+    message.backbone_orientation = doubles(shape.backbone_orientation)
+    message.cable_displacement = doubles(shape.cable_displacement)
+    message.cable_tension = doubles(shape.cable_tension)
+    message.compliance_aa = doubles(shape.response.compliance_aa)
+    message.compliance_ea = doubles(shape.response.compliance_ea)
+    message.cable_displacement_free = doubles(shape.response.displacement_free)
+    message.effector_free = doubles(shape.response.effector_free)
+    message.residual = float(shape.residual)
+    message.error_estimate = float(shape.error_estimate)
+    message.solve_time = float(shape.solve_time)
+    return message
+
+
+def response_of(message: Deformation) -> Response:
+    """The linear answer in a message. Raises ValueError when its arrays do not fit one another, are not finite, or tell of a cable
+    that yields nothing to a tension."""
+    cables, points = len(message.cable_tension), len(message.backbone_station)
+    rows = 6 + 3 * points
+    response = Response(
+        compliance_aa=_matrix(message.compliance_aa, cables, cables, "compliance_aa"),
+        compliance_ea=_matrix(message.compliance_ea, rows, cables, "compliance_ea"),
+        displacement_free=_matrix(message.cable_displacement_free, 1, cables, "cable_displacement_free")[0],
+        effector_free=_matrix(message.effector_free, 1, rows, "effector_free")[0],
+    )
+    _matrix(message.cable_tension, 1, cables, "cable_tension")
+    if not (np.diagonal(response.compliance_aa) > 0.0).all():
+        raise ValueError(f"the diagonal of compliance_aa is {np.diagonal(response.compliance_aa)}; positive numbers (m/N) are needed")
+    return response
+
+
+def backbone_of(message: Deformation) -> Backbone | None:
+    """The backbone in a message; None when it is not one."""
+    station = np.array(message.backbone_station)
+    position, orientation = np.array(message.backbone_position), np.array(message.backbone_orientation)
+    if station.size < 2 or position.size != 3 * station.size or orientation.size != 4 * station.size:
+        return None
+    if not (np.isfinite(position).all() and np.isfinite(orientation).all() and (np.diff(station) > 0.0).all()):
+        return None
+    return Backbone(station, position.reshape(-1, 3), orientation.reshape(-1, 4))
+
+
+def backbone_of_poses(message: PoseArray) -> Backbone | None:
+    """A backbone given as poses from base to tip; None when they are not at least two different ones."""
+    rows = np.array([[p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w]
+                     for p in message.poses]).reshape(-1, 7)  # fmt: skip
+    along = np.cumsum(np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1))
+    if not len(along) or not np.isfinite(rows).all() or (np.diff(along, prepend=0.0) <= 0.0).any():
+        return None
+    return Backbone(np.append(0.0, along / along[-1]), rows[:, :3], rows[:, 3:])
+
+
+def bend_message(angle: float, plane: float, tip_direction_weight: float, frame: str) -> ShapeTarget:
+    """A target of constant curvature, `angle` into the plane at `plane` (rad)."""
+    message = ShapeTarget(bend=True, bend_angle=angle, bend_plane=plane, tip_position_weight=1.0, tip_direction_weight=tip_direction_weight)
+    message.header.frame_id = frame
+    return message
+
+
+def pose_message(position: np.ndarray, orientation: np.ndarray) -> Pose:
+    """position (3,) m, orientation (4,) x y z w."""
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = map(float, position)
+    o = pose.orientation
+    o.x, o.y, o.z, o.w = map(float, orientation)
+    return pose
+
+
+def shape_target(message: ShapeTarget, length: float) -> Target:
+    """The target in a message, for a robot of `length` (m). Raises TargetError."""
+    stations = np.array(message.backbone_station, dtype=float)
+    weights = np.array(message.backbone_weight, dtype=float)
+    if message.bend:
+        return bend_target(
+            length,
+            message.bend_angle,
+            message.bend_plane,
+            tip_position_weight=message.tip_position_weight,
+            tip_direction_weight=message.tip_direction_weight,
+            backbone_station=stations,
+            backbone_weight=weights,
+        )
+    direction = np.array([message.tip_direction.x, message.tip_direction.y, message.tip_direction.z])
+    points = np.array([[p.x, p.y, p.z] for p in message.backbone_position], dtype=float).reshape(-1, 3)
+    return Target(
+        tip_position=np.array([message.tip_position.x, message.tip_position.y, message.tip_position.z]),
+        tip_position_weight=message.tip_position_weight,
+        # A message has no 'none': a direction of length zero is not given.
+        tip_direction=direction if direction.any() or message.tip_direction_weight > 0.0 else None,
+        tip_direction_weight=message.tip_direction_weight,
+        backbone_station=stations,
+        backbone_position=points,
+        backbone_weight=weights,
+    )
+
+
+def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> Target:
+    """The target in a pose of the tip: its z axis is the direction. Raises TargetError."""
+    q = np.array([pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w])
+    norm = np.linalg.norm(q)
+    if not abs(norm - 1.0) < 1e-2:
+        raise TargetError(f"the target's orientation has the norm {norm:g}; a unit quaternion is needed")
+    x, y, z, w = q / norm
+    return Target(
+        tip_position=np.array([pose.position.x, pose.position.y, pose.position.z]),
+        tip_position_weight=position_weight,
+        tip_direction=np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]),
+        tip_direction_weight=direction_weight,
+    )
+
+
+def doubles(values: np.ndarray) -> array:
+    """float64[] fields take an array.array without looking at each element: a hundred times faster than a list."""
+    result = array("d")
+    result.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+    return result
+
+
+def _matrix(field: array, rows: int, columns: int, name: str) -> np.ndarray:
+    values = np.frombuffer(field, dtype=np.float64)
+    if values.size != rows * columns:
+        raise ValueError(f"{name} has {values.size} numbers; {rows} x {columns} are needed")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} has numbers that are not finite")
+    return values.reshape(rows, columns)

@@ -1,0 +1,133 @@
+"""fem_simulator: the robot's shape under the virtual gravity, one equilibrium a sample of gravity.
+
+The model stands still in `soft_base` while its gravity turns; its cables are where they were commanded to be, or where the
+motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from one stamp to
+the next, beginning at rest in the first equilibrium.
+"""
+
+import sys
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from rclpy.time import Time
+from visualization_msgs.msg import MarkerArray
+
+from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
+from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
+from gravcomp_fem.conversion import deformation_message, pose_message
+from gravcomp_fem.markers import markers_of
+from gravcomp_fem.transforms import TransformPublisher
+from gravcomp_msgs.msg import CableCommand, CableState, Deformation
+from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
+from gravcomp_node.managed_node import ERROR, OK, WARN
+
+# No robot is shaken harder than this; more is a broken message.
+_GRAVITY_LIMIT = 100.0  # m/s^2
+# Motion over a longer gap between two stamps is not computed: it would hold up the samples that come after.
+_LONGEST_GAP = 0.1  # s
+
+
+class FemSimulator(ManagedNode):
+    """Publishes the deformation under the virtual gravity."""
+
+    name = "fem_simulator"
+    parameters_class = FemSimulatorParameters
+
+    def configure(self) -> None:
+        self._dynamic = self.parameters.mode == "dynamic"
+        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
+        self._cables: np.ndarray | None = None
+        # The first step compiles what is not cached yet; better now than at the first sample.
+        self._simulator.step(np.zeros(3))
+        self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
+        self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
+        self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
+        self._transforms = TransformPublisher(self)
+
+    def activate(self) -> None:
+        self._simulator.reset()
+        self._refused = 0
+        self._last_stamp: float | None = None
+        self._last_markers = -np.inf
+        self._subscriptions_made = [self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR)]
+        if self.parameters.cables_from == "command":
+            cables = self.create_subscription(CableCommand, "cable/command", self._on_command, COMMAND)
+        else:
+            cables = self.create_subscription(CableState, "cable/state", self._on_state, SENSOR)
+        self._subscriptions_made.append(cables)
+        self.report(WARN, "waiting for gravity")
+
+    def deactivate(self) -> None:
+        for subscription in self._subscriptions_made:
+            self.destroy_subscription(subscription)
+
+    def cleanup(self) -> None:
+        for publisher in (self._deformation, self._tip, self._markers):
+            self.destroy_publisher(publisher)
+        self._transforms.destroy()
+
+    def _on_command(self, message: CableCommand) -> None:
+        self._take_cables(message.displacement, "cable/command")
+
+    def _on_state(self, message: CableState) -> None:
+        if message.state != CableState.UNCONFIGURED:
+            self._take_cables(message.displacement, "cable/state")
+
+    def _take_cables(self, field, topic: str) -> None:
+        displacement = np.array(field, dtype=float)
+        expected = (len(self.robot_file.robot.cables),)
+        if displacement.shape != expected or not np.isfinite(displacement).all():
+            self._refuse(f"{topic} has {displacement.tolist()}; {expected[0]} finite displacements are needed")
+            return
+        self._cables = displacement
+
+    def _on_gravity(self, message: Vector3Stamped) -> None:
+        gravity = np.array([message.vector.x, message.vector.y, message.vector.z])
+        if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
+            self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
+            return
+        shape = self._shape(gravity, Time.from_msg(message.header.stamp).nanoseconds * 1e-9)
+        message.header.frame_id = self.parameters.base_frame
+        self._deformation.publish(deformation_message(shape, message.header))
+        tip = pose_message(shape.tip_position, shape.tip_orientation)
+        self._tip.publish(PoseStamped(header=message.header, pose=tip))
+        self._show(shape, message.header)
+        level = {ShapeStatus.OK: OK, ShapeStatus.FALLBACK: WARN}.get(shape.status, ERROR)
+        self.report(
+            level,
+            shape.message or "following gravity",
+            model=shape.model,
+            solve_time_ms=round(1e3 * shape.solve_time, 3),
+            residual_n=f"{shape.residual:.2e}",
+            refused_messages=self._refused,
+        )
+
+    def _shape(self, gravity: np.ndarray, stamp: float) -> Shape:
+        if not self._dynamic:
+            return self._simulator.step(gravity, self._cables)
+        last, self._last_stamp = self._last_stamp, stamp
+        if last is None or not 0.0 < stamp - last <= _LONGEST_GAP:
+            return self._simulator.settle(gravity, self._cables)
+        return self._simulator.step(gravity, self._cables, duration=stamp - last)
+
+    def _show(self, shape, header) -> None:
+        rate = self.parameters.marker_rate
+        stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
+        # A stamp that went back is a bag that began anew.
+        if rate == 0.0 or 0.0 <= stamp - self._last_markers < 1.0 / rate:
+            return
+        self._last_markers = stamp
+        self._markers.publish(markers_of(shape, self.robot_file.robot, header))
+        self._transforms.publish(shape, header, self.parameters.tip_frame)
+
+    def _refuse(self, sentence: str) -> None:
+        self._refused += 1
+        self.get_logger().warning(sentence, throttle_duration_sec=1.0)
+
+
+def main() -> int:
+    return run(FemSimulator)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

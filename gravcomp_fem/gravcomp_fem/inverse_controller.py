@@ -1,0 +1,196 @@
+"""inverse_controller: the cable displacements that bring the modelled robot to its target, one programme a deformation."""
+
+import sys
+
+from geometry_msgs.msg import PoseStamped
+from rclpy.time import Time
+from std_srvs.srv import SetBool, Trigger
+
+from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
+from gravcomp.inverse import Command, ControllerCode, InverseController as InverseProblem, Target, TargetError, straight_target
+from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
+from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
+from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
+from gravcomp_node.managed_node import ERROR, OK, WARN
+
+# People read the status; the loop does not. A change of the code is told at once.
+_STATUS_PERIOD = 0.1  # s
+_LEVELS = {
+    ControllerCode.INACTIVE: OK,
+    ControllerCode.OK: OK,
+    ControllerCode.RELAXING: OK,
+    ControllerCode.SOLVER_FAILED: ERROR,
+}
+
+
+class InverseController(ManagedNode):
+    """Solves for the cable displacements that keep the target shape."""
+
+    name = "inverse_controller"
+    parameters_class = InverseControllerParameters
+
+    def configure(self) -> None:
+        self._problem = InverseProblem(self.robot_file.robot, self.parameters.inverse)
+        self._target: Target | None = self._straight() if self.parameters.hold_straight else None
+        self._enabled = self.parameters.enabled
+        self._relaxing = False
+        self._command = self.create_publisher(CableCommand, "cable/command", COMMAND)
+        self._status = self.create_publisher(ControllerStatus, "controller/status", LATCHED)
+        self._offered = [
+            self.create_service(SetBool, "~/enable", self._on_enable),
+            self.create_service(Trigger, "~/relax", self._on_relax),
+        ]
+
+    def activate(self) -> None:
+        self._problem.reset()
+        self._last_stamp: float | None = None
+        self._told_code, self._told_at = None, 0.0
+        self._last_arrival = self.get_clock().now()
+        self._inputs = [
+            self.create_subscription(Deformation, "robot/deformation", self._on_deformation, SENSOR),
+            self.create_subscription(PoseStamped, "target", self._on_pose_target, COMMAND),
+            self.create_subscription(ShapeTarget, "target/shape", self._on_shape_target, COMMAND),
+        ]
+        self._watch = self.create_timer(0.5 * self.parameters.stale_after, self._watch_stream)
+        self._say(ControllerCode.INACTIVE, "waiting for robot/deformation")
+
+    def deactivate(self) -> None:
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+        self.destroy_timer(self._watch)
+        self._say(ControllerCode.INACTIVE, "not active")
+
+    def cleanup(self) -> None:
+        for service in self._offered:
+            self.destroy_service(service)
+        self.destroy_publisher(self._command)
+        self.destroy_publisher(self._status)
+
+    def parameters_changed(self, old: InverseControllerParameters, new: InverseControllerParameters) -> None:
+        self._problem.options = new.inverse
+
+    def _straight(self) -> Target:
+        return straight_target(
+            self.robot_file.robot.length,
+            tip_position_weight=self.parameters.tip_position_weight,
+            tip_direction_weight=self.parameters.tip_direction_weight,
+        )
+
+    # The loop.
+
+    def _on_deformation(self, message: Deformation) -> None:
+        self._last_arrival = self.get_clock().now()
+        if message.status == Deformation.FAILED:
+            self._say(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
+            return
+        try:
+            response = response_of(message)
+        except ValueError as error:
+            self._say(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
+            return
+        if len(message.cable_tension) != len(self.robot_file.robot.cables):
+            found, own = len(message.cable_tension), len(self.robot_file.robot.cables)
+            self._say(ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", message.header)
+            return
+        interval = self._interval(message)
+        if self._relaxing:
+            command = self._problem.relax(response, interval=interval)
+        elif self._enabled and self._target is not None:
+            command = self._problem.step(
+                response,
+                self._target,
+                backbone_station=message.backbone_station,
+                tension=message.cable_tension,
+                interval=interval,
+            )
+        else:
+            self._say(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header)
+            return
+        self._command.publish(
+            CableCommand(
+                header=message.header, displacement=doubles(command.displacement), tension=doubles(command.tension)
+            )
+        )
+        self._publish_status(command, message.header)
+
+    def _interval(self, message: Deformation) -> float:
+        """Seconds since the last deformation by its stamps; a stamp that stands or goes back counts as one common step."""
+        stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        interval = 0.01 if self._last_stamp is None else stamp - self._last_stamp
+        self._last_stamp = stamp
+        return interval if interval > 0.0 else 0.01
+
+    def _watch_stream(self) -> None:
+        silence = (self.get_clock().now() - self._last_arrival).nanoseconds * 1e-9
+        if silence > self.parameters.stale_after:
+            # Rates count from the displacement at which the cables were left: the bridge holds it.
+            self._last_stamp = None
+            self._say(ControllerCode.STALE, f"no robot/deformation for {silence:.1f} s: no command is sent")
+
+    # Targets and services.
+
+    def _on_pose_target(self, message: PoseStamped) -> None:
+        weights = self.parameters.tip_position_weight, self.parameters.tip_direction_weight
+        self._take_target(message.header, lambda: pose_target(message.pose, *weights))
+
+    def _on_shape_target(self, message: ShapeTarget) -> None:
+        self._take_target(message.header, lambda: shape_target(message, self.robot_file.robot.length))
+
+    def _take_target(self, header, make) -> None:
+        if header.frame_id not in ("", self.parameters.frame):
+            self._say(
+                ControllerCode.REFUSED,
+                f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept",
+            )
+            return
+        try:
+            self._target = make()
+        except TargetError as error:
+            self._say(ControllerCode.REFUSED, f"target refused: {error}; the last one is kept")
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._enabled, self._relaxing = request.data, False
+        response.success = True
+        response.message = "compensating" if request.data else "no commands are sent; the motors hold"
+        return response
+
+    def _on_relax(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._relaxing = True
+        response.success, response.message = True, "paying the cables out until ~/enable is called"
+        return response
+
+    # Status.
+
+    def _publish_status(self, command: Command, header) -> None:
+        self.report(_LEVELS.get(command.code, WARN), command.message, solve_time_us=round(1e6 * command.solve_time))
+        stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
+        if command.code == self._told_code and 0.0 <= stamp - self._told_at < _STATUS_PERIOD:
+            return
+        self._told_code, self._told_at = command.code, stamp
+        self._status.publish(
+            ControllerStatus(
+                header=header,
+                code=int(command.code),
+                message=command.message,
+                distance=float(command.distance),
+                lateral=float(command.lateral),
+                axial=float(command.axial),
+                tilt=float(command.tilt),
+                solve_time=float(command.solve_time),
+            )
+        )
+
+    def _say(self, code: ControllerCode, sentence: str, header=None) -> None:
+        status = ControllerStatus(code=int(code), message=sentence)
+        status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
+        self._told_code = None
+        self._status.publish(status)
+        self.report(_LEVELS.get(code, WARN), sentence)
+
+
+def main() -> int:
+    return run(InverseController)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""recorder: the graph's topics into a bag, as they come, without decoding them.
+
+Topics are found while it runs; each is subscribed as reliably as it is offered, and its offered QoS goes into the bag.
+"""
+
+import importlib
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rosbags.interfaces import Connection
+
+from gravcomp.bags import BagError
+from gravcomp.bags.qos import offered_qos
+from gravcomp.bags.writing import BagWriter
+from gravcomp.config import ConfigError
+from gravcomp.graph.parameters.recorder import RecorderParameters
+from gravcomp_node import ManagedNode, run
+from gravcomp_node.managed_node import OK, WARN
+
+_LOOK_INTERVAL = 0.25  # s, between looks for new topics
+_DEPTH = 1000
+_GLOBAL = ("/tf", "/tf_static", "/clock", "/diagnostics", "/rosout", "/parameter_events")
+
+
+class Recorder(ManagedNode):
+    """Writes every topic of the graph into a bag."""
+
+    name = "recorder"
+    parameters_class = RecorderParameters
+
+    def configure(self) -> None:
+        if not self.parameters.out:
+            raise ConfigError("recorder: the parameter out is empty; the folder of the new bag is needed")
+        self._bag = BagWriter(Path(self.parameters.out), self.parameters.flush_interval)
+        self._wanted = {self.resolve_topic_name(topic) for topic in self.parameters.topics}
+
+    def activate(self) -> None:
+        self._recorded: dict[str, _Recording] = {}
+        self._refused: set[str] = set()
+        self._looking = self.create_timer(_LOOK_INTERVAL, self._look)
+        self._look()
+        self.get_logger().info(f"recording into {self._bag.path}")
+
+    def deactivate(self) -> None:
+        self.destroy_timer(self._looking)
+        for recording in self._recorded.values():
+            self.destroy_subscription(recording.subscription)
+
+    def cleanup(self) -> None:
+        if hasattr(self, "_bag"):
+            self._bag.close()
+            self.get_logger().info(f"{self._bag.messages} messages in {self._bag.path}")
+            del self._bag
+
+    def _look(self) -> None:
+        """Subscribe to what is new, and anew to what is offered otherwise; write what has waited."""
+        self._bag.flush()
+        for topic, kinds in self.get_topic_names_and_types():
+            if topic in self._refused or not self._belongs(topic):
+                continue
+            offers = [p.qos_profile for p in self.get_publishers_info_by_topic(topic)]
+            if not offers:  # subscribed to by somebody, published by nobody
+                continue
+            if topic not in self._recorded:
+                self._begin(topic, kinds, offers)
+            elif _matching(offers) != self._recorded[topic].qos:
+                self._follow(self._recorded[topic], topic, offers)
+        self.report(
+            WARN if self._refused else OK, f"recording {len(self._recorded)} topics into {self._bag.path}",
+            messages=self._bag.messages, refused=", ".join(sorted(self._refused)))  # fmt: skip
+
+    def _belongs(self, topic: str) -> bool:
+        if self._wanted:
+            return topic in self._wanted
+        own = self.get_namespace().rstrip("/") + "/"
+        return topic.startswith(own) or topic in _GLOBAL
+
+    def _begin(self, topic: str, kinds: list[str], offers: list[QoSProfile]) -> None:
+        try:
+            if len(kinds) != 1:
+                raise BagError(f"it has several types: {', '.join(kinds)}")
+            kind = _message_class(kinds[0])
+            recording = _Recording(kind, self._bag.add_topic(topic, kinds[0], [_stored(q) for q in offers]))
+        except (BagError, ImportError, AttributeError) as error:
+            self._refused.add(topic)
+            self.get_logger().warning(f"{topic} is not recorded: {error}")
+            return
+        self._recorded[topic] = recording
+        self._follow(recording, topic, offers)
+
+    def _follow(self, recording: "_Recording", topic: str, offers: list[QoSProfile]) -> None:
+        if recording.subscription is not None:
+            self.destroy_subscription(recording.subscription)
+        recording.qos = _matching(offers)
+
+        def write(message: bytes) -> None:
+            self._bag.write(recording.connection, time.time_ns(), message)
+
+        recording.subscription = self.create_subscription(recording.kind, topic, write, recording.qos, raw=True)
+
+
+@dataclass
+class _Recording:
+    """A topic that goes into the bag."""
+
+    kind: type
+    connection: Connection
+    qos: QoSProfile | None = None
+    subscription: Subscription | None = None
+
+
+def _matching(offers: list[QoSProfile]) -> QoSProfile:
+    """The strongest QoS that all publishers offer."""
+    reliable = all(q.reliability == ReliabilityPolicy.RELIABLE for q in offers)
+    latched = all(q.durability == DurabilityPolicy.TRANSIENT_LOCAL for q in offers)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _stored(q: QoSProfile):
+    return offered_qos(q.reliability.name, q.durability.name, q.history.name, q.depth)
+
+
+def _message_class(name: str) -> type:
+    package, _, message = name.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), message)
+
+
+def main() -> int:
+    return run(Recorder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

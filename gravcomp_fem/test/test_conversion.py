@@ -1,0 +1,93 @@
+"""Shapes and targets survive their messages; messages that do not fit are refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Pose
+from std_msgs.msg import Header
+
+from gravcomp.inverse import TargetError
+from gravcomp.simulation import Response, Shape, ShapeStatus
+from gravcomp_fem.conversion import deformation_message, pose_target, response_of, shape_target
+from gravcomp_msgs.msg import ShapeTarget
+
+
+@pytest.fixture
+def shape() -> Shape:
+    random = np.random.default_rng(1)
+    points, cables = 5, 6
+    return Shape(
+        tip_position=random.normal(size=3),
+        tip_orientation=np.array([0.0, 0.0, 0.0, 1.0]),
+        backbone_station=np.linspace(0, 1, points),
+        backbone_position=random.normal(size=(points, 3)),
+        backbone_orientation=np.tile([0.0, 0.0, 0.0, 1.0], (points, 1)),
+        cable_displacement=random.normal(size=cables),
+        cable_tension=random.uniform(size=cables),
+        gravity=np.array([0.0, 0.0, -9.81]),
+        response=Response(
+            random.normal(size=(cables, cables)) + 5.0 * np.eye(cables),
+            random.normal(size=(6 + 3 * points, cables)),
+            random.normal(size=cables),
+            random.normal(size=6 + 3 * points),
+        ),
+        residual=1e-9,
+        error_estimate=2e-5,
+        solve_time=1e-3,
+        model="reduced",
+        status=ShapeStatus.FALLBACK,
+        message="beyond its range",
+    )
+
+
+def test_the_response_survives_its_message_bit_for_bit(shape):
+    message = deformation_message(shape, Header(frame_id="soft_base"))
+    response = response_of(message)
+    for field in dataclasses.fields(Response):
+        assert np.array_equal(getattr(response, field.name), getattr(shape.response, field.name))
+    assert (message.status, message.message, message.model) == (1, "beyond its range", "reduced")
+    assert np.array_equal(np.reshape(message.backbone_position, (-1, 3)), shape.backbone_position)
+
+
+@pytest.mark.parametrize("field", ["compliance_aa", "compliance_ea", "cable_displacement_free", "effector_free"])
+def test_arrays_that_do_not_fit_or_are_not_finite_are_refused(shape, field):
+    message = deformation_message(shape, Header())
+    setattr(message, field, list(getattr(message, field))[:-1])
+    with pytest.raises(ValueError, match=field):
+        response_of(message)
+    message = deformation_message(shape, Header())
+    broken = list(getattr(message, field))
+    broken[0] = float("nan")
+    setattr(message, field, broken)
+    with pytest.raises(ValueError, match="not finite"):
+        response_of(message)
+
+
+def test_a_compliance_of_nothing_is_refused(shape):
+    message = deformation_message(shape, Header())
+    message.compliance_aa = [0.0] * len(message.compliance_aa)
+    with pytest.raises(ValueError, match="diagonal of compliance_aa"):
+        response_of(message)
+
+
+def test_a_bend_is_an_arc_of_the_robots_length():
+    message = ShapeTarget(bend=True, bend_angle=np.pi / 2, bend_plane=0.0, tip_position_weight=1.0)
+    target = shape_target(message, 0.1)
+    radius = 0.1 / (np.pi / 2)
+    assert target.tip_position == pytest.approx([radius, 0.0, radius])
+    assert target.tip_direction == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_a_pose_points_along_its_z_axis():
+    pose = Pose()
+    pose.orientation.y = pose.orientation.w = np.sqrt(0.5)
+    assert pose_target(pose, 1.0, 0.01).tip_direction == pytest.approx([1.0, 0.0, 0.0])
+    pose.orientation.w = 5.0
+    with pytest.raises(TargetError, match="unit quaternion"):
+        pose_target(pose, 1.0, 0.01)
+
+
+def test_a_target_without_any_weight_is_refused():
+    with pytest.raises(TargetError, match="weight"):
+        shape_target(ShapeTarget(), 0.1)

@@ -1,0 +1,150 @@
+"""What people ask for on the page, carried out by the node: messages, service calls, bags; what is missing is told them."""
+
+import os
+import time
+
+os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+import rclpy  # noqa: E402
+import yaml  # noqa: E402
+from geometry_msgs.msg import QuaternionStamped  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+
+from gravcomp.commands.record import describe  # noqa: E402
+from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase  # noqa: E402
+from gravcomp.virtual.faults import Fault  # noqa: E402
+from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion  # noqa: E402
+from gravcomp_fem.viewer import Viewer  # noqa: E402
+from gravcomp_msgs.msg import ShapeTarget  # noqa: E402
+from gravcomp_node import COMMAND  # noqa: E402
+
+
+class Stand:
+    """The viewer and, where `whole`, all that it speaks to; what arrives there by topic or service."""
+
+    def __init__(self, folder, whole: bool = True):
+        rclpy.init(args=["test", "--ros-args", "-p", "port:=8870", "-p", f"bag_folder:={folder}", "-p", "rate:=20.0"])
+        self.executor = SingleThreadedExecutor()
+        self.viewer = Viewer()
+        self.other = rclpy.create_node("other", use_global_arguments=False)
+        self.heard: dict[str, list] = {}
+        self.told: list[tuple] = []
+        if whole:
+            for kind, topic in ((ShapeTarget, "target/shape"), (QuaternionStamped, "virtual/base_orientation"), (String, "virtual/fault")):
+                self.other.create_subscription(kind, topic, lambda m, t=topic: self.heard.setdefault(t, []).append(m), COMMAND)
+            for name in ("inverse_controller/relax", "can_bridge/home", "can_bridge/stop"):
+                self.other.create_service(Trigger, name, lambda q, a, n=name: self._serve(n, None, a))
+            self.other.create_service(SetBool, "inverse_controller/enable", lambda q, a: self._serve("inverse_controller/enable", q.data, a))
+        for node in (self.viewer, self.other):
+            self.executor.add_node(node)
+        self.viewer.start()
+        # No browser looks: what would be shown there is kept here.
+        self.viewer._page.notify = lambda title, sentence, good=False: self.told.append((title, sentence, good))
+
+    def _serve(self, name, value, answer):
+        self.heard.setdefault(name, []).append(value)
+        answer.success, answer.message = True, "done as asked"
+        return answer
+
+    def ask(self, request) -> None:
+        """As a control of the page does."""
+        self.viewer._page._controls._requests.put(request)
+
+    def until(self, done, what):
+        end = time.monotonic() + 60.0
+        while not done():
+            assert time.monotonic() < end, what
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def close(self):
+        self.viewer.shut_down()
+        self.viewer.destroy_node()
+        self.other.destroy_node()
+        rclpy.shutdown()
+
+
+@pytest.fixture
+def stand(tmp_path):
+    stand = Stand(tmp_path)
+    publishers = (stand.viewer._shape_target, stand.viewer._base, stand.viewer._fault)
+    stand.until(lambda: all(p.get_subscription_count() for p in publishers), "nobody listens to the viewer")
+    stand.until(lambda: all(c.service_is_ready() for n, c in stand.viewer._remote.items() if n != "can_bridge/release"), "no services")
+    yield stand
+    stand.close()
+
+
+def test_a_bend_becomes_a_target(stand):
+    stand.ask(SetTarget(0.7, -1.2))
+    stand.until(lambda: "target/shape" in stand.heard, "no target")
+    (message,) = stand.heard["target/shape"]
+    assert message.bend and (message.bend_angle, message.bend_plane) == (0.7, -1.2)
+    assert message.header.frame_id == "soft_base" and message.tip_position_weight == 1.0
+
+
+def test_the_last_of_many_tilts_turns_the_base(stand):
+    for degrees in range(0, 60):
+        stand.ask(TiltBase(np.radians(degrees), 0.3))
+    wanted = base_orientation(np.radians(59.0), 0.3)
+
+    def arrived() -> bool:
+        q = stand.heard["virtual/base_orientation"][-1].quaternion if "virtual/base_orientation" in stand.heard else None
+        return q is not None and np.allclose(rotation_from_quaternion(q.x, q.y, q.z, q.w), wanted, atol=1e-9)
+
+    stand.until(arrived, "the last tilt has not come")
+    # A dragged slider floods nobody: one message a frame.
+    assert len(stand.heard["virtual/base_orientation"]) < 60
+
+
+@pytest.mark.parametrize(
+    ("request_", "service", "value"),
+    [
+        (Compensate("compensate"), "inverse_controller/enable", True),
+        (Compensate("hold"), "inverse_controller/enable", False),
+        (Compensate("relax"), "inverse_controller/relax", None),
+        (BridgeService("home"), "can_bridge/home", None),
+        (BridgeService("stop"), "can_bridge/stop", None),
+    ],
+)
+def test_compensation_and_motors_are_asked_for_and_the_answer_is_told(stand, request_, service, value):
+    stand.ask(request_)
+    stand.until(lambda: stand.told, "no answer")
+    assert stand.heard == {service: [value]}
+    assert stand.told == [(service, "done as asked", True)]
+
+
+def test_a_fault_goes_to_the_virtual_robot_in_its_words(stand):
+    stand.ask(InjectFault("{kind: stall, cable: s1c2, duration: 2}"))
+    stand.until(lambda: "virtual/fault" in stand.heard, "no fault")
+    fault = Fault.parse(yaml.safe_load(stand.heard["virtual/fault"][0].data), "page")
+    assert (fault.kind, fault.cable, fault.duration) == ("stall", "s1c2", 2.0)
+
+
+def test_the_button_records_a_bag(stand, tmp_path):
+    stand.ask(Record(True))
+    stand.until(lambda: stand.viewer._recorder is not None, "no recorder")
+    log = stand.viewer._recorder.log
+    stand.until(lambda: "recording into" in log.read_text(), "the recorder does not begin")
+    end = time.monotonic() + 2.0
+    stand.until(lambda: time.monotonic() > end, "")
+    stand.ask(Record(False))
+    stand.until(lambda: any(title == "Recorded" for title, *_ in stand.told), "the recorder does not end")
+    (bag,) = tmp_path.glob("gravcomp_*")
+    assert describe(bag)["topics"].get("/diagnostics", 0) > 0
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    stand = Stand(tmp_path, whole=False)
+    try:
+        stand.ask(Compensate("compensate"))
+        stand.until(lambda: stand.told, "nothing is said")
+        title, sentence, good = stand.told[0]
+        assert title == "inverse_controller/enable" and "not running" in sentence and not good
+        # No virtual robot listens: its controls stay hidden.
+        stand.until(lambda: not stand.viewer._page._controls._base.visible, "the base's controls are shown")
+    finally:
+        stand.close()

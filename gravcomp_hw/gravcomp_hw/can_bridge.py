@@ -1,0 +1,193 @@
+"""The node can_bridge: topics and services around gravcomp.motors.driver.BridgeDriver.
+
+A thread of its own takes samples and states from the driver's queue to the topics, so that a slow middleware delays
+neither the control (a thread of the driver) nor the commands (the executor).
+"""
+
+import array
+import dataclasses
+import sys
+import threading
+
+from builtin_interfaces.msg import Time
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Imu, JointState, Temperature
+from std_msgs.msg import Float32
+from std_srvs.srv import Trigger
+
+from gravcomp.canbus.bus import BusError
+from gravcomp.canbus.imu_stream import ImuSample
+from gravcomp.config import ConfigError
+from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
+from gravcomp.motors.bridge import CableSnapshot, State
+from gravcomp.motors.driver import BridgeDriver, DriverOptions
+from gravcomp.motors.guard import GuardError
+from gravcomp_msgs.msg import CableCommand, CableState
+from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
+from gravcomp_node.managed_node import ERROR, OK, WARN
+
+_TEMPERATURE_EVERY = 10  # samples; the chip renews it every 1.28 s
+_LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}
+_LOG_PERIOD = 1.0  # s, between two equal complaints in the log
+
+
+class CanBridge(ManagedNode):
+    """Drives the cables over CAN, and publishes the IMU and what the cables do."""
+
+    name = "can_bridge"
+    parameters_class = CanBridgeParameters
+
+    def configure(self) -> None:
+        p = self.parameters
+        self._hardware = self._read_hardware()
+        self._driver = BridgeDriver(
+            self._hardware, DriverOptions(p.control_rate, p.state_rate, p.zero, p.require_imu, p.guard, p.trace)
+        )
+        try:
+            self._driver.open()
+        except BusError as error:
+            raise ConfigError(str(error)) from error
+        self._imu = self.create_publisher(Imu, "imu/data_raw", SENSOR)
+        self._temperature = self.create_publisher(Temperature, "imu/temperature", SENSOR)
+        self._state = self.create_publisher(CableState, "cable/state", COMMAND)
+        self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
+        self._told = ""
+        self._publishing = False
+        self._publisher = threading.Thread(target=self._publish, name="publisher", daemon=True)
+        self._publisher.start()
+
+    def activate(self) -> None:
+        try:
+            self._driver.activate()
+        except GuardError as error:
+            raise ConfigError(str(error)) from error
+        self._publishing = True
+        self._active_entities = [
+            self.create_subscription(CableCommand, "cable/command", self._command, COMMAND),
+            # Best effort takes from reliable publishers, too.
+            self.create_subscription(Float32, "imu/heater", lambda m: self._driver.heater(m.data), SENSOR),
+            self.create_service(Trigger, "~/home", self._trigger(lambda bridge, now: bridge.home(now))),
+            self.create_service(Trigger, "~/stop", self._trigger(lambda bridge, now: bridge.stop())),
+            self.create_service(Trigger, "~/release", self._trigger(lambda bridge, now: bridge.release(now))),
+            self.create_service(Trigger, "~/resume", self._trigger(lambda bridge, now: bridge.resume(now))),
+            self.create_timer(0.5, self._diagnose),
+        ]
+
+    def deactivate(self) -> None:
+        self._driver.deactivate()
+        self._publishing = False
+        subscriptions, services, timer = self._active_entities[:2], self._active_entities[2:-1], self._active_entities[-1]
+        for subscription in subscriptions:
+            self.destroy_subscription(subscription)
+        for service in services:
+            self.destroy_service(service)
+        self.destroy_timer(timer)
+
+    def cleanup(self) -> None:
+        driver = getattr(self, "_driver", None)
+        if driver is None:
+            return
+        driver.close()
+        self._publisher.join(2.0)
+        for publisher in (self._imu, self._temperature, self._state, self._joints):
+            self.destroy_publisher(publisher)
+        self._driver = None
+
+    def _read_hardware(self) -> Hardware:
+        """The section `hardware` with this node's interface and channel."""
+        file, p = self.robot_file, self.parameters
+        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        given = {key: value for key, value in (("interface", p.interface), ("channel", p.channel)) if value}
+        return dataclasses.replace(hardware, can=dataclasses.replace(hardware.can, **given))
+
+    def _command(self, message: CableCommand) -> None:
+        stamp = message.header.stamp
+        reason = self._driver.command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
+        if reason:
+            self.get_logger().warning(f"command refused: {reason}", throttle_duration_sec=_LOG_PERIOD)
+
+    def _trigger(self, action):
+        def serve(_, response):
+            response.success, response.message = self._driver.request(action)
+            return response
+
+        return serve
+
+    def _publish(self) -> None:
+        """From the driver's queue to the topics, until the queue ends."""
+        count = 0
+        while (entry := self._driver.queue.get()) is not None:
+            if not self._publishing:
+                continue
+            if isinstance(entry, ImuSample):
+                self._publish_imu(entry, with_temperature=count % _TEMPERATURE_EVERY == 0)
+                count += 1
+            else:
+                self._publish_state(entry)
+
+    def _publish_imu(self, sample: ImuSample, *, with_temperature: bool) -> None:
+        message = Imu()
+        message.header.stamp = _time(round(1e9 * sample.stamp))
+        message.header.frame_id = self.parameters.imu_frame
+        a, w = message.linear_acceleration, message.angular_velocity
+        a.x, a.y, a.z = sample.specific_force
+        w.x, w.y, w.z = sample.angular_rate
+        message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
+        self._imu.publish(message)
+        if with_temperature:
+            self._temperature.publish(Temperature(header=message.header, temperature=float(sample.temperature)))
+
+    def _publish_state(self, snapshot: CableSnapshot) -> None:
+        message = CableState(state=int(snapshot.state), message=snapshot.message)
+        message.header.stamp = _time(snapshot.stamp or self.get_clock().now().nanoseconds)
+        for name in ("command", "displacement", "velocity", "current", "tension"):
+            setattr(message, name, array.array("d", getattr(snapshot, name)))
+        self._state.publish(message)
+        joints = JointState(name=list(self._hardware.cables))
+        joints.header.stamp = self.get_clock().now().to_msg()
+        joints.position, joints.velocity, joints.effort = message.displacement, message.velocity, message.tension
+        self._joints.publish(joints)
+
+    def _diagnose(self) -> None:
+        driver = self._driver
+        snapshot, imu, link = driver.snapshot(), driver.imu.counters, driver.link.counters
+        level = _LEVELS.get(snapshot.state, WARN)
+        fault = driver.imu.fault
+        sentence = f"{snapshot.state.name.lower()}: {snapshot.message}" + (f"; {fault}" if fault else "")
+        self.report(
+            max(level, WARN) if fault else level,
+            sentence,
+            bus=driver.link.status,
+            frames_received=link.received,
+            frames_sent=link.sent,
+            frames_rejected=driver.bridge.rejected_frames + imu.rejected,
+            send_errors=link.send_errors,
+            error_frames=link.error_frames,
+            bus_lost=link.lost,
+            imu_samples=imu.samples,
+            imu_lost=imu.lost,
+            imu_repeated=imu.repeated,
+            board_restarts=imu.restarts,
+            commands_refused=driver.bridge.refused_commands,
+            control_overruns=driver.overruns,
+            command_delay_ms=round(1e3 * driver.delay, 2),
+        )
+        if sentence != self._told:
+            self._told = sentence
+            if level == OK and not fault:
+                self.get_logger().info(sentence)
+            else:
+                self.get_logger().warning(sentence)
+
+
+def _time(nanoseconds: int) -> Time:
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def main() -> int:
+    return run(CanBridge)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,86 @@
+"""graph_probe: looks at a running graph for a few seconds and prints what it finds as JSON: rates, delays, fitting QoS."""
+
+import dataclasses
+import importlib
+import json
+import sys
+import time
+
+import rclpy
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.time import Time
+
+from gravcomp.doctor.finding import Finding
+from gravcomp.graph.nodes import NODES, Port
+from gravcomp_node import SENSOR
+
+_DISCOVERY, _LISTEN = 2.0, 4.0  # s
+_TOLERANCE = 0.05
+
+
+class GraphProbe:
+    """Listens to every topic that keeps a rate."""
+
+    def __init__(self) -> None:
+        self._node = rclpy.create_node("graph_probe")
+        self._ages: dict[str, list[float]] = {}
+        self._ports = {port.name: port for entry in NODES for port in entry.gives if port.rate is not None}
+
+    def examine(self) -> list[Finding]:
+        """One finding a topic, one for the QoS of all."""
+        self._spin(_DISCOVERY)
+        for port in self._ports.values():
+            self._listen(port)
+        self._spin(1.0)
+        for ages in self._ages.values():
+            ages.clear()
+        self._spin(_LISTEN)
+        return [self._of_topic(port) for port in self._ports.values()] + self._quality()
+
+    def _listen(self, port: Port) -> None:
+        ages = self._ages[port.name] = []
+
+        def take(message) -> None:
+            ages.append((self._node.get_clock().now() - Time.from_msg(message.header.stamp)).nanoseconds * 1e-9)
+
+        self._node.create_subscription(_message_class(port.type), port.name, take, SENSOR)
+
+    def _of_topic(self, port: Port) -> Finding:
+        ages = sorted(self._ages[port.name])
+        if not ages:
+            return Finding("missing", port.name, "nothing is published", "./gravcomp up")
+        rate = len(ages) / _LISTEN
+        level = "ok" if abs(rate - port.rate) <= _TOLERANCE * port.rate else "optional"
+        return Finding(level, port.name, f"{rate:.0f} Hz of {port.rate:.0f}, {1e3 * ages[len(ages) // 2]:.1f} ms behind its IMU sample")
+
+    def _quality(self) -> list[Finding]:
+        findings = []
+        for name, _ in self._node.get_topic_names_and_types():
+            for publisher in self._node.get_publishers_info_by_topic(name):
+                for subscriber in self._node.get_subscriptions_info_by_topic(name):
+                    fits, reason = qos_check_compatible(publisher.qos_profile, subscriber.qos_profile)
+                    if fits == QoSCompatibility.ERROR:
+                        pair = f"{publisher.node_name} to {subscriber.node_name}: {reason}"
+                        findings.append(Finding("missing", name, pair, "give both the same reliability and durability"))
+        return findings or [Finding("ok", "QoS", "every subscription fits its publishers")]
+
+    def _spin(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            rclpy.spin_once(self._node, timeout_sec=0.1)
+
+
+def _message_class(kind: str) -> type:
+    package, _, name = kind.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def main() -> int:
+    rclpy.init()
+    print(json.dumps([dataclasses.asdict(finding) for finding in GraphProbe().examine()]))
+    rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

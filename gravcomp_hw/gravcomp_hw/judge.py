@@ -1,0 +1,199 @@
+"""judge: plays sag and compensation on a running graph, and judges it by the virtual robot's truth.
+
+It steers by the controller's services alone, gives nothing to the loop, and ends by itself with the figures in its result file.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from lifecycle_msgs.srv import GetState
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
+from std_srvs.srv import SetBool, Trigger
+
+from gravcomp.config import ConfigError
+from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.graph.parameters.judge import JudgeParameters
+from gravcomp.judging import figures
+from gravcomp.judging.bus_delay import DelayListener
+from gravcomp.judging.released import released_tip_error
+from gravcomp.judging.track import Track
+from gravcomp_msgs.msg import CableCommand
+from gravcomp_node import ManagedNode, run
+from gravcomp_node.polled import Polled
+
+# Messages that the middleware keeps between two looks, a tenth of a second apart.
+_KEPT = 100
+_STRAIGHT = np.array([0.0, 0.0, 1.0])
+
+
+class Judge(ManagedNode):
+    """Plays the demo's scenario and measures it against the truth."""
+
+    name = "judge"
+    parameters_class = JudgeParameters
+
+    def configure(self) -> None:
+        self._truth_tip, self._model_tip = Track(3), Track(3)
+        self._truth_gravity, self._gravity = Track(3), Track(3)
+        self._imu, self._commands = Track(0), Track(0)
+        self._states: dict[str, str] = {}
+        self._phase, self._begin, self._compensated_at = "waiting for the truth", None, None
+        self._pending = None
+        self._target = self.robot_file.robot.length * _STRAIGHT
+        self._delay = DelayListener(self._can()) if self.parameters.measure_delay else None
+
+    def activate(self) -> None:
+        self._waiting_since = self._now()
+        kept = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=_KEPT)
+        self._sources = [
+            (Polled(self, kind, topic, kept), track, values)
+            for kind, topic, track, values in (
+                (PoseStamped, "truth/tip", self._truth_tip, _position),
+                (PoseStamped, "robot/tip", self._model_tip, _position),
+                (Vector3Stamped, "truth/gravity", self._truth_gravity, _vector),
+                (Vector3Stamped, "gravity", self._gravity, _vector),
+                (Imu, "imu/data_raw", self._imu, lambda message: ()),
+                (CableCommand, "cable/command", self._commands, lambda message: ()),
+            )
+        ]
+        self._relax = self.create_client(Trigger, "inverse_controller/relax")
+        self._enable = self.create_client(SetBool, "inverse_controller/enable")
+        self._state_clients = {name: self.create_client(GetState, f"{name}/get_state") for name in self.parameters.nodes}
+        self.create_timer(0.1, self._play)
+        self.create_timer(0.5, self._observe)
+        if self._delay:
+            self._delay.start()
+
+    def deactivate(self) -> None:
+        if self._delay:
+            self._delay.stop()
+
+    # The scenario.
+
+    def _play(self) -> None:
+        self._take()
+        p = self.parameters
+        if self._begin is None:
+            if self._now() - self._waiting_since > p.start_timeout:
+                raise ConfigError(f"no truth/tip for {p.start_timeout:g} s: is virtual_robot running on the same bus?")
+            return
+        elapsed = self._now() - self._begin
+        if self._phase == "waiting for the truth" and self._relax.service_is_ready():
+            self._phase = "sagging" if p.relax_time > 0.0 else self._phase
+            if p.relax_time > 0.0:
+                self._relax.call_async(Trigger.Request())
+        if elapsed >= p.relax_time and self._compensated_at is None and self._enable.service_is_ready():
+            self._enable.call_async(SetBool.Request(data=True))
+            self._phase, self._compensated_at = "compensating", self._now()
+        if elapsed >= p.duration:
+            self._phase = "done"
+            self._write(self._figures())
+            self.finished = True
+
+    def _observe(self) -> None:
+        """Lifecycle states, and the state of the run for whoever watches."""
+        for name, client in self._state_clients.items():
+            if client.service_is_ready():
+                client.call_async(GetState.Request()).add_done_callback(lambda future, name=name: self._on_state(name, future))
+            elif name in self._states:
+                self._states[name] = "lost"
+        if self._phase != "done":
+            self._write({})
+
+    def _on_state(self, name: str, future) -> None:
+        answer = future.result()
+        if answer is not None:
+            self._states[name] = answer.current_state.label
+
+    def _take(self) -> None:
+        """What has come since the last look; the first truth begins the run."""
+        for polled, track, values in self._sources:
+            for received in polled.take_all():
+                track.add(_seconds(received.message), *values(received.message))
+        if self._begin is None and len(self._truth_tip):
+            self._begin = self._now()
+
+    # The figures.
+
+    def _figures(self) -> dict:
+        p = self.parameters
+        end = self._begin + p.duration
+        # The last third of the time with released cables: the robot has come to rest by then.
+        at_rest = self._begin + 2.0 / 3.0 * p.relax_time
+        released_until = self._begin + p.relax_time
+        counted_from = (self._compensated_at or end) + p.settle_time
+        left = figures.residual(self._truth_tip, self._target, _STRAIGHT, counted_from, end)
+        _, gravity = self._truth_gravity.between(counted_from, end)
+        delays = 1e3 * np.array(self._delay.delays) if self._delay and self._delay.delays else None
+        error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
+        return {
+            "sag_mm": _mm(figures.sag(self._truth_tip, self._target, at_rest, released_until)),
+            "residual_lateral_mm": _mm(left and left[0]),
+            "residual_axial_mm": _mm(left and left[1]),
+            "tip_error_with_mm": _mm(left and float(np.hypot(*left))),
+            "tip_error_without_mm": _mm(released_tip_error(self.robot_file, gravity, self._target)),
+            "correlation": _rounded(figures.correlation(self._truth_tip, self._model_tip, self._begin, end), 5),
+            "imu_rate_hz": _rounded(figures.rate(self._imu.between(counted_from, end)[0]), 2),
+            "command_rate_hz": _rounded(figures.rate(self._commands.between(counted_from, end)[0]), 2),
+            "delay_ms": None
+            if delays is None
+            else {"median": _rounded(float(np.median(delays)), 2), "p99": _rounded(float(np.percentile(delays, 99)), 2)},
+            "gravity_error_deg": _rounded(None if error is None else float(np.degrees(error)), 3),
+        }
+
+    def _write(self, result: dict) -> None:
+        if not self.parameters.result_file:
+            return
+        last = self._truth_tip.values[-1] if len(self._truth_tip) else None
+        state = {
+            "phase": self._phase,
+            "elapsed": 0.0 if self._begin is None else self._now() - self._begin,
+            "tip_error_mm": None if last is None else _mm(float(np.linalg.norm(last - self._target))),
+            "nodes": self._states,
+            "figures": result,
+        }
+        partial = Path(self.parameters.result_file + ".partial")
+        partial.write_text(json.dumps(state))
+        partial.replace(self.parameters.result_file)
+
+    def _can(self) -> CanInterface:
+        section = self.robot_file.section("hardware")
+        hardware = parse_hardware(section, source=self.robot_file.source, cables=self.robot_file.robot.cable_names)
+        p = self.parameters
+        return CanInterface(p.interface or hardware.can.interface, p.channel or hardware.can.channel)
+
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
+
+def _seconds(message) -> float:
+    return Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+
+
+def _position(message: PoseStamped) -> tuple[float, float, float]:
+    return message.pose.position.x, message.pose.position.y, message.pose.position.z
+
+
+def _vector(message: Vector3Stamped) -> tuple[float, float, float]:
+    return message.vector.x, message.vector.y, message.vector.z
+
+
+def _mm(metres: float | None) -> float | None:
+    return _rounded(None if metres is None else 1e3 * metres, 3)
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)
+
+
+def main() -> int:
+    return run(Judge)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,156 @@
+"""The virtual robot as a node: CAN frames on the bus as the hardware sends them, and the truth for judging.
+
+Physics, motors, board and faults are in `gravcomp.virtual`; a thread of `RealtimeRobot` steps them. No node of the loop may
+take truth/*.
+"""
+
+import dataclasses
+import sys
+
+import yaml
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3Stamped
+from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
+from gravcomp_node.managed_node import ERROR, OK, WARN
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+from gravcomp.canbus.bus import BusError
+from gravcomp.config import ConfigError, from_mapping
+from gravcomp.description.hardware import parse_hardware
+from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
+from gravcomp.recordings import RecordingError
+from gravcomp.virtual.faults import Fault
+from gravcomp.virtual.motion import rotation_from_quaternion
+from gravcomp.virtual.motions import make_motion
+from gravcomp.virtual.parameters import VirtualRobotParameters
+from gravcomp.virtual.realtime import RealtimeRobot
+from gravcomp.virtual.robot import Truth, VirtualRobot
+
+# Faults come one after the other and each counts.
+_FAULTS = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
+
+
+class VirtualRobotNode(ManagedNode):
+    """The robot that is not there: rod, cables, motors and IMU board behind CAN frames."""
+
+    name = "virtual_robot"
+    parameters_class = VirtualRobotNodeParameters
+
+    def configure(self) -> None:
+        source = self.robot_file.source
+        hardware = parse_hardware(self.robot_file.section("hardware"), source=source, cables=self.robot_file.robot.cable_names)
+        parameters = from_mapping(
+            VirtualRobotParameters, self.robot_file.section("virtual_robot"), source=source, key="virtual_robot"
+        )
+        if self.parameters.feedback_rate:
+            motors = dataclasses.replace(parameters.motors, feedback_rate=self.parameters.feedback_rate)
+            parameters = dataclasses.replace(parameters, motors=motors)
+        seed = parameters.seed if self.parameters.seed < 0 else self.parameters.seed
+        try:
+            motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, seed)
+        except RecordingError as error:
+            raise ConfigError(str(error)) from error
+        robot = VirtualRobot(parameters, self.robot_file.robot, hardware, seed, motion)
+        interface = self.parameters.interface or hardware.can.interface
+        channel = self.parameters.channel or hardware.can.channel
+        settings = type(hardware.can)(interface, channel, hardware.can.bitrate, hardware.can.hop_limit)
+        self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
+        self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
+        self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
+        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate)
+
+    def activate(self) -> None:
+        try:
+            self._live.start()
+        except BusError as error:
+            raise ConfigError(str(error)) from error
+        self._inputs = [self.create_subscription(String, "virtual/fault", self._inject, _FAULTS)]
+        # Who offers to steer sees by the subscription whether anybody obeys.
+        if self.parameters.steerable or self.parameters.motion == "topic":
+            self._inputs.append(self.create_subscription(QuaternionStamped, "virtual/base_orientation", self._turn_base, COMMAND))
+        self._watch = self.create_timer(0.5, self._report)
+
+    def deactivate(self) -> None:
+        self.destroy_timer(self._watch)
+        for subscription in self._inputs:
+            self.destroy_subscription(subscription)
+        self._live.stop()
+
+    def cleanup(self) -> None:
+        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity"):
+            if hasattr(self, name):
+                self.destroy_publisher(getattr(self, name))
+                delattr(self, name)
+
+    def _publish(self, truth: Truth) -> None:
+        """Called from the robot's thread."""
+        stamp, frame = self.get_clock().now().to_msg(), self.parameters.base_frame
+        tip = PoseStamped(pose=_pose(truth.tip_position, truth.tip_orientation))
+        backbone = PoseArray(poses=[_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)])
+        gravity = Vector3Stamped()
+        gravity.vector.x, gravity.vector.y, gravity.vector.z = truth.gravity.tolist()
+        messages = ((self._publisher_tip, tip), (self._publisher_backbone, backbone), (self._publisher_gravity, gravity))
+        for publisher, message in messages:
+            message.header.stamp, message.header.frame_id = stamp, frame
+            publisher.publish(message)
+
+    def _turn_base(self, message: QuaternionStamped) -> None:
+        q = message.quaternion
+        try:
+            orientation = rotation_from_quaternion(q.x, q.y, q.z, q.w)
+        except ValueError as error:
+            self.get_logger().warning(f"virtual/base_orientation: {error}")
+            return
+        with self._live.lock:
+            self._live.robot.turn_base(orientation)
+
+    def _inject(self, message: String) -> None:
+        """`{kind: drop, frames: imu, duration: 2}` begins a fault, `clear` ends all."""
+        try:
+            if message.data.strip() == "clear":
+                with self._live.lock:
+                    self._live.robot.clear_faults()
+                self.get_logger().info("faults cleared")
+                return
+            fault = Fault.parse(yaml.safe_load(message.data), "virtual/fault")
+            with self._live.lock:
+                self._live.robot.inject(fault)
+        except (ConfigError, yaml.YAMLError) as error:
+            self.get_logger().error(str(error))
+            return
+        self.get_logger().info(f"fault: {message.data}")
+
+    def _report(self) -> None:
+        live = self._live
+        if live.error is not None:
+            self.get_logger().fatal(f"the virtual robot has stopped: {live.error!r}")
+            self.report(ERROR, f"stopped: {live.error!r}")
+            self.finished = True
+            return
+        with live.lock:
+            faults, refused, unresolved = live.robot.faults, live.robot.refused, live.robot.unresolved
+        kinds = ", ".join(fault.kind for fault in faults)
+        sentence = f"faults: {kinds}" if kinds else "on the bus" if live.link.is_open else f"no bus: {live.link.status}"
+        self.report(
+            OK if live.link.is_open and not kinds else WARN,
+            sentence,
+            lost_time=f"{live.lost_time:.3f} s",
+            refused_frames=refused,
+            unresolved_steps=unresolved,
+            frames_received=live.link.counters.received,
+            frames_sent=live.link.counters.sent,
+        )
+
+
+def _pose(position: object, orientation: object) -> Pose:
+    x, y, z = position.tolist()
+    qx, qy, qz, qw = orientation.tolist()
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def main() -> int:
+    return run(VirtualRobotNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,194 @@
+"""The node can_bridge as a process, on a bus with a stand-in for motors and board: topics, services, refusals, ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+import pytest  # noqa: E402
+import rclpy  # noqa: E402
+from sensor_msgs.msg import Imu, JointState, Temperature  # noqa: E402
+from std_msgs.msg import Float32  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+
+from gravcomp.canbus import codec  # noqa: E402
+from gravcomp.canbus.link import CanLink  # noqa: E402
+from gravcomp.canbus.multicast import private_channel  # noqa: E402
+from gravcomp.description.hardware import CanInterface  # noqa: E402
+from gravcomp_msgs.msg import CableCommand, CableState  # noqa: E402
+from gravcomp_node import COMMAND, SENSOR  # noqa: E402
+
+# Children of a run under nohup would ignore it.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+ZERO = bytes(8)
+STATUS = dict(protocol=1, firmware_major=1, firmware_minor=0, accelerometer_range=1, gyroscope_range=0, heater_duty=0, flags=0)
+
+
+class Board:
+    """Six motors that stand still and an IMU at rest, in a thread; `currents` are the last frames by id."""
+
+    def __init__(self, channel: str):
+        self.link = CanLink(CanInterface(channel=channel), [0x200, 0x1FF, 0x320])
+        self.link.open()
+        self.currents, self.duties, self.driven, self._end = {}, [], False, threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        begin, k = time.monotonic(), 0
+        while not self._end.is_set():
+            self.link.send(codec.encode(f"MotorFeedback{i}", angle=100 * i, speed=0, current=0.05) for i in range(1, 7))
+            self.link.send([
+                codec.encode("BoardStatus", **STATUS),
+                codec.encode("ImuAccelerometer", x=0, y=k % 5, z=5460, sequence=k % 256),
+                codec.encode("ImuGyroscope", x=0, y=0, z=k % 3, sequence=k % 256),
+                codec.encode("ImuTime", time=int(1e6 * (time.monotonic() - begin)), temperature=40.0, sequence=k % 256),
+            ])
+            k += 1
+            for frame in self.link.receive(0.01):
+                if frame.arbitration_id == 0x320:
+                    self.duties.append(codec.decode(frame).values.duty)
+                else:
+                    self.currents[frame.arbitration_id] = bytes(frame.data)
+                    self.driven |= bytes(frame.data) != ZERO
+
+    def close(self):
+        self._end.set()
+        self._thread.join()
+        self.link.close()
+
+
+class Bench:
+    """The node's process, the board, and a listener."""
+
+    def __init__(self, *parameters: str):
+        channel = private_channel()
+        self.board = Board(channel)
+        options = [part for p in (f"channel:={channel}", *parameters) for part in ("-p", p)]
+        self.process = subprocess.Popen([sys.executable, "-m", "gravcomp_hw.can_bridge", "--ros-args", *options])
+        rclpy.init()
+        self.node = rclpy.create_node("listener")
+        self.heard = {}
+        for kind, topic, qos in (
+            (Imu, "imu/data_raw", SENSOR), (Temperature, "imu/temperature", SENSOR), (CableState, "cable/state", COMMAND),
+            (JointState, "joint_states", 10),
+        ):  # fmt: skip
+            self.node.create_subscription(kind, topic, lambda m, t=topic: self.heard.update({t: m}), qos)
+        self.commands = self.node.create_publisher(CableCommand, "cable/command", COMMAND)
+        self.heater = self.node.create_publisher(Float32, "imu/heater", COMMAND)
+
+    def until(self, condition, what, each=lambda: None):
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline, what
+            each()
+            rclpy.spin_once(self.node, timeout_sec=0.01)
+
+    def drive(self):
+        """Commands with a little expected tension, so that the currents are not zero."""
+        imu = self.heard.get("imu/data_raw")
+        if imu is not None:
+            self.commands.publish(CableCommand(header=imu.header, displacement=[0.0] * 6, tension=[0.5] * 6))
+
+    def state(self):
+        state = self.heard.get("cable/state")
+        return None if state is None else state.state
+
+    def follow(self):
+        self.until(lambda: self.state() == CableState.ACTIVE and self.board.driven, "the bridge does not drive", self.drive)
+
+    def call(self, service):
+        client = self.node.create_client(Trigger, f"can_bridge/{service}")
+        assert client.wait_for_service(10.0)
+        future = client.call_async(Trigger.Request())
+        self.until(future.done, f"{service} is not answered")
+        return future.result()
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        self.node.destroy_node()
+        rclpy.try_shutdown()
+        self.board.close()
+
+
+@pytest.fixture
+def bench(request):
+    bench = Bench(*getattr(request, "param", ()))
+    yield bench
+    bench.close()
+
+
+def test_samples_states_and_services_are_those_of_the_table(bench):
+    bench.follow()
+    bench.until(lambda: len(bench.heard) == 4, "a topic is missing")
+    imu, state, joints = (bench.heard[t] for t in ("imu/data_raw", "cable/state", "joint_states"))
+    assert imu.header.frame_id == "imu_link" and imu.orientation_covariance[0] == -1.0
+    assert imu.linear_acceleration.z == pytest.approx(9.80665, rel=1e-6)
+    assert bench.heard["imu/temperature"].temperature == 40.0
+    assert list(joints.name) == ["s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3"] and len(state.displacement) == 6
+    assert all(t >= 0 for t in state.tension)
+
+    answer = bench.call("stop")
+    assert answer.success and "resume" in answer.message
+    bench.until(lambda: bench.state() == CableState.STOPPED, "not stopped", bench.drive)
+    assert set(bench.board.currents.values()) == {ZERO}
+    assert bench.call("resume").success
+    bench.follow()
+
+
+def test_the_heater_follows_its_topic(bench):
+    bench.until(lambda: 0.25 in bench.board.duties, "no heater command", lambda: bench.heater.publish(Float32(data=0.25)))
+    bench.until(lambda: bench.board.duties[-1] == 0.0, "the heater stays on without commands")
+
+
+def test_a_hostile_command_holds_and_does_not_end_the_node(bench):
+    bench.follow()
+    bad = CableCommand(displacement=[float("nan")] * 6)
+    bench.until(lambda: bench.state() == CableState.HOLDING, "not holding", lambda: bench.commands.publish(bad))
+    assert "not a number" in bench.heard["cable/state"].message
+    bench.follow()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_without_current_and_with_code_0(bench, number):
+    bench.follow()
+    bench.process.send_signal(number)
+    assert bench.process.wait(15.0) == 0
+    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "current is left")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGHUP, signal.SIGSEGV, signal.SIGSTOP])
+def test_whatever_else_ends_it_the_guard_zeroes_the_currents(bench, number):
+    bench.follow()
+    bench.process.send_signal(number)
+    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "current is left")
+
+
+@pytest.mark.parametrize("bench", [("zero:=home",)], indirect=True)
+def test_without_a_known_zero_nothing_is_driven(bench):
+    bench.until(lambda: bench.state() == CableState.STOPPED, "not stopped", bench.drive)
+    assert "not homed" in bench.heard["cable/state"].message and not bench.board.driven
+
+
+@pytest.mark.parametrize(
+    ("parameter", "complaint"),
+    [
+        ("channel:=10.0.0.1:80", "not a multicast group"),
+        ("interface:=semaphore", "CAN interface 'semaphore' is not available"),
+        ("zero:=sometimes", "allowed: one of start, home, home_at_start"),
+        ("control_rate:=20.0", "allowed: 200 to 1000 Hz"),
+        ("robot:=nobody", "give the path of a robot's YAML"),
+        ("chanel:=can0", "unknown parameter 'chanel'"),
+    ],
+)
+def test_bad_parameters_end_the_node_with_one_sentence(parameter, complaint):
+    command = [sys.executable, "-m", "gravcomp_hw.can_bridge", "--ros-args", "-p", parameter]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 2 and complaint in result.stderr and "Traceback" not in result.stderr

@@ -1,0 +1,138 @@
+"""The node virtual_robot: truth topics, base orientation, faults, refusals."""
+
+import os
+import time
+
+os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+import rclpy  # noqa: E402
+from geometry_msgs.msg import PoseArray, PoseStamped, QuaternionStamped, Vector3Stamped  # noqa: E402
+from gravcomp_hw.virtual_robot import VirtualRobotNode  # noqa: E402
+from gravcomp_node import COMMAND, SENSOR  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from gravcomp.config import ConfigError  # noqa: E402
+
+
+class Graph:
+    """The node and a listener in one executor."""
+
+    def __init__(self, *parameters: str):
+        overrides = [
+            part for p in ("interface:=virtual", f"channel:=node{time.monotonic_ns()}", *parameters) for part in ("-p", p)
+        ]
+        rclpy.init(args=["test", "--ros-args", *overrides])
+        self.executor = SingleThreadedExecutor()
+        self.node, self.received = None, {}
+
+    def __enter__(self):
+        return self
+
+    def start(self):
+        self.node = VirtualRobotNode()
+        self.listener = rclpy.create_node("listener", use_global_arguments=False)
+        for topic, kind in (("truth/tip", PoseStamped), ("truth/backbone", PoseArray), ("truth/gravity", Vector3Stamped)):
+            self.listener.create_subscription(kind, topic, lambda m, t=topic: self.received.update({t: m}), SENSOR)
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.listener)
+        self.node.start()
+        return self
+
+    def until(self, condition, what):
+        deadline = time.monotonic() + 120.0
+        while not condition():
+            assert time.monotonic() < deadline, what
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def __exit__(self, *_):
+        if self.node is not None:
+            self.node.shut_down()
+            self.node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def test_truth_is_published_in_the_base_frame_with_one_stamp():
+    with Graph("inclination_deg:=45.0") as graph:
+        graph.start()
+        graph.until(lambda: len(graph.received) == 3, "no truth")
+        tip, gravity = graph.received["truth/tip"], graph.received["truth/gravity"].vector
+        assert {m.header.frame_id for m in graph.received.values()} == {"soft_base"}
+        np.testing.assert_allclose([gravity.x, gravity.y, gravity.z], [-9.80665 / 2**0.5, 0.0, -9.80665 / 2**0.5], atol=1e-6)
+        assert len(graph.received["truth/backbone"].poses) == 11
+        assert 0.09 < tip.pose.position.z < 0.101 and tip.pose.position.x < 0.0
+
+
+@pytest.mark.parametrize("parameters", [("motion:=topic",), ("motion:=tilt", "hold:=0.0", "steerable:=true")])
+def test_the_base_follows_its_topic(parameters):
+    with Graph(*parameters) as graph:
+        graph.start()
+        publisher = graph.listener.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
+        upright = QuaternionStamped()
+        upright.quaternion.w = 1.0
+
+        def points_up():
+            publisher.publish(upright)
+            return "truth/gravity" in graph.received and graph.received["truth/gravity"].vector.z < -9.8
+
+        graph.until(points_up, "the base does not turn")
+
+
+def test_a_base_that_may_not_be_steered_does_not_listen():
+    with Graph("motion:=tilt") as graph:
+        graph.start()
+        publisher = graph.listener.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
+        fault = graph.listener.create_publisher(String, "virtual/fault", 20)
+        graph.until(lambda: fault.get_subscription_count() == 1, "the node does not listen to virtual/fault")
+        assert publisher.get_subscription_count() == 0
+
+
+def test_faults_begin_end_and_are_refused_in_words():
+    with Graph() as graph:
+        graph.start()
+        publisher = graph.listener.create_publisher(String, "virtual/fault", 20)
+        graph.until(lambda: publisher.get_subscription_count() == 1, "the node does not listen to virtual/fault")
+        robot = graph.node._live.robot
+        publisher.publish(String(data="{kind: imu_stuck}"))
+        graph.until(lambda: [f.kind for f in robot.faults] == ["imu_stuck"], "the fault does not begin")
+        for bad in ("{kind: explode}", "{kind: [", "7", "{kind: stall, cable: s9}"):
+            publisher.publish(String(data=bad))
+        publisher.publish(String(data="clear"))
+        graph.until(lambda: robot.faults == (), "the faults do not end")
+
+
+@pytest.mark.parametrize(
+    "parameter, words",
+    [
+        ("motion:=dance", "allowed: one of static"),
+        ("motion:=recording", "'recording' is empty"),
+        ("inclination_deg:=400.0", "allowed: -180 to 180 deg"),
+        ("interface:=nosuch", "nosuch"),
+        ("tilt:=3", "unknown parameter 'tilt'"),
+    ],
+)
+def test_bad_parameters_are_refused_in_words(parameter, words):
+    with Graph(parameter) as graph, pytest.raises(ConfigError, match=words):
+        graph.start()
+
+
+def test_an_unreadable_recording_is_refused_in_words(tmp_path):
+    with (
+        Graph("motion:=recording", f"recording:={tmp_path / 'none.npz'}") as graph,
+        pytest.raises(ConfigError, match="does not exist"),
+    ):
+        graph.start()
+
+
+def test_it_can_be_deactivated_and_activated_again():
+    with Graph() as graph:
+        graph.start()
+        graph.until(lambda: len(graph.received) == 3, "no truth")
+        graph.node.trigger_deactivate()
+        assert not graph.node._live.link.is_open
+        graph.received.clear()
+        graph.node.trigger_activate()
+        graph.until(lambda: len(graph.received) == 3, "no truth after the second activation")

@@ -1,0 +1,117 @@
+"""A declared data class as ROS parameters: descriptors, defaults from the robot's YAML, overrides, and back."""
+
+import typing
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from gravcomp.config import ConfigError, declared_parameters, from_mapping
+from gravcomp.config.parameters import DeclaredParameter, convert
+
+
+def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
+    """Declare every leaf of `cls` on the node and return the data class with the overrides taken in.
+
+    `defaults`: nested mapping of edge keys from the robot's YAML; `source`: where it stands, for errors.
+    Raises ConfigError for a value of the wrong type or out of range, wherever it was given.
+    """
+    check_defaults(cls, defaults, source)
+    given = _flatten(defaults)
+    for leaf in declared_parameters(cls):
+        override = node._parameter_overrides.get(leaf.key)
+        value = given.get(leaf.key, leaf.default)
+        if override is not None:
+            # Checked here and not by rclpy, so that the error says what is allowed, and '1' is as good as '1.0'.
+            value = override.value
+            convert(value, leaf.type, leaf.parameter, source=f"parameter of {node.get_name()}", key=leaf.key)
+        value = _ros_value(value, leaf.type)
+        node.declare_parameter(leaf.key, value, _descriptor(leaf, value), ignore_override=True)
+    return read(node, cls)
+
+
+def refuse_unknown_overrides(node: Node) -> None:
+    """A mistyped parameter is refused; ROS itself would ignore it."""
+    for name in node._parameter_overrides:
+        known = node.has_parameter(name) or name.startswith(("qos_overrides.", "start_type_description_service"))
+        if not known:
+            own = sorted(p for p in node._parameters if not p.startswith(("qos_overrides", "use_sim_time", "start_type")))
+            raise ConfigError(f"{node.get_name()}: unknown parameter '{name}'; allowed: {', '.join(own)}")
+
+
+def read(node: Node, cls: type, changes: list[Parameter] = ()) -> Any:
+    """The data class from the node's parameters, with `changes` (not yet set) taken in. Raises ConfigError."""
+    changed = {p.name: p.value for p in changes}
+    mapping: dict = {}
+    for leaf in declared_parameters(cls):
+        value = changed[leaf.key] if leaf.key in changed else node.get_parameter(leaf.key).value
+        if value is not None and not isinstance(value, (bool, int, float, str)):
+            value = list(value)
+        *path, last = leaf.key.split(".")
+        place = mapping
+        for step in path:
+            place = place.setdefault(step, {})
+        if value is not None or leaf.default is None:
+            place[last] = value
+    return from_mapping(cls, _without_unset(mapping, cls), source=f"parameter of {node.get_name()}")
+
+
+def check_defaults(cls: type, defaults: dict, source: str) -> None:
+    """Check what the YAML gives: unknown keys and bad values; a key that only ROS will give may be missing."""
+    leaves = {leaf.key: leaf for leaf in declared_parameters(cls)}
+    for key, value in _flatten(defaults).items():
+        if key not in leaves:
+            raise ConfigError(f"{source}: unknown key '{key}'; allowed: {', '.join(sorted(leaves))}")
+        convert(value, leaves[key].type, leaves[key].parameter, source=source, key=key)
+
+
+def _flatten(mapping: dict, prefix: str = "") -> dict:
+    flat = {}
+    for key, value in (mapping or {}).items():
+        here = f"{prefix}.{key}" if prefix else str(key)
+        if isinstance(value, dict):
+            flat.update(_flatten(value, here))
+        else:
+            flat[here] = value
+    return flat
+
+
+def _without_unset(mapping: dict, cls: type) -> dict:
+    return {k: _without_unset(v, cls) if isinstance(v, dict) else v for k, v in mapping.items() if v is not None}
+
+
+def _scalar_type(kind: Any) -> Any:
+    arguments = [k for k in typing.get_args(kind) if k not in (type(None), Ellipsis)]
+    return arguments[0] if arguments else kind
+
+
+def _ros_value(value: Any, kind: Any) -> Any:
+    """ROS knows no tuples and tells 1 from 1.0."""
+    scalar = _scalar_type(kind)
+    if isinstance(value, (list, tuple)) or hasattr(value, "typecode"):
+        return [scalar(v) for v in value]
+    if value is None or scalar is bool:
+        return value
+    return scalar(value)
+
+
+def _descriptor(leaf: DeclaredParameter, value: Any) -> ParameterDescriptor:
+    declared = leaf.parameter
+    unit = f" [{declared.edge_unit}]" if declared.edge_unit else ""
+    descriptor = ParameterDescriptor(
+        description=f"{declared.description}{unit}",
+        additional_constraints=f"allowed: {declared.allowed()}",
+        read_only=declared.read_only,
+        # An unset or empty value tells ROS no type, so it may change; `read` checks it all the same.
+        dynamic_typing=value is None or value == [],
+    )
+    if leaf.type is float and (declared.minimum is not None or declared.maximum is not None):
+        low = -1e308 if declared.minimum is None else float(declared.minimum)
+        high = 1e308 if declared.maximum is None else float(declared.maximum)
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
+    if leaf.type is int and (declared.minimum is not None or declared.maximum is not None):
+        low = -(2**63) if declared.minimum is None else int(declared.minimum)
+        high = 2**63 - 1 if declared.maximum is None else int(declared.maximum)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=0)]
+    return descriptor

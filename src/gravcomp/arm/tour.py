@@ -1,0 +1,45 @@
+"""A tour of an arm through poses: joint positions over time, and what is measured at each pose.
+
+Between two poses every joint follows the minimum-jerk polynomial  s(x) = 10 x^3 - 15 x^4 + 6 x^5  over the same time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# The article's five directions of the robot, degrees above the horizontal, and joints of the seven-axis arm that give them.
+FIVE_POSES = {
+    135.0: (0.0, -0.6, 0.0, -0.9, 0.0, 0.7145, 0.0),
+    90.0: (0.0, 0.3, 0.0, -0.9, 0.0, 0.6, 0.0),
+    45.0: (0.3, 0.3, 0.0, 0.6, 0.0, -0.1145, 0.0),
+    0.0: (0.3, 0.5, 0.0, 0.8, 0.0, 0.2708, 0.0),
+    -45.0: (0.0, 0.6, 0.0, 1.0, 0.0, 0.7562, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Tour:
+    """Poses (p, j) in rad, visited in order; each `hold` s after a way of `travel` s."""
+
+    poses: np.ndarray
+    travel: float
+    hold: float
+
+    @property
+    def duration(self) -> float:
+        """s of one pass."""
+        return len(self.poses) * (self.travel + self.hold)
+
+    def positions(self, time: float) -> np.ndarray:
+        """(j,) rad at `time` s; it starts from the last pose, so that passes join, and goes on for ever."""
+        leg, into = divmod(time, self.travel + self.hold)
+        index = int(leg) % len(self.poses)
+        x = min(1.0, into / self.travel)
+        s = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        before = self.poses[index - 1]
+        return before + s * (self.poses[index] - before)
+
+    def at_rest(self, time: float, settled: float) -> int | None:
+        """The pose that has been held for `settled` s at `time`, else None."""
+        leg, into = divmod(time, self.travel + self.hold)
+        return int(leg) % len(self.poses) if into >= self.travel + settled else None

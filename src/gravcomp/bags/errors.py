@@ -1,0 +1,7 @@
+"""What goes wrong with bags."""
+
+from gravcomp.config import ConfigError
+
+
+class BagError(ConfigError):
+    """A bag that cannot be written or read; the text is for people."""

@@ -1,0 +1,159 @@
+"""The reduced model and the inverse problem: cost of a closed-loop step, error against the full model, what
+compensation leaves."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gravcomp.description import Robot, load_robot_file
+from gravcomp.inverse import Command, InverseController, Target, straight_target
+from gravcomp.reduction import build, load
+from gravcomp.reduction.motion import ReducedDynamicSolver
+from gravcomp.simulation import RobotModel, Shape, Simulator
+
+Progress = Callable[[str], None]
+
+_GRAVITY, _RATE = 9.81, 100.0  # m/s^2, steps a second
+_DIRECTIONS, _SETTLING = 200, 80
+# A weight of 1e-3 m^2 makes 0.1 rad of tilt count like 3 mm.
+_DIRECTION_WEIGHT = 1e-3
+
+
+def reduced_model(progress: Progress) -> dict:
+    """`reduction_build_s` (0: was built before); `reduced_step_ms`: one closed-loop step, model and inverse problem,
+    and `inverse_us`: the inverse problem alone, both while gravity turns at random at 10 deg/s; `reduced_error_mm`:
+    worst tip distance from the full model under the same commands at 10 and 90 deg/s; `reduced_share`: of the steps
+    that the reduced model served."""
+    robot = load_robot_file("article").robot
+    model = RobotModel(robot)
+    seconds = _build_if_needed(model, progress)
+    target = straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
+    steps, solves, served, errors = [], [], [], {}
+    for rate in (10, 90):
+        for seed in range(3):
+            progress(f"reduced model at {rate} deg/s, path {seed + 1} of 3")
+            gravities = random_path(np.radians(rate), 400, seed)
+            loop = list(closed_loop(Simulator(model), gravities, target))
+            if rate == 10:
+                steps += [shape.solve_time + command.solve_time for shape, command in loop[50:]]
+                solves += [command.solve_time for _, command in loop[50:]]
+            served += [shape.model == "reduced" for shape, _ in loop]
+            errors[rate] = max(errors.get(rate, 0.0), _worst_error(robot, gravities, loop))
+    return {
+        "reduction_build_s": round(seconds, 1),
+        "reduced_step_ms": _statistics(np.array(steps), 1e3),
+        "inverse_us": _statistics(np.array(solves), 1e6),
+        "reduced_error_mm": round(1e3 * max(errors.values()), 4),
+        "reduced_error_by_rate_mm": {f"{rate} deg/s": round(1e3 * error, 4) for rate, error in errors.items()},
+        "reduced_share": round(float(np.mean(served)), 4),
+    }
+
+
+def reduced_motion(model: RobotModel, progress: Progress) -> ReducedDynamicSolver:
+    """The model's motion in reduced coordinates."""
+    _build_if_needed(model, progress)
+    reduced = load(model).reduced_model(model)
+    mass = reduced.basis.T @ model.mass_matrix().multiply(reduced.basis)
+    return ReducedDynamicSolver(reduced, mass, model.mesh.materials[0].damping_time, model.length)
+
+
+def compensation(progress: Progress) -> dict:
+    """What the full model says of the displacements found, over random directions of gravity: `inverse_lateral_mm`
+    (position alone is kept), and with a weight on the tip's direction `inverse_tilt_deg` and
+    `inverse_lateral_with_direction_mm`; `inverse_shortening_mm`: the axial error left; `inverse_least_tension_n`:
+    largest, over directions, of the least tension in a segment: cables that pull against each other."""
+    robot = load_robot_file("article").robot
+    simulator, full = Simulator(robot), Simulator(robot, reduced=False)
+    lateral, lateral_tilted, tilt, shortening, least = [], [], [], [], []
+    for number, gravity in enumerate(_directions(_DIRECTIONS)):
+        progress(f"compensation, direction {number + 1} of {_DIRECTIONS}")
+        for weight in (0.0, _DIRECTION_WEIGHT):
+            target = straight_target(robot.length, tip_direction_weight=weight)
+            *_, (_, command) = closed_loop(simulator, [gravity] * _SETTLING, target)
+            shape = full.step(gravity, command.displacement)
+            (lateral_tilted if weight else lateral).append(np.linalg.norm(shape.tip_position[:2]))
+            if weight:
+                tilt.append(np.degrees(np.arctan2(np.linalg.norm(shape.tip_direction[:2]), shape.tip_direction[2])))
+                shortening.append(robot.length - shape.tip_position[2])
+                least.append(max(_tensions_of(robot, segment.name, shape).min() for segment in robot.segments))
+    return {
+        "inverse_lateral_mm": _spread(lateral, 1e3),
+        "inverse_lateral_with_direction_mm": _spread(lateral_tilted, 1e3),
+        "inverse_tilt_deg": _spread(tilt, 1.0),
+        "inverse_shortening_mm": _spread(shortening, 1e3),
+        "inverse_least_tension_n": round(max(least), 4),
+    }
+
+
+def closed_loop(simulator: Simulator, gravities, target: Target):
+    """Yields shape and command of each step of the loop, from the released robot."""
+    controller = InverseController(simulator.robot)
+    simulator.reset()
+    displacement = None
+    for gravity in gravities:
+        shape = simulator.step(gravity, displacement)
+        command = controller.step(
+            shape.response,
+            target,
+            backbone_station=shape.backbone_station,
+            tension=shape.cable_tension,
+            interval=1.0 / _RATE,
+        )
+        displacement = command.displacement
+        yield shape, command
+
+
+def _build_if_needed(model: RobotModel, progress: Progress) -> float:
+    """s that it took to build the reduced model; 0 where there is one."""
+    if load(model) is not None:
+        return 0.0
+    progress("building the reduced model")
+    return build(model)[1]
+
+
+def random_path(rate: float, steps: int, seed: int) -> np.ndarray:
+    """Gravity (steps, 3) that turns at `rate` (rad/s) about an axis that changes every second."""
+    rng = np.random.default_rng(seed)
+    gravity = _GRAVITY * _unit(rng)
+    path = []
+    for step in range(steps):
+        if step % round(_RATE) == 0:
+            axis = _unit(rng)
+        angle = rate / _RATE
+        along = axis * (axis @ gravity)
+        gravity = along + np.cos(angle) * (gravity - along) + np.sin(angle) * np.cross(axis, gravity)
+        path.append(gravity)
+    return np.array(path)
+
+
+def _worst_error(robot: Robot, gravities: np.ndarray, loop: list[tuple[Shape, Command]]) -> float:
+    """Worst distance (m) of the loop's tips from those of the full model under the same displacements."""
+    full = Simulator(robot, reduced=False)
+    displacement, worst = None, 0.0
+    for gravity, (shape, command) in zip(gravities, loop):
+        exact = full.step(gravity, displacement)
+        worst = max(worst, float(np.linalg.norm(exact.tip_position - shape.tip_position)))
+        displacement = command.displacement
+    return worst
+
+
+def _tensions_of(robot: Robot, segment: str, shape: Shape) -> np.ndarray:
+    return shape.cable_tension[[cable.segment == segment for cable in robot.cables]]
+
+
+def _directions(count: int) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return np.array([_GRAVITY * _unit(rng) for _ in range(count)])
+
+
+def _unit(rng: np.random.Generator) -> np.ndarray:
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def _statistics(values: np.ndarray, factor: float) -> dict:
+    return {"median": round(factor * float(np.median(values)), 3), "p99": round(factor * float(np.percentile(values, 99)), 3)}
+
+
+def _spread(values: list[float], factor: float) -> dict:
+    return {"median": round(factor * float(np.median(values)), 4), "worst": round(factor * float(np.max(values)), 4)}

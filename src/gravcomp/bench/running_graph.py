@@ -1,0 +1,70 @@
+"""The whole graph on a virtual robot, as processes, for the benchmarks: on a bus and in a namespace of its own."""
+
+import os
+import time
+
+import psutil
+
+from gravcomp.canbus import codec
+from gravcomp.canbus.link import CanLink
+from gravcomp.canbus.multicast import private_channel
+from gravcomp.description.hardware import CanInterface
+from gravcomp.launcher import Graph
+from gravcomp.launcher.robot_graph import LOOP, RobotGraph
+
+NODES = ("virtual_robot", *(executable for _, executable in LOOP))
+"""Executables of the nodes that run."""
+
+START_TIMEOUT = 300.0
+"""s; on first use the compiled code of the models is made."""
+
+
+class RunningGraph:
+    """Virtual robot and loop; starts on entering. `parameters`: executable -> parameters.
+
+    Attributes: can (CanInterface), namespace, robot (RobotGraph).
+    """
+
+    def __init__(self, parameters: dict[str, dict] | None = None):
+        self.can = CanInterface(channel=private_channel())
+        self.namespace = f"/bench_{os.getpid()}_{self.can.channel.rpartition(':')[2]}"
+        self.robot = robot = RobotGraph("article", self.can.interface, self.can.channel, self.namespace, parameters or {})
+        specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop()]
+        self._specs = {spec.executable: spec for spec in specs}
+        self._graph = Graph(specs)
+
+    def __enter__(self) -> "RunningGraph":
+        self._graph.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._graph.stop()
+
+    def check(self) -> None:
+        """Raises NodeDied when a node has ended by itself."""
+        self._graph.check()
+
+    def dead(self) -> dict[str, str]:
+        """Nodes that have ended, and why."""
+        return self._graph.dead()
+
+    def restart(self, executable: str) -> None:
+        """Start a node again that was ended."""
+        self._graph.start_one(self._specs[executable])
+
+    def process(self, executable: str) -> psutil.Process:
+        return psutil.Process(self._graph.processes[self._specs[executable].name].pid)
+
+    def wait_for_commands(self, timeout: float = START_TIMEOUT) -> float:
+        """s until currents follow commands, seen on the bus. Raises TimeoutError, NodeDied."""
+        begin = time.monotonic()
+        link = CanLink(self.can, [codec.layout("CommandTrace").frame_id])
+        link.open()
+        try:
+            while time.monotonic() - begin < timeout:
+                if link.receive(0.1):
+                    return time.monotonic() - begin
+                self.check()
+        finally:
+            link.close()
+        raise TimeoutError(f"no command reached the motors within {timeout:.0f} s; the nodes' output is in {self._graph.logs}")

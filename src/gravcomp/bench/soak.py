@@ -1,0 +1,73 @@
+"""A long run of the graph: no command may get lost, no process may grow.
+
+Lost commands are those that the controller published and whose CommandTrace never came on the bus: overtaken in the
+middleware, or refused. Memory growth is the median of the resident set over the last tenth of the run minus that over the first
+tenth after the warm-up.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+
+from gravcomp.bench.probe import CurrentMonitor, Probe
+from gravcomp.bench.running_graph import NODES, RunningGraph
+from gravcomp.description import load_robot_file
+from gravcomp.description.hardware import parse_hardware
+
+_WARM_UP = 60.0  # s, at most a fifth of the run
+_SAMPLE = 2.0  # s between looks at the memory
+_SETTLE = 1.0  # s for what is on its way
+
+
+def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
+    """`lost_commands`, `memory_growth_mb` by process (worst: `worst_growth_mb`), violations of the current limit."""
+    file = load_robot_file("article")
+    limit = parse_hardware(file.section("hardware"), source=file.source).drive.current_limit
+    parameters = {"virtual_robot": {"motion": "tremor"}, "inverse_controller": {"enabled": False}}
+    with RunningGraph(parameters) as graph:
+        progress("starting the graph")
+        probe, monitor = Probe(graph), CurrentMonitor(graph, limit)
+        try:
+            time.sleep(5.0)
+            probe.enable(True)
+            graph.wait_for_commands()
+            memory = _watch(graph, 60.0 * minutes, progress)
+            probe.enable(False)
+            time.sleep(_SETTLE)
+            commands, traces = probe.count()["commands"], monitor.traces
+            graph.check()
+        finally:
+            probe.close()
+            monitor.close()
+    growth = {name: round(_growth(samples, 60.0 * minutes), 2) for name, samples in memory.items()}
+    return {
+        "robot": "virtual robot",
+        "minutes": minutes,
+        "commands": commands,
+        "lost_commands": commands - traces,
+        "memory_growth_mb": growth,
+        "worst_growth_mb": max(growth.values()),
+        "limit_violations": monitor.violations,
+        "holds": len([seen for seen in probe.states if seen.state.name in ("HOLDING", "FAULT")]),
+    }
+
+
+def _watch(graph: RunningGraph, duration: float, progress: Callable[[str], None]) -> dict[str, list[tuple[float, float]]]:
+    """(s, MB) by process."""
+    processes = {name: graph.process(name) for name in NODES}
+    samples: dict[str, list] = {name: [] for name in NODES}
+    begin = time.monotonic()
+    while (elapsed := time.monotonic() - begin) < duration:
+        graph.check()
+        for name, process in processes.items():
+            samples[name].append((elapsed, process.memory_info().rss / 2**20))
+        progress(f"{elapsed / 60:.1f} of {duration / 60:.1f} min")
+        time.sleep(min(_SAMPLE, duration / 50))
+    return samples
+
+
+def _growth(samples: list[tuple[float, float]], duration: float) -> float:
+    warm = min(_WARM_UP, 0.2 * duration)
+    after = [memory for elapsed, memory in samples if elapsed >= warm]
+    tenth = max(1, len(after) // 10)
+    return statistics.median(after[-tenth:]) - statistics.median(after[:tenth])

@@ -1,0 +1,169 @@
+"""Sliding tendons through via points: length, its exact Jacobian, and the stiffness that tension adds.
+
+A cable runs straight between its via points P_k = sum_a w_ka x_a. With e_k = P_(k+1) - P_k = sum_a d_ka x_a, l_k = |e_k|
+and t_k = e_k / l_k, its displacement (pulled in is positive) and what it adds to the equilibrium are
+
+    delta = sum_k (L_k - l_k),    H_a = d(delta)/dx_a = -sum_k d_ka t_k,    force = H^T lambda,
+    K_ab  = lambda sum_k d_ka d_kb (I - t_k t_k^T) / l_k.
+
+With capstan friction the tension falls along the path, lambda_k = lambda exp(-+ mu theta_k) with the angle theta_k turned
+so far (Euler and Eytelwein): minus while the cable is pulled in, plus while it is let out.
+"""
+
+import dataclasses
+
+import numpy as np
+from numba import njit
+
+from gravcomp.description import Cable
+from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
+from gravcomp.mesh.embedding import Embedding
+
+
+@dataclasses.dataclass(frozen=True)
+class TendonState:
+    """At one shape: displacement (m,) in m; jacobian (m, n) of it by the unknowns; force_jacobian (m, n), whose transpose
+    times the tensions is the cables' force (the same array without friction); tangent (s, 3) and length (s,) of every
+    piece; share (s,) of the cable's tension in it."""
+
+    displacement: np.ndarray
+    jacobian: np.ndarray
+    force_jacobian: np.ndarray
+    tangent: np.ndarray
+    length: np.ndarray
+    share: np.ndarray
+
+
+class Tendons:
+    """The cables of a robot on a mesh whose nodes are in the pattern's order."""
+
+    def __init__(self, cables: tuple[Cable, ...], routes: list[Embedding], rest: np.ndarray, pattern: BlockPattern):
+        self.count = len(cables)
+        self.friction = np.array([c.friction for c in cables])
+        self._n_free = pattern.n // 3
+        pieces = [piece for route in routes for piece in pieces_of(route)]
+        self._cable = np.repeat(np.arange(self.count), [len(r.nodes) - 1 for r in routes]).astype(np.int64)
+        self._first = np.concatenate([[0], np.cumsum([len(nodes) for nodes, _ in pieces])]).astype(np.int64)
+        self._nodes = np.concatenate([nodes for nodes, _ in pieces]) if pieces else np.zeros(0, dtype=np.int64)
+        self._weights = np.concatenate([weights for _, weights in pieces]) if pieces else np.zeros(0)
+        self._position = self._scatter_positions(pieces, pattern)
+        self._rest_length = np.zeros(self.count)
+        self._rest_length = -self.state(rest).displacement
+        stiffness = np.array([c.axial_stiffness or np.inf for c in cables])
+        # Elongation under unit tension, m/N: zero for an inextensible cable.
+        self.axial_compliance = self._rest_length / stiffness
+
+    @property
+    def rest_length(self) -> np.ndarray:
+        """(m,) path lengths on the straight robot, in m."""
+        return self._rest_length
+
+    def state(self, x: np.ndarray, pulling: np.ndarray | None = None) -> TendonState:
+        """Lengths and Jacobians at node positions x (n, 3); `pulling` (m,) is 1 for cables pulled in, -1 for let out, 0 for
+        no friction."""
+        count = len(self._cable)
+        length, tangent = np.empty(count), np.empty((count, 3))
+        jacobian = np.zeros((self.count, 3 * self._n_free))
+        path = np.zeros(self.count)
+        _tendons(x, self._cable, self._first, self._nodes, self._weights, self._n_free, length, tangent, jacobian, path)
+        share, force_jacobian = np.ones(count), jacobian
+        if pulling is not None and np.any(self.friction * pulling):
+            share = self._shares(tangent, self.friction * pulling)
+            force_jacobian = np.zeros_like(jacobian)
+            _force_jacobian(self._cable, self._first, self._nodes, self._weights, self._n_free, tangent, share, force_jacobian)
+        return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share)
+
+    def add_stiffness(self, state: TendonState, tension: np.ndarray, matrix: BlockMatrix) -> None:
+        """Add the geometric stiffness of the cables under `tension` (m,) to `matrix`."""
+        _add_stiffness(
+            self._cable, self._first, self._weights, state.tangent, state.length, state.share, tension, self._position,
+            matrix.values,
+        )  # fmt: skip
+
+    def _shares(self, tangent: np.ndarray, friction: np.ndarray) -> np.ndarray:
+        same = self._cable[1:] == self._cable[:-1]
+        cosine = np.clip((tangent[1:] * tangent[:-1]).sum(axis=1), -1.0, 1.0)
+        turn = np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)])
+        turned = np.cumsum(turn)
+        first = np.searchsorted(self._cable, np.arange(self.count))
+        return np.exp(-friction[self._cable] * (turned - turned[first][self._cable]))
+
+    def _scatter_positions(self, pieces: list, pattern: BlockPattern) -> np.ndarray:
+        """Where the 3 x 3 entries of each pair of nodes a >= b go; -1 where clamped or mirrored."""
+        rows, columns = [], []
+        for nodes, _ in pieces:
+            a, b = np.tril_indices(len(nodes))
+            for i in range(3):
+                for j in range(3):
+                    mirrored = (a == b) & (j > i)
+                    rows.append(np.where(mirrored, -1, 3 * nodes[a] + i))
+                    columns.append(3 * nodes[b] + j)
+            block = slice(-9, None)
+            rows[block] = [np.stack(rows[block], axis=1).ravel()]
+            columns[block] = [np.stack(columns[block], axis=1).ravel()]
+        if not rows:
+            return np.zeros(0, dtype=np.int64)
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        free = (row >= 0) & (row < 3 * self._n_free) & (column < 3 * self._n_free)
+        position = np.full(len(row), -1, dtype=np.int64)
+        position[free] = pattern.position(row[free], column[free])
+        return position
+
+
+def pieces_of(route: Embedding) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Nodes and weights d of every straight piece between neighbouring via points."""
+    pieces = []
+    for k in range(len(route.nodes) - 1):
+        nodes = np.concatenate([route.nodes[k + 1], route.nodes[k]])
+        signed = np.concatenate([route.weights[k + 1], -route.weights[k]])
+        unique, inverse = np.unique(nodes, return_inverse=True)
+        weights = np.bincount(inverse, signed)
+        used = weights != 0.0
+        pieces.append((unique[used], weights[used]))
+    return pieces
+
+
+@njit(cache=True)
+def _tendons(x, cable, first, nodes, weights, n_free, length, tangent, jacobian, path):
+    e = np.empty(3)
+    for k in range(len(cable)):
+        e[:] = 0.0
+        for q in range(first[k], first[k + 1]):
+            for i in range(3):
+                e[i] += weights[q] * x[nodes[q], i]
+        length[k] = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+        path[cable[k]] += length[k]
+        for i in range(3):
+            tangent[k, i] = e[i] / length[k]
+        for q in range(first[k], first[k + 1]):
+            if nodes[q] < n_free:
+                for i in range(3):
+                    jacobian[cable[k], 3 * nodes[q] + i] -= weights[q] * tangent[k, i]
+
+
+@njit(cache=True)
+def _force_jacobian(cable, first, nodes, weights, n_free, tangent, share, jacobian):
+    for k in range(len(cable)):
+        for q in range(first[k], first[k + 1]):
+            if nodes[q] < n_free:
+                for i in range(3):
+                    jacobian[cable[k], 3 * nodes[q] + i] -= share[k] * weights[q] * tangent[k, i]
+
+
+@njit(cache=True)
+def _add_stiffness(cable, first, weights, tangent, length, share, tension, position, values):
+    block = np.empty((3, 3))
+    entry = 0
+    for k in range(len(cable)):
+        factor = tension[cable[k]] * share[k] / length[k]
+        for i in range(3):
+            for j in range(3):
+                block[i, j] = factor * ((1.0 if i == j else 0.0) - tangent[k, i] * tangent[k, j])
+        for a in range(first[k], first[k + 1]):
+            for b in range(first[k], a + 1):
+                pair = weights[a] * weights[b]
+                for i in range(3):
+                    for j in range(3):
+                        if position[entry] >= 0:
+                            values[position[entry]] += pair * block[i, j]
+                        entry += 1

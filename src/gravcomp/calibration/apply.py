@@ -1,0 +1,106 @@
+"""What a calibration found, put into the robot's and the motors' descriptions, and into the robot's YAML with its comments kept."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+from gravcomp.calibration.statics import StaticParameters
+from gravcomp.config import ConfigError
+from gravcomp.description import Robot
+from gravcomp.description.hardware import Hardware
+from gravcomp.orientation.calibration import RestCalibration
+
+_STIFFEST = 1e6  # N: cables stiffer than that stay inextensible
+
+
+def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: float | None = None) -> Robot:
+    """The robot with modulus, cable elasticity and, where given, damping time (s) as fitted."""
+    cables = tuple(
+        dataclasses.replace(cable, axial_stiffness=_stiffness(robot.cable_end(cable) - cable.start, float(compliance)))
+        for cable, compliance in zip(robot.cables, parameters.compliance)
+    )
+    changes = {} if damping_time is None else {"damping_time": damping_time}
+    return dataclasses.replace(robot.with_material(youngs_modulus=float(parameters.youngs_modulus), **changes), cables=cables)
+
+
+def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
+    """The motors with capstan radius and cables' offsets as fitted, on top of what was known."""
+    motors = tuple(
+        dataclasses.replace(motor, offset=float(parameters.winding * motor.offset + offset))
+        for motor, offset in zip(hardware.motors, parameters.offset)
+    )
+    drive = dataclasses.replace(hardware.drive, capstan_radius=hardware.drive.capstan_radius * float(parameters.winding))
+    return dataclasses.replace(hardware, motors=motors, drive=drive)
+
+
+def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardware: Hardware) -> None:
+    """Write the robot's file `source` to `target` with the calibrated values of `robot` and `hardware`; comments and order stay.
+
+    Raises ConfigError when it cannot be written.
+    """
+    document = _document(source)
+    for entry, segment in zip(document["robot"]["segments"], robot.segments):
+        material = entry.setdefault("material", {})
+        material["youngs_modulus_mpa"] = round(segment.material.youngs_modulus * 1e-6, 5)
+        material["damping_time_ms"] = round(segment.material.damping_time * 1e3, 3)
+        if segment.material.creep_ratio:
+            material["creep_ratio"] = round(segment.material.creep_ratio, 5)
+            material["creep_time"] = round(segment.material.creep_time, 4)
+    for entry, cable in zip(document["robot"]["cables"], robot.cables):
+        if cable.axial_stiffness is not None:
+            entry["axial_stiffness"] = round(cable.axial_stiffness, 2)
+    motors = document.get("hardware") or {}
+    for entry, motor in zip(motors.get("motors", []), hardware.motors):
+        entry["offset_mm"] = round(motor.offset * 1e3, 4)
+    if motors:
+        motors.setdefault("drive", {})["capstan_radius_mm"] = round(hardware.drive.capstan_radius * 1e3, 5)
+    _write(document, target)
+
+
+def write_imu_calibration(source: str | Path, target: str | Path, found: RestCalibration, bias_model: Path | None = None) -> None:
+    """Write the robot's file `source` to `target` with the IMU's calibration, its mount where it was fitted, and where its bias model is kept.
+
+    Comments and order stay. Raises ConfigError when it cannot be written.
+    """
+    document = _document(source)
+    estimator = _section(_section(document, "nodes"), "imu_estimator")
+    calibration, correction = _section(estimator, "calibration"), found.correction
+    calibration["accel_scale"] = [round(value, 6) for value in correction.accel_scale]
+    calibration["accel_offset"] = [round(value, 5) for value in correction.accel_offset]
+    calibration["gyro_offset_deg_s"] = [round(math.degrees(value), 5) for value in correction.gyro_offset]
+    if bias_model is not None:
+        estimator["bias_model_file"] = str(bias_model.resolve())
+    if found.mount is not None:
+        _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in found.mount]
+    _write(document, target)
+
+
+def _section(mapping: dict, key: str) -> dict:
+    """The mapping under the key, made where the file has none or an empty one."""
+    if mapping.get(key) is None:
+        mapping[key] = {}
+    return mapping[key]
+
+
+def _document(source: str | Path) -> dict:
+    return _yaml().load(Path(source).read_text(encoding="utf-8"))
+
+
+def _write(document: dict, target: str | Path) -> None:
+    try:
+        with Path(target).open("w", encoding="utf-8") as file:
+            _yaml().dump(document, file)
+    except OSError as error:
+        raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
+
+
+def _yaml():
+    from ruamel.yaml import YAML
+
+    yaml = YAML()
+    yaml.preserve_quotes, yaml.width = True, 130
+    return yaml
+
+
+def _stiffness(length: float, compliance: float) -> float | None:
+    return length / compliance if compliance > length / _STIFFEST else None

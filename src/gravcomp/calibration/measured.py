@@ -1,0 +1,168 @@
+"""Measured courses of the tip, and the windows in them at which the robot stands still.
+
+A CSV file has a header and one row a sample:
+
+    trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty: released),
+    tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z
+
+`trial` may be missing when there is one. A bag has `gravity`, `cable/state` and the tip as geometry_msgs/PoseStamped.
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+STILL_TIME = 0.5  # s: length of a window
+STILL_TIP = 0.6e-3  # m: the tip stays within, in a window
+STILL_CABLE = 0.05e-3  # m
+STILL_GRAVITY = math.radians(0.5)  # rad
+
+
+class MeasurementError(ValueError):
+    """Data that cannot be used; the text says what was found, and what is needed."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Samples in the order of time within each trial; t samples, m cables. SI, soft_base."""
+
+    source: str
+    trial: np.ndarray  # (t,) int
+    time: np.ndarray  # (t,) s
+    gravity: np.ndarray  # (t, 3)
+    displacement: np.ndarray  # (t, m), NaN: released
+    tip_position: np.ndarray  # (t, 3)
+    tip_direction: np.ndarray | None = None  # (t, 3)
+
+    def __post_init__(self) -> None:
+        for name in ("time", "gravity", "tip_position"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
+        if len(self.time) < 2:
+            raise MeasurementError(f"{self.source}: holds {len(self.time)} samples; at least 2 are needed")
+
+    def trials(self) -> list["Measured"]:
+        """One a trial."""
+        return [self.rows(self.trial == number) for number in dict.fromkeys(self.trial.tolist())]
+
+    def rows(self, which: np.ndarray) -> "Measured":
+        """The samples chosen by a mask or by indices."""
+        direction = None if self.tip_direction is None else self.tip_direction[which]
+        return Measured(
+            self.source, self.trial[which], self.time[which], self.gravity[which], self.displacement[which],
+            self.tip_position[which], direction,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class StillWindows:
+    """Means over the windows at which nothing moves, one row a window; k windows."""
+
+    gravity: np.ndarray  # (k, 3)
+    displacement: np.ndarray  # (k, m), NaN: released
+    tip_position: np.ndarray  # (k, 3)
+
+
+def still_windows(measured: Measured) -> StillWindows:
+    """The last window of every stretch of each trial during which gravity, cables and tip stand still.
+
+    Raises MeasurementError when there is none.
+    """
+    found = []
+    for trial in measured.trials():
+        found += _windows_of(trial)
+    if not found:
+        raise MeasurementError(
+            f"{measured.source}: the robot never stands still for {STILL_TIME:g} s (tip within {1e3 * STILL_TIP:g} mm,"
+            f" cables within {1e3 * STILL_CABLE:g} mm); let it settle in a few poses"
+        )
+    return StillWindows(*(np.array(column) for column in zip(*found)))
+
+
+def _windows_of(trial: Measured) -> list[tuple]:
+    """The last still window before each movement, and before the trial's end."""
+    count = max(2, round(STILL_TIME / max(np.median(np.diff(trial.time)), 1e-6)))
+    windows, last = [], None
+    for start in range(0, len(trial.time) - count + 1, max(1, count // 2)):
+        window = trial.rows(np.arange(start, start + count))
+        if _is_still(window):
+            last = (window.gravity.mean(axis=0), window.displacement.mean(axis=0), window.tip_position.mean(axis=0))
+        elif last is not None:
+            windows.append(last)
+            last = None
+    return windows + ([last] if last is not None else [])
+
+
+def _is_still(window: Measured) -> bool:
+    spread = np.ptp(window.tip_position, axis=0).max() <= STILL_TIP
+    released = np.isnan(window.displacement)
+    same = (released.all(axis=0) | ~released.any(axis=0)).all()
+    cables = np.ptp(np.nan_to_num(window.displacement), axis=0).max(initial=0.0) <= STILL_CABLE
+    direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
+    turned = np.ptp(direction, axis=0).max() <= STILL_GRAVITY
+    return bool(spread and same and cables and turned)
+
+
+def read_measured(path: str | Path, cables: tuple[str, ...], tip_topic: str | None = None) -> Measured:
+    """Read a CSV file or a rosbag2 folder. Raises MeasurementError."""
+    path = Path(path).expanduser()
+    if not path.exists():
+        raise MeasurementError(f"{path}: does not exist; a CSV file or a rosbag2 folder is needed")
+    if path.is_dir():
+        from gravcomp.calibration.bag import read_bag
+
+        return read_bag(path, cables, tip_topic)
+    return _read_csv(path, cables)
+
+
+def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
+    """Write what `read_measured` reads."""
+    gravity, tip = ["gravity_x", "gravity_y", "gravity_z"], ["tip_x_mm", "tip_y_mm", "tip_z_mm"]
+    direction = ["direction_x", "direction_y", "direction_z"] if measured.tip_direction is not None else []
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["trial", "time_s", *gravity, *(f"{name}_mm" for name in cables), *tip, *direction])
+        for row in range(len(measured.time)):
+            wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in measured.displacement[row]]
+            values = [f"{x:.5f}" for x in measured.gravity[row]] + wound + [f"{1e3 * x:.4f}" for x in measured.tip_position[row]]
+            if direction:
+                values += [f"{x:.6f}" for x in measured.tip_direction[row]]
+            writer.writerow([int(measured.trial[row]), f"{measured.time[row]:.4f}", *values])
+
+
+def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            header, rows = reader.fieldnames or [], list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise MeasurementError(f"{path}: cannot be read as CSV: {error}") from error
+    wound = [f"{name}_mm" for name in cables]
+    needed = ["time_s", "gravity_x", "gravity_y", "gravity_z", *wound, "tip_x_mm", "tip_y_mm", "tip_z_mm"]
+    missing = [name for name in needed if name not in header]
+    if missing:
+        raise MeasurementError(f"{path}: the column '{missing[0]}' is missing; needed: {', '.join(needed)}; found: {', '.join(header)}")
+
+    def column(name: str, empty: float | None = None, scale: float = 1.0) -> np.ndarray:
+        values = []
+        for line, row in enumerate(rows, start=2):
+            text = (row[name] or "").strip()
+            try:
+                values.append(empty if not text and empty is not None else float(text))
+            except ValueError as error:
+                raise MeasurementError(f"{path}, line {line}: {name} is '{text}'; a number is needed") from error
+        return np.array(values, dtype=float) * scale
+
+    directions = [f"direction_{axis}" for axis in "xyz"]
+    return Measured(
+        source=str(path),
+        trial=column("trial").astype(int) if "trial" in header else np.zeros(len(rows), dtype=int),
+        time=column("time_s"),
+        gravity=np.column_stack([column(f"gravity_{axis}") for axis in "xyz"]),
+        displacement=np.column_stack([column(name, empty=math.nan, scale=1e-3) for name in wound]),
+        tip_position=np.column_stack([column(f"tip_{axis}_mm", scale=1e-3) for axis in "xyz"]),
+        tip_direction=np.column_stack([column(name) for name in directions]) if set(directions) <= set(header) else None,
+    )

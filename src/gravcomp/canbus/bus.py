@@ -1,0 +1,54 @@
+"""Opening a CAN bus by interface and channel, with errors that say what to do."""
+
+import can
+
+from gravcomp.canbus.multicast import LoopbackMulticastBus, enlarge_receive_buffer
+from gravcomp.description.hardware import CanInterface
+
+
+class BusError(Exception):
+    """The bus cannot be opened or used; the text is for people."""
+
+
+def open_bus(settings: CanInterface, frame_ids: list[int] | None = None) -> can.BusABC:
+    """Open the bus; with `frame_ids`, only these standard frames (and error frames) are received.
+
+    Raises BusError. `udp_multicast` with hop_limit 0 stays on this host, see `gravcomp.canbus.multicast`.
+    """
+    filters = frame_ids and [{"can_id": i, "can_mask": 0x7FF, "extended": False} for i in frame_ids]
+    name = f"{settings.interface} {settings.channel}".strip()
+    try:
+        if settings.interface == "udp_multicast" and settings.hop_limit == 0:
+            return LoopbackMulticastBus(settings.channel, can_filters=filters)
+        bus = can.Bus(interface=settings.interface, can_filters=filters, **_options(settings))
+        if settings.interface == "socketcan":
+            enlarge_receive_buffer(bus.socket)
+        return bus
+    except can.CanInterfaceNotImplementedError as error:
+        known = ", ".join(sorted(can.VALID_INTERFACES))
+        raise BusError(f"CAN interface '{settings.interface}' is not available ({error}); known: {known}") from error
+    except can.CanError as error:
+        raise BusError(f"{name} cannot be opened: {error}{_advice(settings)}") from error
+    except (OSError, ValueError, TypeError, ImportError) as error:
+        raise BusError(f"{name} cannot be opened: {error}{_advice(settings)}") from error
+
+
+def _options(settings: CanInterface) -> dict:
+    """The keyword arguments that this interface of python-can takes."""
+    if settings.interface == "udp_multicast":
+        group, _, port = settings.channel.partition(":")
+        return {"channel": group, "hop_limit": settings.hop_limit, "fd": False} | ({"port": int(port)} if port else {})
+    if settings.interface in ("socketcan", "virtual"):  # the bit rate of a socketcan device is set by `ip link`
+        return {"channel": settings.channel}
+    return {"channel": settings.channel, "bitrate": settings.bitrate}
+
+
+def _advice(settings: CanInterface) -> str:
+    if settings.interface == "socketcan":
+        return (
+            f"; bring it up: sudo ip link set {settings.channel or 'can0'} up type can bitrate {settings.bitrate}"
+            " restart-ms 100, and sudo ip link set " + (settings.channel or "can0") + " txqueuelen 1000"
+        )
+    if settings.interface == "slcan":
+        return "; is the adapter plugged in, and may this user open it (group dialout)?"
+    return ""

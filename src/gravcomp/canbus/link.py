@@ -1,0 +1,172 @@
+"""A CAN bus that comes back: receives and sends without raising, counts what goes wrong, and reopens with back-off.
+
+The adapter may vanish, the controller may go bus-off, the transmit queue may overflow. None of it ends the caller's
+loop: `receive` and `send` tell by their results, `status` says what is wrong in one sentence.
+"""
+
+import dataclasses
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+import can
+
+from gravcomp.canbus.bus import BusError, open_bus
+from gravcomp.description.hardware import CanInterface
+
+_FIRST_WAIT, _LONGEST_WAIT = 0.1, 2.0  # s, between attempts to reopen
+_OVERLOAD_TIME = 0.5  # s of failing sends after which the bus is reopened
+_MOST_AT_ONCE = 1024  # frames: 0.3 s of full traffic
+_ERROR_BUS_OFF = 0x40  # socketcan error class
+_WALL_CLOCK = 60.0  # s by which a frame's stamp is old at most if it is wall time
+
+
+@dataclasses.dataclass
+class LinkCounters:
+    """Since the link was made."""
+
+    received: int = 0
+    sent: int = 0
+    send_errors: int = 0
+    error_frames: int = 0
+    lost: int = 0  # times that an open bus was lost
+    opened: int = 0
+
+
+def lateness(frame: can.Message, wall: float) -> float:
+    """s from when the kernel took the frame until `wall` (s, time.time()): a thread that comes late does not make a frame late.
+
+    0 for drivers whose stamps are no wall time.
+    """
+    late = wall - frame.timestamp
+    return late if 0.0 <= late < _WALL_CLOCK else 0.0
+
+
+class CanLink:
+    """The bus `settings`, received with the filter `frame_ids`, reopened whenever it is lost.
+
+    `opener` opens the bus and raises BusError (for tests). Not opened until the first `open`, `receive` or `send`.
+    One thread receives; any thread may send.
+    """
+
+    def __init__(
+        self,
+        settings: CanInterface,
+        frame_ids: list[int] | None = None,
+        *,
+        opener: Callable[[CanInterface, list[int] | None], can.BusABC] = open_bus,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.counters = LinkCounters()
+        self.status = "not opened"
+        self._settings, self._frame_ids, self._opener, self._clock = settings, frame_ids, opener, clock
+        self._bus: can.BusABC | None = None
+        self._wait, self._next_attempt = _FIRST_WAIT, -float("inf")
+        self._failing_since: float | None = None
+        self._lock = threading.RLock()
+
+    @property
+    def is_open(self) -> bool:
+        return self._bus is not None
+
+    def open(self) -> None:
+        """Open now. Raises BusError."""
+        with self._lock:
+            if self._bus is None:
+                self._bus = self._opener(self._settings, self._frame_ids)
+                self._failing_since, self.status = None, "open"
+                self.counters.opened += 1
+
+    def receive(self, timeout: float) -> list[can.Message]:
+        """Every frame waiting, or the first to come within `timeout` (s); empty when there is none or no bus.
+
+        While there is no bus the time-out is slept out, so that a loop around this keeps its pace.
+        """
+        deadline = self._clock() + timeout
+        frames: list[can.Message] = []
+        if not self._ensure_open():
+            time.sleep(max(0.0, min(timeout, _FIRST_WAIT)))
+            return frames
+        bus = self._bus
+        try:
+            while bus is not None and len(frames) < _MOST_AT_ONCE:
+                frame = bus.recv(0.0 if frames else max(0.0, deadline - self._clock()))
+                if frame is None:
+                    break
+                self.counters.received += 1
+                self._wait = _FIRST_WAIT
+                if frame.is_error_frame:
+                    self.counters.error_frames += 1
+                    if frame.arbitration_id & _ERROR_BUS_OFF:
+                        self._lose("bus-off: is the bus terminated, and does any other node acknowledge?")
+                        break
+                    continue
+                frames.append(frame)
+        except Exception as error:  # drivers raise what they like when their adapter vanishes
+            self._lose(str(error) or type(error).__name__)
+        return frames
+
+    def send(self, frames: Iterable[can.Message]) -> bool:
+        """Send in order; False when a frame was not taken (no bus, full queue, vanished adapter)."""
+        if not self._ensure_open():
+            return False
+        with self._lock:
+            try:
+                for frame in frames:
+                    if self._bus is None:
+                        return False
+                    self._bus.send(frame)
+                    self.counters.sent += 1
+                self._failing_since = None
+                return True
+            except Exception as error:
+                self.counters.send_errors += 1
+                now = self._clock()
+                self._failing_since = now if self._failing_since is None else self._failing_since
+                self.status = f"cannot send: {error}"
+                if now - self._failing_since > _OVERLOAD_TIME:
+                    self._lose(self.status)
+                return False
+
+    def close(self) -> None:
+        with self._lock:
+            bus, self._bus = self._bus, None
+            self._next_attempt = float("inf")
+            self.status = "closed"
+        _shut(bus)
+
+    def _ensure_open(self) -> bool:
+        if self._bus is not None:
+            return True
+        with self._lock:
+            if self._clock() < self._next_attempt:
+                return False
+            try:
+                self.open()
+            except BusError as error:
+                self.status = str(error)
+                self._schedule()
+                return False
+            return True
+
+    def _lose(self, why: str) -> None:
+        with self._lock:
+            bus, self._bus = self._bus, None
+            if bus is None:
+                return
+            self.counters.lost += 1
+            self.status = why
+            self._schedule()
+        _shut(bus)
+
+    def _schedule(self) -> None:
+        self._next_attempt = self._clock() + self._wait
+        self._wait = min(2 * self._wait, _LONGEST_WAIT)
+
+
+def _shut(bus: can.BusABC | None) -> None:
+    try:
+        if bus is not None:
+            bus.shutdown()
+    except Exception:  # a bus whose adapter is gone cannot always be shut down
+        pass

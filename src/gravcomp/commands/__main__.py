@@ -1,0 +1,39 @@
+"""`python -m gravcomp.commands COMMAND ...`: what `./gravcomp` runs inside the environment."""
+
+import argparse
+import importlib
+import signal
+import sys
+
+from gravcomp.commands import COMMANDS, overview
+
+
+def main(arguments: list[str]) -> int:
+    """Run one command; returns the exit code: 2 for a mistake in what was given, 130 for Ctrl-C."""
+    if not arguments or arguments[0] not in COMMANDS:
+        print(overview(), file=sys.stderr)
+        return 2
+    name, *rest = arguments
+    # SIGTERM ends a command like Ctrl-C does, so that its nodes are ended, too.
+    signal.signal(signal.SIGTERM, _interrupt)
+    module = importlib.import_module(f"gravcomp.commands.{name.replace('-', '_')}")
+    parser = argparse.ArgumentParser(prog=f"gravcomp {name}", description=COMMANDS[name], allow_abbrev=False)
+    module.add_arguments(parser)
+    from gravcomp.config import ConfigError
+    from gravcomp.launcher import LaunchError, NodeDied
+
+    try:
+        return module.run(parser.parse_args(rest))
+    except (ConfigError, LaunchError, NodeDied, TimeoutError) as error:
+        print(f"gravcomp {name}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _interrupt(*_) -> None:
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,124 @@
+"""`gravcomp arm`: a seven-axis arm carries the virtual robot through five poses, with released cables and compensated."""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from gravcomp.commands.live_page import add_page_arguments, show_page
+
+# Numba compiles once for each machine; the first start waits for it.
+_START_TIMEOUT = 300.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = (
+        "The worked example for larger arms: the URDF of arm and robot, gravity from the IMU checked against the arm's joints, "
+        "the tip error at five poses with and without compensation."
+    )
+    parser.add_argument("--xacro", metavar="FILE", help="another arm of seven axes with the soft robot in it (default: the shipped one)")
+    parser.add_argument("--gravity", choices=("imu", "arm", "both"), default="both", help="from the IMU, from the arm's joints, or the IMU checked by the arm (default)")
+    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="seconds at each pose (default 5)")
+    parser.add_argument("--viewer", action="store_true", help="show it in a browser")
+    add_page_arguments(parser)
+    parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes, for one of several robots")
+    parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
+    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: played to the end, 2: it could not be."""
+    from gravcomp.arm.description import expanded, shipped_xacro
+    from gravcomp.canbus.multicast import private_channel
+    from gravcomp.commands.preparation import prepare
+    from gravcomp.launcher import Graph
+    from gravcomp.launcher.domain import private_domain
+    from gravcomp.launcher.robot_graph import RobotGraph
+
+    prepare(args.robot, virtual=True)
+    xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
+    with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
+        urdf, result = Path(scratch) / "arm.urdf", Path(scratch) / "result.json"
+        urdf.write_text(expanded(xacro), encoding="utf-8")
+        # Half the rates of truth and feedback, as in the demo: a bus in software shall not take the loop's time.
+        motion = {"motion": "topic", "truth_rate": 50.0, "feedback_rate": 250, **_start_of_tour(urdf)}
+        graph = RobotGraph(args.robot, "udp_multicast", private_channel(), args.namespace, {"virtual_robot": motion})
+        specs = [spec for spec in graph.loop() if args.gravity != "arm" or spec.executable != "imu_estimator"]
+        if args.gravity != "imu":
+            use = "publish" if args.gravity == "arm" else "check"
+            specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf)))
+        if args.viewer:
+            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+        specs.append(graph.node("gravcomp_hw", "virtual_robot"))
+        player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
+        logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
+        with Graph([*specs, player], logs, domain) as processes:
+            processes.start()
+            print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
+            if args.viewer:
+                show_page(processes, args.no_open)
+            figures = _follow(processes, result)
+    _print_summary(figures)
+    if args.json:
+        print(json.dumps(figures), flush=True)
+    return 0
+
+
+def _start_of_tour(urdf: Path) -> dict:
+    """How the virtual robot's base stands at first: as the arm holds it, so that nothing is jerked."""
+    import math
+
+    from gravcomp.arm.chain import Chain
+    from gravcomp.arm.tour import FIVE_POSES
+
+    chain = Chain(urdf.read_text(encoding="utf-8"), "soft_base", "world", str(urdf))
+    last = list(FIVE_POSES.values())[-1]
+    x, y, z = chain.gravity(dict(zip(chain.moving, last)))
+    return {"inclination_deg": math.degrees(math.atan2(-z, math.hypot(x, y))), "roll_deg": math.degrees(math.atan2(y, -x))}
+
+
+def _follow(processes, result: Path) -> dict:
+    """Until the tour has ended; its figures. Raises NodeDied, TimeoutError."""
+    from rich.console import Console
+
+    console, phase, begin = Console(stderr=True), "", time.monotonic()
+    while True:
+        # Looked at before the file is read: the player's last word is in it when it has gone.
+        dead = processes.dead()
+        try:
+            state = json.loads(result.read_text())
+        except (OSError, ValueError):
+            state = {"phase": "starting"}
+        if state["phase"] == "done":
+            return state["figures"]
+        if dead:
+            processes.check()
+        if state["phase"] != phase:
+            phase, begin = state["phase"], time.monotonic()
+            console.print(phase, highlight=False)
+        if phase not in ("released", "compensated") and time.monotonic() - begin > _START_TIMEOUT:
+            raise TimeoutError(f"the tour did not go on ({phase}); the nodes' output is in {processes.logs}")
+        time.sleep(0.1)
+
+
+def _print_summary(figures: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("inclination, deg", "released, mm", "compensated, mm", title="Virtual robot on a seven-axis arm: tip error", title_justify="left")
+    rows = zip(figures["inclination_deg"], figures["tip_error_released_mm"], figures["tip_error_compensated_mm"])
+    for inclination, released, compensated in rows:
+        table.add_row(f"{inclination:g}", f"{released:.2f}", f"{compensated:.2f}")
+    table.add_row("RMS", f"{figures['tip_error_released_rms_mm']:.2f}", f"{figures['tip_error_compensated_rms_mm']:.2f}")
+    console = Console(file=sys.stderr)
+    console.print(table)
+    disagreement = figures["arm_and_imu_disagree_by_deg"]
+    agree = "" if disagreement is None else f"; at the poses arm and IMU disagree on gravity by at most {disagreement:g} deg"
+    console.print(f"{figures['ratio']:g} times smaller with compensation{agree}", highlight=False)
+    if min(figures["followed_percent"].values()) < 100.0:
+        shares = ", ".join(f"{name} {share:g} %" for name, share in figures["followed_percent"].items())
+        console.print(f"The bridge did not follow all the time ({shares} of what was measured): this machine was too busy", highlight=False)

@@ -1,0 +1,165 @@
+"""`gravcomp demo`: the main job on a virtual robot: it sags, is compensated, and is tilted; ends with the figures."""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from gravcomp.commands.live_page import add_page_arguments, show_page
+
+# A run shorter than this shows neither sag nor compensation.
+_SHORTEST = 10.0
+# A hand that holds still, with the gyroscope's bias, stays below this.
+_TURNING = 0.2  # rad/s
+# Numba compiles once for each machine; the first start waits for it.
+_START_TIMEOUT = 300.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = "Virtual robot on a CAN bus of its own, the four nodes as processes, the viewer; ends with the figures."
+    parser.add_argument("--duration", type=float, default=30.0, metavar="S", help="seconds to play (default 30, at least 10)")
+    parser.add_argument("--headless", action="store_true", help="without the viewer")
+    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
+    parser.add_argument("--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder")
+    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    add_page_arguments(parser)
+    parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: played to the end, 2: it could not be."""
+    from gravcomp.canbus.multicast import private_channel
+    from gravcomp.commands.preparation import prepare
+    from gravcomp.config import ConfigError
+    from gravcomp.launcher import Graph
+    from gravcomp.launcher.domain import private_domain
+    from gravcomp.launcher.robot_graph import LOOP, RobotGraph
+
+    if not _SHORTEST <= args.duration <= 86400.0:
+        raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
+    prepare(args.robot, virtual=True)
+    relax_time = min(8.0, 0.3 * args.duration)
+    start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
+    compensate_until = relax_time + 0.45 * (args.duration - relax_time)
+    # Half the rates of truth and feedback: judging and a bus in software shall not take the loop's time.
+    motion = {"truth_rate": 50.0, "feedback_rate": 250, "steerable": True}
+    if args.imu:
+        motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
+    else:
+        motion |= {"motion": "tilt", "hold": compensate_until}
+    graph = RobotGraph(args.robot, "udp_multicast", private_channel(), parameters={"virtual_robot": motion})
+    nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
+    with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
+        result_file = Path(scratch) / "result.json"
+        judge = graph.node(
+            "gravcomp_hw", "judge", duration=args.duration, relax_time=relax_time, settle_time=min(4.0, 0.15 * args.duration),
+            start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes,
+        )  # fmt: skip
+        specs = [*graph.loop(), judge]
+        if not args.headless:
+            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+        logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
+        domain = private_domain()
+        with Graph(specs, logs, domain) as processes:
+            processes.start()
+            print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
+            if not args.headless:
+                show_page(processes, args.no_open)
+            ready = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller"]
+            processes.wait(lambda: _all_active(_read(result_file), ready), _START_TIMEOUT, "the nodes' start")
+            # Last, because its motion begins with its activation.
+            processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
+            state = _follow(processes, result_file, args)
+            figures = {**state["figures"], "nodes": state["nodes"], "source": args.imu and Path(args.imu).name or "scenario: sag, compensate, tilt"}
+    _print_summary(figures)
+    if args.json:
+        print(json.dumps(figures), flush=True)
+    return 0
+
+
+def _begin_of_motion(path: str) -> float:
+    """Seconds into the recording at which it begins to turn: what lies still before is shortened to the time of sagging."""
+    import numpy as np
+
+    from gravcomp.config import ConfigError
+    from gravcomp.recordings import RecordingError, read_recording
+
+    try:
+        recording = read_recording(path)
+    except RecordingError as error:
+        raise ConfigError(str(error)) from error
+    if recording.orientation is None:
+        raise ConfigError(f"{path}: has no ground truth of the orientation; the virtual robot's base cannot turn as it did")
+    turning = np.linalg.norm(recording.gyro, axis=1) > _TURNING
+    return float(recording.stamp_ns[np.argmax(turning)] - recording.stamp_ns[0]) * 1e-9
+
+
+def _read(path: Path) -> dict:
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+
+
+def _all_active(state: dict, names: list[str]) -> bool:
+    states = state.get("nodes", {})
+    return all(states.get(name) == "active" for name in names)
+
+
+def _follow(processes, result_file: Path, args: argparse.Namespace) -> dict:
+    """Show the run until the judge is done; returns its last state. Raises NodeDied."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[note]}"))
+    deadline = time.monotonic() + args.duration + _START_TIMEOUT
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting", total=args.duration, note="")
+        phase = ""
+        while True:
+            state = _read(result_file)
+            if state.get("phase") == "done":
+                processes.wait(lambda: "judge" in processes.dead(), 10.0, "the judge's end")
+                return state
+            dead = processes.dead()
+            if dead:
+                # The judge may have just written its last word and gone.
+                state = _read(result_file)
+                if set(dead) == {"judge"} and state.get("phase") == "done":
+                    return state
+                processes.check()
+            if state.get("phase") and state["phase"] != phase:
+                phase = state["phase"]
+                console.print(f"{state['elapsed']:5.1f} s  {phase}", highlight=False)
+            error = state.get("tip_error_mm")
+            note = "" if error is None else f"tip error {error:5.1f} mm"
+            progress.update(task, description=phase, completed=state.get("elapsed", 0.0), note=note)
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"the run did not end; the nodes' output is in {processes.logs}")
+            time.sleep(0.2)
+
+
+def _print_summary(figures: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    delay = figures["delay_ms"] or {"median": None, "p99": None}
+    table = Table(title=f"Virtual robot, {figures['source']}", title_justify="left", show_header=False)
+    rows = [
+        ("sag without compensation", figures["sag_mm"], "mm"),
+        ("tip error with compensation: lateral", figures["residual_lateral_mm"], "mm RMS"),
+        ("tip error with compensation: axial", figures["residual_axial_mm"], "mm RMS"),
+        ("tip error with / without, same motion", f"{figures['tip_error_with_mm']} / {figures['tip_error_without_mm']}", "mm RMS"),
+        ("correlation of model and truth", figures["correlation"], ""),
+        ("gravity's error", figures["gravity_error_deg"], "deg RMS"),
+        ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),
+        ("delay, IMU to motor current, median / p99", f"{delay['median']} / {delay['p99']}", "ms"),
+        ("nodes", ", ".join(f"{name} {state}" for name, state in figures["nodes"].items()), ""),
+    ]
+    for name, value, unit in rows:
+        table.add_row(name, f"{value} {unit}".strip())
+    Console(file=sys.stderr).print(table)

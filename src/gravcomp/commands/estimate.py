@@ -1,0 +1,118 @@
+"""`gravcomp estimate FILE`: the orientation filter offline over a recording, as the node would give it."""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from gravcomp.orientation import BiasModelError, BiasTemperatureModel, EstimatorOptions, GravityEstimator, estimate_recording
+from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.recordings import RecordingError, read_recording
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("file", help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder")
+    parser.add_argument("--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument("--topic", help="the IMU topic, for a bag with several")
+    parser.add_argument("--average", type=int, default=1, metavar="N", help="take the mean of every N samples (3: 95.2 Hz in BROAD)")
+    parser.add_argument("--robot", default="article", help="shipped robot or YAML: its mount and its imu_estimator parameters are taken")
+    parser.add_argument("--bias-model", metavar="FILE", help="bias over temperature as kept by imu_estimator")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: done, 2: the recording or an option cannot be used."""
+    try:
+        if args.average < 1:
+            raise RecordingError(f"--average is {args.average}; 1 or more is needed")
+        recording = read_recording(args.file, args.topic)
+        if args.average > 1:
+            recording = recording.averaged(args.average)
+        model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
+        options, mount = _of_robot(args.robot)
+        estimator = GravityEstimator(options, mount, model)
+    except (RecordingError, BiasModelError, ValueError) as error:
+        print(f"gravcomp estimate: {error}", file=sys.stderr)
+        return 2
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("estimating", total=1.0)
+        begin = time.perf_counter()
+        result = estimate_recording(recording, estimator, lambda done: progress.update(task, completed=done))
+        elapsed = time.perf_counter() - begin
+
+    figures = {
+        "file": str(args.file),
+        "samples": len(recording),
+        "duration_s": recording.duration,
+        "rate_hz": recording.rate,
+        "rest_fraction": float(result.rest.mean()),
+        "bias_deg_s": np.degrees(result.bias[-1]).tolist(),
+        "inclination_std_deg": float(np.degrees(np.nanmean(result.inclination_std))),
+        "inclination_rmse_deg": None,
+        "rejected": estimator.filter.rejected,
+        "problems": result.problems,
+        "us_per_sample": elapsed / len(recording) * 1e6,
+    }
+    if recording.orientation is not None:
+        rmse = inclination_rmse(result.orientation, recording.orientation, recording.movement)
+        figures["inclination_rmse_deg"] = None if np.isnan(rmse) else float(np.degrees(rmse))
+    if args.out:
+        try:
+            _write(Path(args.out), result)
+        except OSError as error:
+            print(f"gravcomp estimate: {args.out}: cannot be written: {error.strerror}", file=sys.stderr)
+            return 2
+        figures["out"] = str(args.out)
+    print(json.dumps(figures, indent=2) if args.json else _text(figures))
+    return 0
+
+
+def _of_robot(robot: str) -> tuple[EstimatorOptions, tuple]:
+    """The estimator's options and the IMU's mount (w x y z) that the robot's file gives."""
+    from gravcomp.config import from_mapping
+    from gravcomp.description import load_robot_file
+    from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
+
+    file = load_robot_file(robot)
+    section = file.section("nodes").get("imu_estimator")
+    parameters = from_mapping(ImuEstimatorParameters, section, source=file.source, key="nodes.imu_estimator")
+    return parameters.estimator, quat.from_roll_pitch_yaw(*file.robot.imu_mount.rpy)
+
+
+def _write(path: Path, result) -> None:
+    with path.open("wb") as file:
+        np.savez_compressed(
+            file,
+            stamp_ns=result.stamp_ns,
+            quat=result.orientation,
+            gravity=result.gravity,
+            bias=result.bias,
+            rest=result.rest,
+            inclination_std=result.inclination_std,
+        )
+
+
+def _text(figures: dict) -> str:
+    lines = [
+        f"{figures['file']}: {figures['samples']} samples, {figures['duration_s']:.1f} s at {figures['rate_hz']:.1f} Hz",
+        f"  at rest             {100 * figures['rest_fraction']:.0f} % of the time",
+        "  gyroscope bias      {:+.3f} {:+.3f} {:+.3f} deg/s at the end".format(*figures["bias_deg_s"]),
+        f"  expected error      {figures['inclination_std_deg']:.2f} deg of inclination, mean standard deviation",
+    ]
+    if figures["inclination_rmse_deg"] is not None:
+        lines.append(f"  inclination RMSE    {figures['inclination_rmse_deg']:.3f} deg against the recording's truth")
+    lines.append(f"  rejected samples    {figures['rejected']}")
+    lines += [f"    {count} x {problem}" for problem, count in figures["problems"].items()]
+    lines.append(f"  cost                {figures['us_per_sample']:.0f} us a sample")
+    if "out" in figures:
+        lines.append(f"  written             {figures['out']}")
+    return "\n".join(lines)

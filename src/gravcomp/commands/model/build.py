@@ -1,0 +1,81 @@
+"""`gravcomp model build ROBOT`: the robot's reduced model, which the simulator uses from then on."""
+
+import argparse
+import json
+import sys
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
+    parser.add_argument("--force", action="store_true", help="build it anew where it is built already")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: built, or built already, 2: this robot cannot be reduced."""
+    from gravcomp.config import ConfigError
+    from gravcomp.mesh import MeshError
+    from gravcomp.reduction import path_of
+
+    try:
+        model, reduction, seconds = prepare(args.robot, force=args.force)
+    except (ConfigError, MeshError) as error:
+        print(f"gravcomp model build: {error}", file=sys.stderr)
+        return 2
+    figures = {
+        "robot": model.robot.name,
+        "unknowns": reduction.basis.shape[0],
+        "modes": reduction.basis.shape[1],
+        "strains": reduction.elasticity.linear.shape[0],
+        "samples": reduction.samples,
+        "tip_error_median_mm": 1e3 * reduction.error_median,
+        "tip_error_worst_mm": 1e3 * reduction.error_worst,
+        "youngs_modulus_mpa": [1e-6 * reduction.modulus_low, 1e-6 * reduction.modulus_high],
+        "seconds": seconds,
+        "file": str(path_of(model)),
+    }
+    print(json.dumps(figures) if args.json else _sentences(figures))
+    return 0
+
+
+def prepare(robot: str, *, force: bool = False) -> tuple:
+    """(model, its reduction, seconds it took), built with a progress bar unless it is there. Raises ConfigError, MeshError."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.reduction import build, load
+    from gravcomp.simulation.model import RobotModel
+
+    model = RobotModel(load_robot_file(robot).robot)
+    reduction = None if force else load(model)
+    if reduction is not None:
+        return model, reduction, 0.0
+    columns = TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("training", total=1.0)
+        reduction, seconds = build(model, progress=lambda stage, share: progress.update(task, description=stage, completed=share))
+    return model, reduction, seconds
+
+
+def prepare_model(robot: str) -> None:
+    """Build the reduced model on a robot's first use; a robot that cannot be reduced is served by its full model."""
+    from gravcomp.config import ConfigError
+
+    try:
+        prepare(robot)
+    except ConfigError as error:
+        print(f"No reduced model: {error}", file=sys.stderr)
+
+
+def _sentences(figures: dict) -> str:
+    low, high = figures["youngs_modulus_mpa"]
+    took = f"built in {figures['seconds']:.0f} s" if figures["seconds"] else "was built before (--force builds it anew)"
+    return (
+        f"{figures['robot']}: the reduced model {took}: {figures['modes']} modes and {figures['strains']} strains in place of"
+        f" {figures['unknowns']} unknowns\n"
+        f"trained with {figures['samples']} shapes; tip error over others: median {figures['tip_error_median_mm']:.4f} mm,"
+        f" worst {figures['tip_error_worst_mm']:.3f} mm; serves Young's moduli from {low:.3g} to {high:.3g} MPa\n"
+        f"kept in {figures['file']}"
+    )

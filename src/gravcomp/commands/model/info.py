@@ -1,0 +1,119 @@
+"""`gravcomp model info ROBOT`: what the model of a robot is, and how exact its mesh."""
+
+import argparse
+import dataclasses
+import json
+
+import numpy as np
+
+_GRAVITY = 9.81
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommand's arguments."""
+    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the subcommand; 0: done."""
+    from gravcomp.description import load_robot_file
+    from gravcomp.mesh.quality import mesh_quality
+    from gravcomp.simulation import Simulator
+    from gravcomp.simulation.modes import natural_frequencies
+
+    file = load_robot_file(args.robot)
+    simulator = Simulator(file.robot, reduced=False)
+    robot, model = file.robot, simulator.model
+    quality = mesh_quality(model.mesh)
+    sag = simulator.solve([-_GRAVITY, 0.0, 0.0])
+    figures = {
+        "robot": robot.name,
+        "file": file.source,
+        "length_mm": 1e3 * robot.length,
+        "mass_g": 1e3 * model.mass,
+        "payload_g": 1e3 * robot.payload.mass,
+        "cables": {
+            name: {"length_mm": 1e3 * length} for name, length in zip(robot.cable_names, model.tendons.rest_length)
+        },
+        "natural_frequency_hz": natural_frequencies(model).tolist(),
+        "horizontal_tip_mm": (1e3 * sag.tip_position).tolist(),
+        "reach": _reach(simulator),
+        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
+    }
+    print(json.dumps(figures) if args.json else _table(figures))
+    return 0
+
+
+def _reach(simulator) -> list[dict]:
+    """Where each cable alone brings the weightless robot: with growing tension, up to the limits or a half turn."""
+    from gravcomp.simulation.statics import CableInput
+
+    robot, reach = simulator.robot, []
+    for index, name in enumerate(robot.cable_names):
+        simulator.reset()
+        best = {"cable": name, "tension_n": 0.0, "displacement_mm": 0.0, "lateral_mm": 0.0, "tilt_deg": 0.0}
+        for tension in np.linspace(0.0, robot.limits.tension_max, 41)[1:]:
+            tensions = np.zeros(len(robot.cables))
+            tensions[index] = tension
+            # Where following ends, so does the reach: no need to search for how much of this last part is carried.
+            if not simulator.solver.track(np.zeros(3), CableInput(tension=tensions), iterations=10).converged:
+                break
+            shape = simulator.step(np.zeros(3), tension=tensions)
+            tilt = float(np.degrees(np.arccos(np.clip(shape.tip_direction[2], -1.0, 1.0))))
+            beyond = shape.cable_displacement[index] > robot.limits.displacement_max
+            if beyond or tilt < best["tilt_deg"]:
+                break
+            lateral = 1e3 * float(np.hypot(*shape.tip_position[:2]))
+            best |= {
+                "tension_n": float(tension),
+                "displacement_mm": 1e3 * float(shape.cable_displacement[index]),
+                "lateral_mm": max(lateral, best["lateral_mm"]),
+                "tilt_deg": tilt,
+            }
+        reach.append(best)
+    return reach
+
+
+def _mesh_error(robot, sag) -> dict:
+    """How far the horizontal robot's tip moves when the mesh is refined; bodies from files say how to refine them."""
+    from gravcomp.simulation import Simulator
+
+    if robot.body is not None:
+        return {"refinement": "mesh the file finer (or lower element_size_mm) and compare horizontal_tip_mm"}
+    elements = robot.elements
+    finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
+    change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve([-_GRAVITY, 0.0, 0.0])
+    error = float(np.linalg.norm(change.tip_position - sag.tip_position))
+    good = error < 2e-3 * robot.length
+    return {
+        "tip_change_when_refined_mm": 1e3 * error,
+        "refinement": "fine enough" if good else "raise elements.along or elements.around: the change is above 0.2 % of the length",
+    }
+
+
+def _table(figures: dict) -> str:
+    mesh = figures["mesh"]
+    lines = [
+        f"{figures['robot']} ({figures['file']})",
+        f"  length {figures['length_mm']:.1f} mm, mass {figures['mass_g']:.2f} g (payload {figures['payload_g']:.2f} g)",
+        "  cables " + ", ".join(f"{name} {cable['length_mm']:.1f} mm" for name, cable in figures["cables"].items()),
+        "  natural frequencies " + ", ".join(f"{f:.2f}" for f in figures["natural_frequency_hz"]) + " Hz",
+        "  tip when horizontal, cables released: " + ", ".join(f"{x:.2f}" for x in figures["horizontal_tip_mm"]) + " mm",
+        "  reach without gravity, each cable alone:",
+    ]
+    lines += [
+        f"    {r['cable']}: {r['lateral_mm']:.1f} mm to the side, tip turned {r['tilt_deg']:.0f} deg,"
+        f" at {r['tension_n']:.2f} N and {r['displacement_mm']:.1f} mm"
+        for r in figures["reach"]
+    ]
+    lines.append(
+        f"  mesh: {mesh['elements']} {mesh['kind']}, {mesh['nodes']} nodes, {mesh['unknowns']} unknowns;"
+        f" worst Jacobian ratio {mesh['jacobian_ratio']:.2f}, worst aspect ratio {mesh['aspect_ratio']:.1f}"
+    )
+    if "tip_change_when_refined_mm" in mesh:
+        lines.append(f"  refined twice, the horizontal tip moves {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}")
+    else:
+        lines.append(f"  refinement: {mesh['refinement']}")
+    lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
+    return "\n".join(lines)

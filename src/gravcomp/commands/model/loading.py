@@ -1,0 +1,62 @@
+"""What `solve` and `view` have in common: a robot and its load from the command line, and the shape."""
+
+import argparse
+
+import numpy as np
+
+
+def add_load_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare robot, gravity and what is done to the cables."""
+    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
+    parser.add_argument(
+        "--gravity", nargs=3, type=float, default=[-9.81, 0.0, 0.0], metavar=("X", "Y", "Z"),
+        help="m/s^2 in soft_base, z along the robot (default: -9.81 0 0, the robot horizontal)",
+    )  # fmt: skip
+    cables = parser.add_mutually_exclusive_group()
+    cables.add_argument("--tension", nargs="+", type=float, metavar="N", help="tension of every cable")
+    cables.add_argument(
+        "--displacement", nargs="+", type=float, metavar="MM", help="displacement of every cable, pulled in is positive; nan: released"
+    )
+    cables.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to reach with the cables, mm")
+    parser.add_argument("--direction", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip direction to reach, with --target")
+    parser.add_argument("--full", action="store_true", help="the full model even where a reduced one is built")
+
+
+def loaded_shape(args: argparse.Namespace):
+    """Simulator, shape and, with a target, the controller's last command (else None). Raises ValueError, MeshError."""
+    from gravcomp.description import load_robot_file
+    from gravcomp.simulation import Simulator
+
+    if args.direction is not None and args.target is None:
+        raise ValueError("--direction is given without --target")
+    simulator = Simulator(load_robot_file(args.robot).robot, reduced=not args.full)
+    gravity = np.array(args.gravity)
+    if args.target is not None:
+        shape, command = _reached(simulator, gravity, args.target, args.direction)
+        return simulator, shape, command
+    displacement = None if args.displacement is None else 1e-3 * np.array(args.displacement)
+    shape = simulator.solve(gravity, displacement, args.tension)
+    if not args.full and not shape.status:
+        # Where a reduced model is built it serves the shape, from the full model's solution on.
+        shape = simulator.step(gravity, displacement, args.tension)
+    return simulator, shape, None
+
+
+def _reached(simulator, gravity: np.ndarray, target, direction):
+    """The closed loop of model and inverse problem, run until neither moves any more."""
+    from gravcomp.inverse import InverseController, Target
+
+    weight = 0.01 if direction is not None else 0.0
+    wanted = Target(1e-3 * np.array(target), tip_direction=direction, tip_direction_weight=weight)
+    controller = InverseController(simulator.robot)
+    shape = simulator.solve(gravity)
+    before = shape.tip_position
+    for _ in range(2000):
+        command = controller.step(
+            shape.response, wanted, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02
+        )
+        shape = simulator.step(gravity, command.displacement)
+        if np.linalg.norm(shape.tip_position - before) < 1e-8:
+            break
+        before = shape.tip_position
+    return shape, command

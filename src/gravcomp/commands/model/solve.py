@@ -1,0 +1,68 @@
+"""`gravcomp model solve ROBOT`: one equilibrium, its shape and its cables."""
+
+import argparse
+import json
+
+import numpy as np
+
+from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommand's arguments."""
+    add_load_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the subcommand; 0: solved, 1: no equilibrium was found."""
+    simulator, shape, command = loaded_shape(args)
+    figures = {
+        "robot": simulator.robot.name,
+        "model": shape.model,
+        "status": shape.status.name.lower(),
+        "message": shape.message,
+        "gravity": shape.gravity.tolist(),
+        "tip_position_mm": (1e3 * shape.tip_position).tolist(),
+        "tip_orientation_xyzw": shape.tip_orientation.tolist(),
+        "tip_direction": shape.tip_direction.tolist(),
+        "backbone_station": shape.backbone_station.tolist(),
+        "backbone_position_mm": (1e3 * shape.backbone_position).tolist(),
+        "cables": list(simulator.robot.cable_names),
+        "tension_n": shape.cable_tension.tolist(),
+        "displacement_mm": (1e3 * shape.cable_displacement).tolist(),
+        "residual_n": shape.residual,
+        "error_estimate_mm": 1e3 * shape.error_estimate,
+        "solve_time_ms": 1e3 * shape.solve_time,
+    }
+    if command is not None:
+        error = 1e3 * (shape.tip_position - 1e-3 * np.array(args.target))
+        figures |= {
+            "target_mm": list(args.target),
+            "target_distance_mm": float(np.linalg.norm(error)),
+            "controller": command.code.name.lower(),
+            "controller_message": command.message,
+        }
+    print(json.dumps(figures) if args.json else _table(figures))
+    return 1 if figures["status"] in ("not_converged", "failed") else 0
+
+
+def _table(figures: dict) -> str:
+    def row(values: list, digits: int = 3) -> str:
+        return ", ".join(f"{value:.{digits}f}" for value in values)
+
+    lines = [
+        f"{figures['robot']}, {figures['model']} model: {figures['status']} {figures['message']}".rstrip(),
+        f"  tip {row(figures['tip_position_mm'])} mm, direction {row(figures['tip_direction'], 4)}",
+    ]
+    if "target_mm" in figures:
+        message = figures["controller_message"]
+        lines.append(f"  {figures['target_distance_mm']:.3f} mm from the target; controller: {figures['controller']} {message}".rstrip())
+    lines += [
+        f"  {name}: {tension:.4f} N, {displacement:+.3f} mm"
+        for name, tension, displacement in zip(figures["cables"], figures["tension_n"], figures["displacement_mm"])
+    ]
+    lines.append(f"  residual {figures['residual_n']:.1e} N, {figures['solve_time_ms']:.2f} ms")
+    lines.append("  backbone (station: x, y, z in mm)")
+    lines += [f"    {s:.2f}: {row(p)}" for s, p in zip(figures["backbone_station"], figures["backbone_position_mm"])]
+    return "\n".join(lines)

@@ -1,0 +1,57 @@
+"""`gravcomp model view ROBOT`: a picture of the straight and of the deformed robot."""
+
+import argparse
+
+import numpy as np
+
+from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
+
+# Corners of an element's faces, in VTK's node order.
+_FACES = {
+    "hex20": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+    "tet10": [(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
+}
+_FACES["tet4"] = _FACES["tet10"]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommand's arguments."""
+    add_load_arguments(parser)
+    parser.add_argument("--out", default="robot.png", metavar="FILE", help="picture to write: .png, .svg or .pdf (default: robot.png)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the subcommand; 0: written."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    simulator, shape, _ = loaded_shape(args)
+    mesh = simulator.model.mesh
+    faces = _surface(mesh)
+    figure = Figure(figsize=(8, 7))
+    axes = figure.add_subplot(projection="3d")
+    places = (mesh.nodes, "0.85", "0.75", 0.15), (mesh.nodes + simulator.displacements, "tab:orange", "0.3", 0.5)
+    for nodes, colour, edge, alpha in places:
+        axes.add_collection3d(Poly3DCollection(1e3 * nodes[faces], facecolor=colour, edgecolor=edge, linewidth=0.2, alpha=alpha))
+    axes.plot(*(1e3 * shape.backbone_position.T), "k.-", label="backbone")
+    everything = 1e3 * np.vstack([mesh.nodes, mesh.nodes + simulator.displacements])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    half = (high - low).max() / 2
+    for middle, limits in zip((low + high) / 2, (axes.set_xlim, axes.set_ylim, axes.set_zlim)):
+        limits(middle - half, middle + half)
+    axes.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+    tip = ", ".join(f"{value:.1f}" for value in 1e3 * shape.tip_position)
+    axes.set_title(f"{simulator.robot.name}: tip at {tip} mm")
+    figure.savefig(args.out, dpi=150)
+    print(f"{args.out}: tip at {tip} mm, residual {shape.residual:.1e} N")
+    return 0
+
+
+def _surface(mesh) -> np.ndarray:
+    """(f, 3 or 4) corner nodes of the faces that belong to one element only."""
+    faces = mesh.elements[:, np.array(_FACES[mesh.kind])].reshape(-1, len(_FACES[mesh.kind][0]))
+    _, index, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[index[count == 1]]

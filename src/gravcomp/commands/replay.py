@@ -1,0 +1,125 @@
+"""`gravcomp replay BAG`: the whole graph on a recorded IMU stream, at any speed, with /clock."""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+from gravcomp.commands.live_page import add_page_arguments, show_page
+
+# A machine that has never run the graph compiles first.
+_START_TIMEOUT = 300.0
+# What the graph still computes when the last sample has been sent.
+_SETTLE = 1.0
+# Topics of the estimator that a recorded replay must not lose anything of, and the messages that wait for a slow recorder.
+_ESTIMATES, _KEPT = ("gravity", "imu/data", "imu/bias"), 1000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = (
+        "Play a recorded IMU stream into estimator, simulator and controller. A bag that was cut off or damaged is read as far as it goes."
+    )
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, or an .npz file in BROAD's layout")
+    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default 1); 0: as fast as it is taken")
+    parser.add_argument("--topic", default="", help="the IMU topic, for a bag with several")
+    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument("--out", metavar="DIR", help="record what the graph makes of it into a new bag")
+    parser.add_argument("--viewer", action="store_true", help="show it in a browser")
+    add_page_arguments(parser)
+    parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes")
+    parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
+    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: played to the end, 2: it could not be."""
+    from gravcomp.commands.preparation import prepare
+    from gravcomp.commands.record import describe
+    from gravcomp.config import ConfigError
+    from gravcomp.launcher import Graph
+    from gravcomp.launcher.robot_graph import RobotGraph
+    from gravcomp.recordings import RecordingError, read_recording
+
+    if not 0.0 <= args.speed <= 1000.0:
+        raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as it is taken) to 1000")
+    if args.out and Path(args.out).exists():
+        raise ConfigError(f"{args.out}: exists; a bag is not written over, name another folder")
+    bag = _whole(args.bag)
+    try:
+        recording = read_recording(bag, args.topic or None)
+    except RecordingError as error:
+        raise ConfigError(str(error)) from error
+    prepare(args.robot, virtual=False)
+    graph = RobotGraph(args.robot, namespace=args.namespace)
+    specs = [
+        graph.node("gravcomp_estimation", "imu_estimator", use_sim_time=True, **(_lossless(args.namespace) if args.out else {})),
+        graph.node("gravcomp_fem", "fem_simulator", use_sim_time=True),
+        graph.node("gravcomp_fem", "inverse_controller", use_sim_time=True),
+    ]
+    if args.viewer:
+        specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+    if args.out:
+        specs.append(graph.node("gravcomp_fem", "recorder", out=str(Path(args.out).resolve())))
+    replay = graph.node(
+        "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
+        wait_for=[spec.executable for spec in specs], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
+    begin = time.monotonic()
+    with Graph([*specs, replay], Path(args.logs) if args.logs else None) as processes:
+        processes.start()
+        if args.viewer:
+            show_page(processes, args.no_open)
+        _follow(processes, replay.name, recording.duration, args.speed)
+        time.sleep(_SETTLE)
+    figures = {
+        "source": str(args.bag), "samples": len(recording), "duration_s": recording.duration, "speed": args.speed,
+        "elapsed_s": round(time.monotonic() - begin, 2)}  # fmt: skip
+    if args.out:
+        figures["recorded"] = describe(Path(args.out))
+    print(f"{figures['source']}: {figures['samples']} samples, {figures['duration_s']:.1f} s, played to the end", file=sys.stderr)
+    if args.json:
+        print(json.dumps(figures), flush=True)
+    return 0
+
+
+def _lossless(namespace: str) -> dict:
+    """Parameters by which what the estimator gives is recorded to the last message: the same bag twice then makes the same bag."""
+    prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+    wanted = {"reliability": "reliable", "depth": _KEPT}
+    return {f"qos_overrides.{prefix}/{topic}.publisher.{key}": value for topic in _ESTIMATES for key, value in wanted.items()}
+
+
+def _whole(path: str) -> str:
+    """The path itself, or what could be saved of a damaged bag."""
+    from gravcomp.bags.recovery import readable
+
+    if Path(path).suffix == ".npz":
+        return path
+    bag = readable(path)
+    if bag.problem:
+        print(f"{path}: damaged ({bag.problem}); {bag.messages} messages could be read", file=sys.stderr)
+    return str(bag.path)
+
+
+def _follow(processes, replay: str, duration: float, speed: float) -> None:
+    """Until the replay has ended well. Raises NodeDied when any node ends otherwise."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("starting", total=duration / speed if speed else None)
+        log, started = processes.processes[replay].log, None
+        while processes.processes[replay].exit_code is None:
+            others = {name: why for name, why in processes.dead().items() if name != replay}
+            if others:
+                processes.check()
+            if started is None and "playing" in log.read_text(errors="replace"):
+                started = time.monotonic()
+                progress.update(task, description="playing")
+            if started is not None:
+                progress.update(task, completed=time.monotonic() - started)
+            time.sleep(0.1)
+        if processes.processes[replay].exit_code:
+            processes.check()

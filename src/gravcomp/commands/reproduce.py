@@ -1,0 +1,90 @@
+"""`gravcomp reproduce NAME`: one of the article's experiments, or `all`, with a report page, plots and JSON."""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+from gravcomp.config import ConfigError
+from gravcomp.experiments import EXPERIMENTS, experiment
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    lines = "\n".join(f"  {name:<14}{summary}" for name, summary in EXPERIMENTS.items())
+    parser.description = f"Reproduce the article's experiments on the virtual robot:\n\n{lines}\n  {'all':<14}all of them, with an index page"
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("name", choices=[*EXPERIMENTS, "all"], metavar="NAME", help="the experiment, or all")
+    parser.add_argument("--out", metavar="DIR", default="reports", help="where pages and JSON go (default: reports)")
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON, last line of the output")
+    parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    parser.add_argument("--seed", type=int, help="of the virtual robot's noise (default: the robot file's)")
+    parser.add_argument("--workers", type=int, help="processes for sweeps (default: one a core)")
+    parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
+    parser.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 0: every figure with a limit reached, 1: at least one missed. Raises ConfigError."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from gravcomp.commands.model.build import prepare_model
+    from gravcomp.description import load_robot_file
+    from gravcomp.experiments.report import write_index, write_report
+    from gravcomp.experiments.setup import Context, Setup
+    from gravcomp.experiments.sweep import Sweep
+
+    folder = Path(args.out).expanduser()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out is {folder}: cannot be made: {error.strerror}") from error
+    file = load_robot_file(args.robot)
+    prepare_model(args.robot)
+    names = list(EXPERIMENTS) if args.name == "all" else [args.name]
+    console = Console(stderr=True)
+    results = []
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Sweep(args.workers, args.dask) as sweep, Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("starting")
+        label = ""
+        context = Context(
+            Setup.of(file, args.seed),
+            sweep,
+            lambda sentence: progress.update(task, description=f"{label}: {sentence}"),
+            args.brief,
+        )
+        for name in names:
+            label = name
+            started = time.perf_counter()
+            result = experiment(name).run(context)
+            result.seconds = time.perf_counter() - started
+            result.parameters.setdefault("seed", context.setup.seed)
+            result.parameters.update({"robot": context.setup.source, "sweeps": sweep.place})
+            if args.brief:
+                result.notes.insert(0, "Run with --brief: fewer and shorter runs than the article's experiment.")
+            page = write_report(result, folder)
+            results.append(result)
+            _tell(console, result, page)
+        if len(results) > 1:
+            console.print(f"[bold]index[/bold]  {write_index(results, folder)}")
+    if args.json:
+        document = {"experiments": [result.to_mapping() for result in results], "reached": all(r.reached for r in results)}
+        print(json.dumps(document))
+        sys.stdout.flush()
+    return 0 if all(result.reached for result in results) else 1
+
+
+def _tell(console, result, page: Path) -> None:
+    from rich.table import Table
+
+    table = Table(title=f"{result.title}  ({result.seconds:.0f} s)", title_justify="left", box=None, pad_edge=False, title_style="bold")
+    for column in ("figure", "here", "the article", "to be reached", ""):
+        table.add_column(column)
+    words = {True: "[green]reached[/green]", False: "[red]missed[/red]", None: ""}
+    for figure in result.figures:
+        table.add_row(figure.name, figure.text, figure.article, figure.target, words[figure.reached])
+    console.print(table)
+    console.print(f"[dim]{page}[/dim]\n")

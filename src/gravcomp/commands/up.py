@@ -1,0 +1,54 @@
+"""`gravcomp up`: the graph for real hardware or as the robot's YAML says, until Ctrl-C."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from gravcomp.commands.live_page import add_page_arguments, show_page
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = "Bridge, estimator, simulator and controller of a robot, until Ctrl-C. The motors are driven."
+    parser.add_argument("robot", nargs="?", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument("--interface", default="", help="python-can interface in place of the file's, e.g. socketcan; with --virtual a bus of its own")
+    parser.add_argument("--channel", default="", help="its channel, e.g. can0")
+    parser.add_argument("--virtual", action="store_true", help="with the virtual robot on the bus")
+    parser.add_argument("--namespace", default="", help="of all nodes, e.g. /left; for several robots in one graph")
+    parser.add_argument("--viewer", action="store_true", help="with the viewer")
+    add_page_arguments(parser)
+    parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; 130 after Ctrl-C, 2 when a node ended by itself."""
+    from gravcomp.canbus.multicast import private_channel
+    from gravcomp.commands.preparation import prepare
+    from gravcomp.config import ConfigError
+    from gravcomp.launcher import Graph
+    from gravcomp.launcher.robot_graph import RobotGraph
+
+    if args.namespace and not args.namespace.startswith("/"):
+        raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
+    prepare(args.robot, args.virtual)
+    interface, channel = args.interface, args.channel
+    if args.virtual and not (interface or channel):
+        # Several virtual robots on one machine would hear each other's motors on the file's bus.
+        interface, channel = "udp_multicast", private_channel()
+    graph = RobotGraph(args.robot, interface, channel, args.namespace)
+    specs = graph.loop()
+    if args.virtual:
+        specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
+    if args.viewer:
+        specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+    with Graph(specs, Path(args.logs) if args.logs else None) as processes:
+        processes.start()
+        names = ", ".join(processes.processes)
+        bus = f" Bus: {interface} {channel}." if interface or channel else ""
+        print(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.", file=sys.stderr, flush=True)
+        if args.viewer:
+            show_page(processes, args.no_open)
+        while True:
+            processes.check()
+            time.sleep(0.2)

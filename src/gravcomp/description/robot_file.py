@@ -1,0 +1,67 @@
+"""Reading a robot's YAML: its sections, and the robot itself."""
+
+import dataclasses
+from importlib import resources
+from pathlib import Path
+
+from gravcomp.config import ConfigError, from_mapping, load_yaml
+from gravcomp.description.robot import Robot
+
+SECTIONS = ("robot", "hardware", "virtual_robot", "nodes")
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotFile:
+    """A robot's file: `source` is its path, `sections` the document as read."""
+
+    source: str
+    robot: Robot
+    sections: dict
+
+    def section(self, name: str) -> dict:
+        """A top-level section as a plain mapping of edge keys; empty when the file has none."""
+        if name not in SECTIONS:
+            raise ConfigError(f"{self.source}: no section '{name}' is known; allowed: {', '.join(SECTIONS)}")
+        return dict(self.sections.get(name) or {})
+
+
+def shipped_robots() -> dict[str, Path]:
+    """The robots that come with the product: name and path."""
+    folder = Path(str(resources.files("gravcomp") / "robots"))
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def load_robot_file(name_or_path: str | Path) -> RobotFile:
+    """Read and check a robot: a shipped one by its bare name ('article'), any other by its path.
+
+    Raises ConfigError naming file, key, value and what is allowed.
+    """
+    path = _resolve(name_or_path)
+    document = load_yaml(path)
+    if not isinstance(document, dict):
+        raise ConfigError(f"{path}: is empty or not a mapping; the top-level keys are {', '.join(SECTIONS)}")
+    for key in document:
+        if key not in SECTIONS:
+            raise ConfigError(f"{path}: unknown key '{key}'; allowed: {', '.join(SECTIONS)}")
+    for key, section in document.items():
+        if section is not None and not isinstance(section, dict):
+            raise ConfigError(f"{path}: {key} is {section!r}; a mapping of keys is needed")
+    if "robot" not in document:
+        raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
+    robot = from_mapping(Robot, document["robot"], source=str(path), key="robot")
+    if robot.body is not None and not Path(robot.body.file).is_absolute():
+        body = dataclasses.replace(robot.body, file=str(path.resolve().parent / robot.body.file))
+        robot = dataclasses.replace(robot, body=body)
+    return RobotFile(str(path), robot, document)
+
+
+def _resolve(name_or_path: str | Path) -> Path:
+    text = str(name_or_path)
+    shipped = shipped_robots()
+    if text in shipped:
+        return shipped[text]
+    path = Path(text).expanduser()
+    if path.is_file():
+        return path
+    kind = "is a folder" if path.is_dir() else "does not exist"
+    raise ConfigError(f"{path}: {kind}; give the path of a robot's YAML or a shipped robot: {', '.join(shipped)}")

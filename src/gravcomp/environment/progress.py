@@ -1,0 +1,41 @@
+"""Progress on stderr: a bar on a terminal, a line now and then elsewhere."""
+
+import sys
+import time
+
+WIDTH = 28
+
+
+class Progress:
+    """One long step: `with Progress("Python packages", total=200) as p: p.advance("numpy")`."""
+
+    def __init__(self, title: str, total: int):
+        self.title = title
+        self.total = max(total, 1)
+        self.done = 0
+        self._started = time.monotonic()
+        self._printed_tenth = -1
+        self._tty = sys.stderr.isatty()
+
+    def __enter__(self) -> "Progress":
+        self._show("")
+        return self
+
+    def __exit__(self, kind, *_) -> None:
+        seconds = time.monotonic() - self._started
+        end = "done" if kind is None else "not finished"
+        print(f"{chr(13) if self._tty else ''}{self.title}: {end} after {seconds:.0f} s".ljust(79), file=sys.stderr, flush=True)
+
+    def advance(self, what: str, steps: int = 1) -> None:
+        """Count steps that were done; `what` names the latest."""
+        self.done = min(self.done + steps, self.total)
+        self._show(what)
+
+    def _show(self, what: str) -> None:
+        share = self.done / self.total
+        if self._tty:
+            bar = "#" * int(share * WIDTH)
+            print(f"\r{self.title} [{bar:<{WIDTH}}] {what[:28]:<28}", end="", file=sys.stderr, flush=True)
+        elif int(share * 10) > self._printed_tenth:
+            self._printed_tenth = int(share * 10)
+            print(f"{self.title}: {share:4.0%} {what}", file=sys.stderr, flush=True)

@@ -1,0 +1,123 @@
+"""From `./gravcomp COMMAND` to the command: make the environment when it is missing or out of date, then enter it."""
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import pwd
+import sys
+from pathlib import Path
+
+from gravcomp.commands import COMMANDS, overview
+from gravcomp.environment import packages, system_packages, workspace
+from gravcomp.environment.errors import SetupError
+from gravcomp.environment.interpreter import choose_interpreter
+
+SEARCH_PATHS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PATH")
+
+
+def enter(root: Path, arguments: "list[str]") -> int:
+    """Run the command in the environment; returns only when it cannot (exit code 2 or 3) or need not."""
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(overview())
+        return 0
+    if arguments[0] not in COMMANDS:
+        print(f"gravcomp: unknown command '{arguments[0]}'\n\n{overview()}", file=sys.stderr)
+        return 2
+    # A bare environment has neither; ROS logs below HOME, and the build looks its tools up in PATH.
+    os.environ.setdefault("PATH", "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin")
+    os.environ.setdefault("HOME", pwd.getpwuid(os.geteuid()).pw_dir)
+    try:
+        state = _ready(root) or _make(root)
+    except SetupError as error:
+        print(f"gravcomp: {error}", file=sys.stderr)
+        return 3
+    except KeyboardInterrupt:
+        print("\ngravcomp: set-up interrupted; the next start takes it up again", file=sys.stderr)
+        return 130
+    python = state["python"]
+    sys.stdout.flush()
+    os.execve(python, [python, "-m", "gravcomp.commands", *arguments], environment(root, state["paths"]))
+
+
+def environment(root: Path, paths: "dict[str, str]") -> "dict[str, str]":
+    """The process environment in which commands and nodes run."""
+    result = dict(os.environ, GRAVCOMP_ROOT=str(root))
+    for name in SEARCH_PATHS:
+        parts = [p for p in paths[name].split(":") if p]
+        parts += [p for p in os.environ.get(name, "").split(":") if p and p not in parts]
+        result[name] = ":".join(parts)
+    # Nothing leaves the machine unless asked; one thread for matrices of this size.
+    result.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        result.setdefault(name, "1")
+    return result
+
+
+def _ready(root: Path) -> "dict | None":
+    try:
+        state = json.loads((root / ".workspace" / "ready.json").read_text())
+    except (OSError, ValueError):
+        return None
+    if state.get("key") != _key(root, state.get("ros", "")) or not os.access(state.get("python", ""), os.X_OK):
+        return None
+    return state
+
+
+def _make(root: Path) -> dict:
+    with _alone(root):
+        state = _ready(root)  # another process may have made it while this one waited
+        if state:
+            return state
+        python = choose_interpreter()
+        system_packages.provide(system_packages.missing_packages(python))
+        inner = root / ".venv" / "bin" / "python"
+        stamp = root / ".venv" / "packages.key"
+        packages_key = hashlib.sha256(packages.lock_file(root, python).read_bytes() + str((root, python.version, python.ros)).encode()).hexdigest()
+        if not (stamp.exists() and stamp.read_text() == packages_key):
+            inner = packages.build(root, python)
+            stamp.write_text(packages_key)
+        paths = workspace.build(root, python, inner)
+        state = {"key": _key(root, python.ros), "ros": python.ros, "python": str(inner), "paths": paths}
+        partial = root / ".workspace" / "ready.json.partial"
+        partial.write_text(json.dumps(state, indent=1))
+        partial.replace(partial.with_suffix(""))
+        return state
+
+
+def _key(root: Path, ros: str) -> str:
+    """Everything that makes the environment: the place, the ROS, the locks, the messages, the packages' files.
+
+    Python files do not count, because the workspace links to them; only those of gravcomp_msgs are linked one by one, so
+    there a new one counts.
+    """
+    sourced = os.environ.get("AMENT_PREFIX_PATH", "").split(":")[-1] if os.environ.get("ROS_DISTRO") else ""
+    digest = hashlib.sha256(f"{root}|{ros}|{sourced}".encode())
+    files = [*root.glob("*.lock"), root / "colcon.meta"]
+    files += [root / "src" / name for name in ("package.xml", "setup.py", "setup.cfg")]
+    for package in workspace.PACKAGES[1:]:
+        files += [p for p in (root / package).rglob("*") if p.is_file() and _is_built(p, package)]
+    for path in sorted(files):
+        digest.update(str(path.relative_to(root)).encode())
+        if path.suffix != ".py" or path.name == "setup.py":
+            digest.update(path.read_bytes() if path.exists() else b"")
+    return digest.hexdigest()
+
+
+def _is_built(path: Path, package: str) -> bool:
+    if {"__pycache__", "test"} & set(path.parts) or ".egg-info" in str(path) or path.suffix == ".md":
+        return False
+    return path.suffix != ".py" or package == "gravcomp_msgs" or path.name == "setup.py"
+
+
+@contextlib.contextmanager
+def _alone(root: Path):
+    (root / ".workspace").mkdir(exist_ok=True)
+    with open(root / ".workspace" / "lock", "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print("gravcomp: another start is setting up; waiting for it", file=sys.stderr)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,117 @@
+"""The robot on an arm that turns its base through the article's five directions and back, two passes of 90 s, straight and bent."""
+
+import numpy as np
+
+from gravcomp.experiments import metrics
+from gravcomp.experiments.cases import GROUND, Case, target_of
+from gravcomp.experiments.drawing import REAL, TARGET, WITHOUT, Drawing
+from gravcomp.experiments.loop import ClosedLoop, Trace
+from gravcomp.experiments.result import Figure, Plot, Result, Table
+from gravcomp.experiments.setup import Context, Setup
+from gravcomp.virtual.motion import WaypointMotion, base_orientation
+
+TITLE = "On a moving arm"
+
+INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
+HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
+ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
+_START = 4.0  # s before the passes, for the robot to come to rest at its first pose
+
+
+def run(context: Context) -> Result:
+    """The experiment."""
+    setups = {"calibrated": context.calibration.setup, "not calibrated": context.setup}
+    jobs = [
+        (setup, bend, weightless, context.brief)
+        for bend in (0.0, 30.0)
+        for setup, weightless in ((context.setup, True), *((setup, False) for setup in setups.values()))
+    ]
+    traces = context.map(_pass, jobs, "two passes of 90 s")
+    figures, rows, plots = [], [], []
+    for index, bend in enumerate((0.0, 30.0)):
+        without, fitted, plain = traces[3 * index : 3 * index + 3]
+        target = target_of(context.setup, Case(0.0, bend=bend))
+        judged = {
+            name: (_recovery(trace, target.tip_position), _errors(trace, target))
+            for name, trace in (("without", without), ("calibrated", fitted), ("not calibrated", plain))
+        }
+        shape = f"bent by {bend:g} deg" if bend else "straight"
+        gain = judged["without"][1].distance.mean() / judged["calibrated"][1].distance.mean()
+        figures += [
+            Figure(f"r, {shape}, calibrated", judged["calibrated"][0], "", ARTICLE[bend], 0.99, True, 5),
+            Figure(f"r, {shape}, without compensation", judged["without"][0], "", digits=5),
+            Figure(f"tip error smaller than without by the factor, {shape}", gain, "", limit=5.0, at_least=True),
+        ]
+        for name, (r, errors) in judged.items():
+            mean = [1e3 * errors.distance.mean(), 1e3 * errors.distance.max(), 1e3 * errors.lateral.mean()]
+            rows.append((shape, name, f"{r:.5f}", *mean, float(np.degrees(errors.tilt.mean()))))
+        plots.append(
+            Plot(
+                f"{shape.capitalize()}: tip over time",
+                _course(without, fitted, target.tip_position),
+                "Left: height of the tip over the base, in the world, against that of the shape asked for. Right: distance of the tip from"
+                " its target.",
+            )
+        )
+    return Result(
+        name="arm",
+        title=TITLE,
+        question="Does the robot keep its shape while its base is turned through the upright and downwards?",
+        ground=GROUND + " The base turns about a horizontal axis, as the virtual arm moves it; it does not travel.",
+        figures=figures,
+        parts=[
+            Table(
+                "All runs",
+                ("shape", "compensation", "r", "mean tip error, mm", "largest, mm", "mean lateral, mm", "mean tilt, deg"),
+                rows,
+                "r: the tip of the shape asked for and the true tip, both seen from the world over the base, over both passes.",
+            ),
+            *plots,
+        ],
+        parameters={"inclinations_deg": INCLINATIONS, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        notes=[
+            "Without compensation: straight means released cables; bent means the cables that bend the weightless robot stay where they are"
+            " and the others are released.",
+            "At the poses with the base upside down (135 deg) the uncompensated robot falls over to the other side, which is what r sees most.",
+        ],
+    )
+
+
+def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
+    setup, bend, weightless, brief = job
+    inclinations = [*INCLINATIONS, *INCLINATIONS[-2::-1]]
+    stops = [(base_orientation(np.radians(i)), (HOLD / 10 if brief else HOLD) + (_START if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
+    motion = WaypointMotion(stops, RATE * (5 if brief else 1))
+    loop = ClosedLoop(setup, motion)
+    loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
+    loop.run(_START)
+    loop.forget()
+    loop.run(motion.duration - loop.time)
+    return loop.trace
+
+
+def _errors(trace: Trace, target) -> metrics.TipErrors:
+    return metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
+
+
+def _recovery(trace: Trace, target: np.ndarray) -> float:
+    """r between the tip asked for and the true one, in world axes from the base."""
+    wanted = metrics.rotate(trace.base_orientation, np.broadcast_to(target, trace.tip_position.shape))
+    return metrics.recovery_rate(wanted, metrics.rotate(trace.base_orientation, trace.tip_position))
+
+
+def _course(without: Trace, fitted: Trace, target: np.ndarray) -> str:
+    with Drawing(1, 2, width=10.5, height=3.2) as drawing:
+        height, error = drawing.axes
+        wanted = metrics.rotate(fitted.base_orientation, np.broadcast_to(target, fitted.tip_position.shape))
+        height.plot(fitted.time, 1e3 * wanted[:, 2], color=TARGET, label="asked for", linewidth=2.4, alpha=0.6)
+        for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated, calibrated")):
+            tip = metrics.rotate(trace.base_orientation, trace.tip_position)
+            height.plot(trace.time, 1e3 * tip[:, 2], color=colour, label=label, linewidth=1.2)
+            error.plot(trace.time, 1e3 * np.linalg.norm(trace.tip_position - target, axis=1), color=colour, label=label)
+        height.set_ylabel("height of the tip in mm")
+        error.set_ylabel("tip error in mm")
+        for axes in drawing.axes:
+            axes.set_xlabel("time in s")
+        height.legend(loc="best")
+    return drawing.svg

@@ -1,0 +1,26 @@
+"""From the rectum into the first bend of the colon, the patient supine and on the left side: the same way in the body, another gravity.
+
+Rectum: 40 mm straight; bend: 70 mm radius toward the patient's front; lumen 30 mm. The frame turns with the patient.
+"""
+
+import numpy as np
+
+from gravcomp.experiments.lumen import Lumen, Reach
+from gravcomp.experiments.reaching import reaching
+from gravcomp.experiments.result import Result
+from gravcomp.experiments.setup import Context
+
+TITLE = "Colonoscopy, supine and left lateral"
+
+_COLON = Lumen(inlet=0.04, radius=0.07, plane=np.radians(0.0), diameter=30e-3)
+
+REACHES = tuple(
+    Reach(name, _COLON, inclination=0.0, roll=roll, first=0.0, last=0.1, duration=20.0, hand=True)
+    for name, roll in (("supine", 0.0), ("left lateral", 90.0))
+)
+
+
+def run(context: Context) -> Result:
+    """The experiment."""
+    question = "Does the way through the colon stay the same when the patient is turned on the side?"
+    return reaching(context, "colonoscopy", TITLE, question, REACHES)

@@ -1,0 +1,166 @@
+"""How late the robot answers to gravity: the delay of the running graph, what a delay costs while the base moves, and what prediction wins back."""
+
+import dataclasses
+import math
+import time
+
+import numpy as np
+
+from gravcomp.experiments import metrics
+from gravcomp.experiments.cases import Case, target_of
+from gravcomp.experiments.drawing import MODEL, REAL, WITHOUT, Drawing
+from gravcomp.experiments.loop import SAMPLE_PERIOD, ClosedLoop
+from gravcomp.experiments.result import Figure, Plot, Result, Table
+from gravcomp.experiments.setup import Context, Setup
+from gravcomp.launcher import LaunchError, NodeDied
+from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
+
+TITLE = "Delay, and prediction of gravity"
+
+DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
+ARTICLE_DELAY = 3.0  # s
+_START, _DURATION = 3.0, 12.0  # s
+_WARM_UP, _LISTEN = 5.0, 15.0  # s
+_LONGEST_HORIZON = 0.5  # s: the estimator's limit
+
+
+class SwingingMotion(SyntheticMotion):
+    """The base swings about a horizontal axis by +- amplitude (rad) with the period (s), after standing still."""
+
+    def __init__(self, amplitude: float, period: float, hold: float):
+        self._amplitude, self._period, self._hold = amplitude, period, hold
+
+    @property
+    def fastest(self) -> float:
+        """rad/s."""
+        return 2 * math.pi / self._period * self._amplitude
+
+    def pose(self, moment: float) -> tuple[np.ndarray, np.ndarray]:
+        since = max(0.0, moment - self._hold)
+        # It starts with zero rate: 1 - cos rather than sin.
+        angle = self._amplitude * (1.0 - math.cos(2 * math.pi * since / self._period))
+        return base_orientation(0.0) @ turned(np.array([0.0, angle, 0.0])), np.zeros(3)
+
+
+def run(context: Context) -> Result:
+    """The experiment."""
+    measured, why = _graph_delays(context)
+    setup = context.calibration.setup
+    delays = DELAYS[:3] if context.brief else DELAYS
+    jobs = [(setup, delay, predicted) for delay in delays for predicted in ((False, True) if delay else (False,))]
+    errors = dict(zip([job[1:] for job in jobs], context.map(_swing, jobs, "swinging base")))
+    in_ms = 1e3 * np.array(measured)
+    median = float(np.median(in_ms)) if len(in_ms) else math.nan
+    p99 = float(np.percentile(in_ms, 99)) if len(in_ms) else math.nan
+    pair = (10, False), (10, True)
+    figures = [
+        Figure("delay from IMU sample to motor current, median", median, "ms", "about 3 s", 100.0),
+        Figure("delay from IMU sample to motor current, 99th percentile", p99, "ms", "about 3 s", 100.0),
+    ]
+    if pair[0] in errors:
+        figures += [
+            Figure("tip error by a delay of 100 ms, without prediction", 1e3 * _extra(errors, *pair[0]), "mm"),
+            Figure("tip error by a delay of 100 ms, predicted", 1e3 * _extra(errors, *pair[1]), "mm"),
+        ]
+    if (300, False) in errors:
+        figures.append(Figure("tip error by the article's delay of 3 s", 1e3 * _extra(errors, 300, False), "mm"))
+    swing = SwingingMotion(np.radians(20.0), 6.0, 0.0)
+    return Result(
+        name="delay",
+        title=TITLE,
+        question="How late does the cable answer to a turn of the base, and how much of that does prediction win back?",
+        ground=(
+            "The delay is that of the running graph, four nodes and the virtual robot as processes on this machine, read from the CAN bus: from"
+            " an IMU sample's last frame to the first current frame that it caused."
+            if not why
+            else f"The running graph could not be measured here: {why}."
+        )
+        + " What delays cost was computed in the core at full speed against the virtual robot, with a delay put between loop and bridge.",
+        figures=figures,
+        parts=[
+            Plot(
+                "Delays",
+                _drawing(in_ms, errors),
+                "Left: delays in the running graph. Right: what a delay adds to the tip's error while the base swings, without prediction and with"
+                " gravity predicted by as much.",
+            ),
+            Table(
+                "Tip error on a swinging base",
+                ("delay, ms", "without prediction, mm RMS", "added by the delay, mm", "predicted, mm RMS", "added, mm"),
+                [
+                    (10 * delay, 1e3 * errors[delay, False], 1e3 * _extra(errors, delay, False),
+                     1e3 * errors.get((delay, True), math.nan), 1e3 * _extra(errors, delay, True) if delay else "–")
+                    for delay in delays
+                ],
+                f"The base swings by ±20 deg every 6 s, at most {np.degrees(swing.fastest):.0f} deg/s. RMS of the tip's distance from straight; the"
+                " delay's part is the root of the difference of squares to the undelayed run. Prediction reaches at most"
+                f" {1e3 * _LONGEST_HORIZON:.0f} ms ahead.",
+            ),
+        ],
+        parameters={"delays_ms": [10 * d for d in delays], "swing_deg": 20.0, "period_s": 6.0, "samples in the graph": len(in_ms)},
+        data={"graph_delay_ms": {"median": median, "p99": p99, "samples": len(in_ms)}},
+    )  # fmt: skip
+
+
+def _graph_delays(context: Context) -> tuple[list[float], str]:
+    """Delays in s of the running graph, or none and why."""
+    from gravcomp.bench.running_graph import RunningGraph
+    from gravcomp.judging.bus_delay import DelayListener
+
+    context.progress("starting the running graph")
+    try:
+        with RunningGraph() as graph:
+            graph.wait_for_commands()
+            context.progress(f"delays of the running graph over {_WARM_UP + _LISTEN:.0f} s")
+            time.sleep(_WARM_UP)
+            listener = DelayListener(graph.can)
+            listener.start()
+            time.sleep(_LISTEN)
+            listener.stop()
+            graph.check()
+    except (LaunchError, NodeDied, TimeoutError, ImportError, OSError) as error:
+        return [], str(error).rstrip(".")
+    return listener.delays, "" if listener.delays else listener.failure or "no command was traced on the bus"
+
+
+def _swing(job: tuple[Setup, int, bool]) -> float:
+    """RMS of the tip error in m."""
+    setup, delay, predicted = job
+    if predicted:
+        horizon = min(delay * SAMPLE_PERIOD, _LONGEST_HORIZON)
+        prediction = dataclasses.replace(setup.estimator.prediction, horizon=horizon)
+        setup = dataclasses.replace(setup, estimator=dataclasses.replace(setup.estimator, prediction=prediction))
+    loop = ClosedLoop(setup, SwingingMotion(np.radians(20.0), 6.0, _START), delay=delay)
+    target = target_of(setup, Case(0.0))
+    loop.hold(target)
+    loop.run(_START)
+    loop.forget()
+    loop.run(_DURATION)
+    trace = loop.trace.between(_START + max(0.0, delay * SAMPLE_PERIOD))
+    error = metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
+    return float(np.sqrt((error.distance**2).mean()))
+
+
+def _extra(errors: dict, delay: int, predicted: bool) -> float:
+    """What the delay adds, m."""
+    return math.sqrt(max(0.0, errors[delay, predicted] ** 2 - errors[0, False] ** 2))
+
+
+def _drawing(in_ms: np.ndarray, errors: dict) -> str:
+    with Drawing(1, 2, width=10.5, height=3.3) as drawing:
+        histogram, cost = drawing.axes
+        if len(in_ms):
+            histogram.hist(in_ms, bins=40, range=(0.0, max(20.0, float(np.percentile(in_ms, 99.5)))), color=MODEL, alpha=0.85)
+            histogram.axvline(float(np.median(in_ms)), color=REAL, label=f"median {np.median(in_ms):.1f} ms")
+            histogram.legend()
+        histogram.set_xlabel("from IMU sample to current in ms")
+        histogram.set_ylabel("samples")
+        for predicted, colour, label in ((False, WITHOUT, "without prediction"), (True, REAL, "gravity predicted")):
+            points = sorted((10 * d, 1e3 * _extra(errors, d, p)) for d, p in errors if d and p is predicted)
+            cost.plot(*zip(*points), "o-", color=colour, label=label)
+        cost.set_xscale("log")
+        cost.set_yscale("symlog", linthresh=0.1)
+        cost.set_xlabel("delay in ms")
+        cost.set_ylabel("added tip error in mm")
+        cost.legend()
+    return drawing.svg

@@ -1,0 +1,23 @@
+"""A trembling hand reaches through a straight and a curved lumen."""
+
+import numpy as np
+
+from gravcomp.experiments.lumen import Lumen, Reach
+from gravcomp.experiments.reaching import reaching
+from gravcomp.experiments.result import Result
+from gravcomp.experiments.setup import Context
+
+TITLE = "Hand-held, through lumens"
+
+REACHES = (
+    Reach("straight lumen", Lumen(0.2, 0.0, 0.0, 22e-3), inclination=0.0, roll=0.0, first=0.0, last=0.1, duration=20.0, hand=True),
+    Reach(
+        "curved lumen", Lumen(0.04, 0.09, np.radians(60.0), 24e-3), inclination=10.0, roll=0.0, first=0.0, last=0.1, duration=20.0, hand=True
+    ),
+)  # fmt: skip
+
+
+def run(context: Context) -> Result:
+    """The experiment."""
+    question = "Can a person reach through a tube without touching it, straight and around a bend?"
+    return reaching(context, "hand-held", TITLE, question, REACHES)

@@ -1,0 +1,115 @@
+"""What the two experiments in lumens have in common: their runs, figures, tables and drawings."""
+
+import numpy as np
+
+from gravcomp.experiments.cases import GROUND
+from gravcomp.experiments.drawing import REAL, TARGET, WITHOUT, Drawing, draw_robot
+from gravcomp.experiments.lumen import Reach, Reached, run_reach
+from gravcomp.experiments.result import Figure, Plot, Result, Table
+from gravcomp.experiments.setup import Context
+
+
+def reaching(context: Context, name: str, title: str, question: str, reaches: tuple[Reach, ...]) -> Result:
+    """Every reach with and without compensation, by the calibrated controller."""
+    setup = context.calibration.setup
+    if context.brief:
+        reaches = reaches[-1:]
+    jobs = [(setup, reach, weightless) for reach in reaches for weightless in (True, False)]
+    results = context.map(run_reach, jobs, "reaching through lumens")
+    pairs = list(zip(results[::2], results[1::2]))
+    figures = []
+    for without, held in pairs:
+        gain = float(without.tip_error.mean() / held.tip_error.mean())
+        figures += [
+            Figure(f"{held.reach.name}: tip error smaller than without by the factor", gain, "", limit=5.0, at_least=True),
+            Figure(f"{held.reach.name}: least clearance to the wall", 1e3 * float(held.clearance.min()), "mm"),
+            Figure(f"{held.reach.name}: the same without compensation", 1e3 * float(without.clearance.min()), "mm"),
+            Figure(f"{held.reach.name}: camera axis error, mean", float(np.degrees(held.camera.mean())), "deg"),
+        ]
+    rows = [
+        (r.reach.name, kind, 1e3 * r.clearance.min(), 1e3 * r.clearance[np.isfinite(r.clearance)].mean(), 1e3 * r.deviation.mean(),
+         1e3 * r.tip_error.mean(), float(np.degrees(r.camera.mean())), float(np.degrees(r.camera.max())))
+        for pair in pairs
+        for kind, r in zip(("without", "with"), pair)
+    ]  # fmt: skip
+    return Result(
+        name=name,
+        title=title,
+        question=question,
+        ground=GROUND,
+        figures=figures,
+        parts=[
+            Plot(
+                "Bodies in the lumen",
+                _bodies(pairs),
+                "The lumen's section in its own plane of bending (first of each pair) and across it; vermilion with compensation, pink without;"
+                " three moments of the way.",
+            ),
+            Plot("Along the way", _courses(pairs), "Least clearance to the wall and camera axis error over the depth of the tip."),
+            Table(
+                "With and without compensation",
+                ("lumen", "compensation", "least clearance, mm", "mean clearance, mm", "tip from centreline, mm", "tip error, mm",
+                 "camera error, deg", "largest, deg"),
+                rows,
+                "Tip error: against the shape asked for in the robot's base. Tip from centreline and clearance: in the lumen's frame, so they hold"
+                " what the hand's trembling does to the base, too, which no cable can undo.",
+            ),
+        ],
+        parameters={
+            reach.name: {
+                "inlet_mm": 1e3 * reach.lumen.inlet, "radius_mm": 1e3 * reach.lumen.radius, "plane_deg": float(np.degrees(reach.lumen.plane)),
+                "diameter_mm": 1e3 * reach.lumen.diameter, "inclination_deg": reach.inclination, "roll_deg": reach.roll,
+                "tip from mm": 1e3 * reach.first, "to mm": 1e3 * reach.last, "duration_s": reach.duration, "trembling hand": reach.hand,
+            }
+            for reach in reaches
+        },
+        notes=[
+            "No contact is computed, neither in the model nor in the virtual robot: a negative clearance says by how much the robot would press"
+            " into the wall, which a wall would then bear.",
+            "Without compensation: the cables that would bend the weightless robot along the lumen are wound in, the others are released.",
+        ],
+    )  # fmt: skip
+
+
+def _bodies(pairs: list[tuple[Reached, Reached]]) -> str:
+    with Drawing(1, 2 * len(pairs), width=11.0, height=4.4, squeeze=False) as drawing:
+        for index, (without, held) in enumerate(pairs):
+            lumen = held.reach.lumen
+            plane = np.array([np.cos(lumen.plane), np.sin(lumen.plane), 0.0])
+            across = np.array([-plane[1], plane[0], 0.0])
+            way = np.linspace(0.0, held.reach.last + 5e-3, 200)
+            centre = lumen.point(way)
+            normal = np.cross(across, lumen.direction(way))
+            for axes, sideways, wall in zip(drawing.axes[0, 2 * index : 2 * index + 2], (plane, across), (normal, np.tile(across, (200, 1)))):
+                for sign in (-1, 1):
+                    side = centre + sign * wall * lumen.diameter / 2
+                    axes.plot(1e3 * side @ sideways, 1e3 * side[:, 2], color="#8a6d5a", linewidth=2.0)
+                axes.plot(1e3 * centre @ sideways, 1e3 * centre[:, 2], color=TARGET, linewidth=1.0, linestyle="--")
+                for moment in (0.35, 0.7, 0.999):
+                    k = int(np.searchsorted(held.depth, held.reach.first + moment * (held.reach.last - held.reach.first)))
+                    k = min(k, len(held.time) - 1)
+                    for result, colour in ((without, WITHOUT), (held, REAL)):
+                        body = result.body[k]
+                        draw_robot(axes, np.stack([body @ sideways, body[:, 2]], axis=1), colour, alpha=0.35 + 0.65 * moment)
+                axes.set_aspect("equal")
+                axes.set_xlabel("in the bend's plane, mm" if sideways is plane else "across it, mm")
+                axes.set_ylabel("along the inlet, mm")
+                axes.set_ylim(bottom=-30.0)
+            drawing.axes[0, 2 * index].set_title(held.reach.name)
+    return drawing.svg
+
+
+def _courses(pairs: list[tuple[Reached, Reached]]) -> str:
+    with Drawing(2, len(pairs), width=10.5, height=5.2, squeeze=False) as drawing:
+        for index, pair in enumerate(pairs):
+            clearance, camera = drawing.axes[:, index]
+            for result, colour, label in zip(pair, (WITHOUT, REAL), ("without", "with compensation")):
+                clearance.plot(1e3 * result.depth, 1e3 * np.where(np.isfinite(result.clearance), result.clearance, np.nan), color=colour, label=label)
+                camera.plot(1e3 * result.depth, np.degrees(result.camera), color=colour)
+            clearance.axhline(0.0, color="#8a6d5a", linewidth=2.0)
+            clearance.set_title(pair[0].reach.name)
+            clearance.set_ylabel("clearance in mm")
+            camera.set_ylabel("camera error in deg")
+            camera.set_xlabel("depth of the tip in mm")
+        drawing.axes[0, 0].legend()
+    return drawing.svg

@@ -1,0 +1,1 @@
+"""The graph as data: its nodes and their parameters, without ROS."""

@@ -1,0 +1,1 @@
+"""The nodes' parameters: one module and one frozen data class a node."""

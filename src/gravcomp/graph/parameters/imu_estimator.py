@@ -1,0 +1,39 @@
+"""Parameters of the node imu_estimator."""
+
+from dataclasses import dataclass, field
+
+from gravcomp.config import parameter
+from gravcomp.orientation.calibration import ImuCalibration
+from gravcomp.orientation.estimator import EstimatorOptions
+from gravcomp.orientation.options import FilterOptions
+from gravcomp.orientation.prediction import PredictionOptions
+from gravcomp.thermal.heater import HeaterOptions
+
+RELIABILITIES = ("auto", "best_effort", "reliable")
+
+
+@dataclass(frozen=True)
+class ImuEstimatorParameters:
+    """What can be set on the node; where the IMU sits is in the robot's file under robot.imu_mount."""
+
+    imu_frame: str = parameter("imu_link", description="frame of imu/data", read_only=True)
+    base_frame: str = parameter("soft_base", description="frame of gravity", read_only=True)
+    reliability: str = parameter(
+        "auto",
+        choices=RELIABILITIES,
+        read_only=True,
+        description="how imu/data_raw is taken; auto: as reliably as it is offered, so a replayed bag loses nothing",
+    )
+    stale_time: float = parameter(0.5, unit="s", minimum=0.05, maximum=10, description="no sample for so long: NO_DATA")
+    bias_model_file: str = parameter(
+        "", read_only=True, description="where the bias over temperature is kept; empty: neither used nor learned", unit="path"
+    )
+    filter: FilterOptions = field(default_factory=FilterOptions)
+    calibration: ImuCalibration = field(default_factory=ImuCalibration)
+    prediction: PredictionOptions = field(default_factory=PredictionOptions)
+    heater: HeaterOptions = field(default_factory=HeaterOptions)
+
+    @property
+    def estimator(self) -> EstimatorOptions:
+        """What the orientation depends on."""
+        return EstimatorOptions(self.filter, self.calibration, self.prediction)

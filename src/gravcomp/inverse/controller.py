@@ -1,0 +1,141 @@
+"""The inverse controller: one step from the model's linear answer and the target to what the winches shall do.
+
+Each step is one Gauss-Newton iteration of the inverse problem around the state that the model has reached under the
+last command: build the programme, solve it, turn its tensions into displacements, hold those to the limits and judge
+the result. The model takes the displacements with the next sample of gravity, so the iteration runs in the closed loop
+itself.
+"""
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gravcomp.description.robot import Robot
+from gravcomp.inverse.command import Command, cable_displacement
+from gravcomp.inverse.damping import StepDamping
+from gravcomp.inverse.limits import step_bounds, within_limits
+from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
+from gravcomp.inverse.status import ControllerCode, judge
+from gravcomp.inverse.errors import backbone_missed, tip_errors
+from gravcomp.inverse.target import Target
+
+if TYPE_CHECKING:
+    from gravcomp.simulation.shape import Response
+
+# Longer pauses between two steps allow no longer strides: the linear answer would not carry that far.
+_LONGEST_INTERVAL = 0.1
+
+
+class InverseController:
+    """Turns linear answers of the model into commands; remembers the last command and the last solution.
+
+    robot: names and limits of the cables; options: see `InverseOptions`, replaceable at any time through `options`.
+    """
+
+    def __init__(self, robot: Robot, options: InverseOptions = InverseOptions()):
+        self.robot = robot
+        self.options = options
+        self._solver = ProgrammeSolver(len(robot.cables))
+        self.reset()
+
+    def reset(self, displacement: np.ndarray | None = None) -> None:
+        """Forget the past: rates count from `displacement` (m,), or, without it, from where the cables' paths are at
+        the next step."""
+        self._solver.reset()
+        self._damping = StepDamping()
+        self._displacement = None if displacement is None else np.array(displacement, dtype=float)
+        self._tension = np.zeros(len(self.robot.cables))
+
+    def step(
+        self,
+        response: "Response",
+        target: Target,
+        *,
+        backbone_station: np.ndarray,
+        tension: np.ndarray | None = None,
+        interval: float = 0.01,
+    ) -> Command:
+        """The command that brings the modelled robot nearest to the target.
+
+        backbone_station (n,): stations of the response's backbone rows; tension (m,) N: present tensions of the model
+        (None: those of the last command); interval (s): since the last step. Never raises for a hard problem: see the
+        command's code.
+        """
+        started = time.perf_counter()
+        limits, options = self.robot.limits, self.options
+        tension = self._tension if tension is None else np.asarray(tension, dtype=float)
+        present_path = response.compliance_aa @ tension + response.displacement_free
+        previous = present_path if self._displacement is None else self._displacement
+        interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
+        bounds = step_bounds(
+            limits, displacement=previous, tension=tension, path=present_path, pretension=options.pretension, interval=interval
+        )
+        try:
+            programme = build_programme(
+                response,
+                target,
+                bounds,
+                tension=tension,
+                backbone_station=backbone_station,
+                damping=self._damping.factor,
+                options=options,
+            )
+            solution = self._solver.solve(programme)
+        except SolverFailed as error:
+            return Command(
+                displacement=previous,
+                tension=tension,
+                code=ControllerCode.SOLVER_FAILED,
+                message=f"{error}; the last command is kept",
+                solve_time=time.perf_counter() - started,
+            )
+        path = response.compliance_aa @ solution.tension + response.displacement_free
+        self._damping.observe(path - present_path)
+        wanted = cable_displacement(path, response.compliance_aa.diagonal(), solution, options.slack)
+        displacement = within_limits(wanted, previous, limits, interval)
+        effector = response.compliance_ea @ solution.tension + response.effector_free
+        errors = tip_errors(effector, target)
+        missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
+        code, message = judge(
+            target=target,
+            points_missed=missed,
+            tilt=errors.tilt,
+            tension=solution.tension,
+            displacement=displacement,
+            rate_bound=np.abs(displacement - previous) > limits.displacement_rate * interval - 1e-6,
+            limits=limits,
+            names=self.robot.cable_names,
+            options=options,
+        )
+        self._displacement, self._tension = displacement, solution.tension
+        return Command(
+            displacement=displacement,
+            tension=solution.tension,
+            code=code,
+            message=message,
+            distance=errors.distance,
+            lateral=errors.lateral,
+            axial=errors.axial,
+            tilt=errors.tilt,
+            solve_time=time.perf_counter() - started,
+        )
+
+    def relax(self, response: "Response", *, interval: float = 0.01) -> Command:
+        """Pay the cables out, at the rates allowed, until none of them carries any tension."""
+        started = time.perf_counter()
+        free = response.displacement_free - self.options.slack
+        previous = free if self._displacement is None else self._displacement
+        interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
+        displacement = within_limits(free, previous, self.robot.limits, interval)
+        self.reset(displacement)
+        relaxed = bool(np.all(displacement <= free + 1e-6))
+        return Command(
+            displacement=displacement,
+            tension=np.zeros(free.size),
+            code=ControllerCode.RELAXING,
+            message="the cables are paid out" if relaxed else "paying the cables out",
+            solve_time=time.perf_counter() - started,
+        )

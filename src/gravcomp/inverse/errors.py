@@ -1,0 +1,50 @@
+"""How far an effector is from its target: the tip's distance, its parts across and along the robot, its tilt, and the
+backbone's distance."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from gravcomp.inverse.programme import tip_axis
+from gravcomp.inverse.target import Target
+
+
+class TipErrors(NamedTuple):
+    """distance, lateral (across the axis of `tip_axis`), axial (along it, signed) in m; tilt in rad."""
+
+    distance: float
+    lateral: float
+    axial: float
+    tilt: float
+
+
+def tip_errors(effector: np.ndarray, target: Target) -> TipErrors:
+    """Errors of the tip in the effector (e,); rows 0-2 its position, 3-5 its direction."""
+    return TipErrors(*_tip_errors(effector, target.tip_position, tip_axis(target, effector)))
+
+
+@njit(cache=True)
+def _tip_errors(effector, tip, axis):
+    distance, axial, across, chord = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        distance += (effector[i] - tip[i]) ** 2
+        axial += (effector[i] - tip[i]) * axis[i]
+    length = np.sqrt(effector[3] ** 2 + effector[4] ** 2 + effector[5] ** 2)
+    for i in range(3):
+        across += (effector[i] - tip[i] - axial * axis[i]) ** 2
+        chord += (effector[3 + i] / length - axis[i]) ** 2
+    # Half the angle by the chord is exact where the angle is small and arccos is not.
+    return np.sqrt(distance), np.sqrt(across), axial, 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(chord)))
+
+
+def backbone_missed(effector: np.ndarray, target: Target, backbone_station: np.ndarray) -> float:
+    """Largest distance (m) of a weighted backbone point from its target, 0 without any."""
+    if not target.backbone_weight.size:
+        return 0.0
+    used = target.backbone_weight > 0.0
+    if not used.any():
+        return 0.0
+    points = effector[6:].reshape(-1, 3)
+    reached = np.stack([np.interp(target.backbone_station[used], backbone_station, points[:, k]) for k in range(3)], axis=1)
+    return float(np.linalg.norm(reached - target.backbone_position[used], axis=1).max())

@@ -1,0 +1,162 @@
+"""The inverse problem of one step as a quadratic programme in the cables' tensions (its solution is in `solver`).
+
+The model answers linearly around its present state, effector e = W_ea lambda + e_free and path displacement delta =
+W_aa lambda + delta_free. The tensions lambda that bring the effector nearest to its target solve (after Coevoet,
+Escande and Duriez, IEEE RA-L 2017)
+
+    min   |M (W_ea lambda + e_free - e_target)|^2  +  c (eps lambda^T W_aa lambda  +  rho |lambda - lambda_now|_D^2)
+    s.t.  tension_lower <= lambda <= tension_upper,
+          displacement_lower <= W_aa lambda + delta_free <= displacement_upper,
+
+with M the roots of the weights, D the diagonal of W_aa, and c = trace(W_ea^T M^T M W_ea) / trace(W_aa), which makes eps
+and rho numbers that suit any robot. The energy eps picks, among tensions of equal effect, those without cables that
+work against each other; the proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see
+`damping`). Of the errors of tip and backbone the part along the robot counts less, because cables only pull: they
+cannot make up for the length that they take.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from gravcomp.inverse.limits import StepBounds
+from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.target import Target
+
+if TYPE_CHECKING:
+    from gravcomp.simulation.shape import Response
+
+_NO_DIRECTION = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Programme:
+    """min 1/2 x^T hessian x + gradient^T x over the tensions x (m,), subject to the bounds, with displacement =
+    compliance x + offset."""
+
+    hessian: np.ndarray
+    gradient: np.ndarray
+    compliance: np.ndarray
+    offset: np.ndarray
+    bounds: StepBounds
+
+
+def build_programme(
+    response: "Response",
+    target: Target,
+    bounds: StepBounds,
+    *,
+    tension: np.ndarray,
+    backbone_station: np.ndarray,
+    damping: float,
+    options: InverseOptions,
+) -> Programme:
+    """The programme around the present state.
+
+    tension (m,): the present tensions, reference of the proximal term; backbone_station (n,): of the effector's backbone rows;
+    damping: factor of the proximal term.
+    """
+    jacobian, offset = weighted_errors(target, response, tension, backbone_station, options)
+    hessian, gradient, compliance = _quadratic(
+        jacobian, offset, response.compliance_aa, tension, options.energy_weight, damping * options.proximal_weight
+    )
+    return Programme(hessian=hessian, gradient=gradient, compliance=compliance, offset=response.displacement_free, bounds=bounds)
+
+
+def tip_axis(target: Target, effector: np.ndarray) -> np.ndarray:
+    """Unit vector (3,) that splits the tip's error into axial and lateral: the target's direction, else that of the
+    effector (e,)."""
+    if target.tip_direction is not None:
+        return target.tip_direction
+    return effector[3:6] / math.sqrt(effector[3:6] @ effector[3:6])
+
+
+def weighted_errors(
+    target: Target, response: "Response", tension: np.ndarray, backbone_station: np.ndarray, options: InverseOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """M W_ea (k, m) and M (e_free - e_target) (k,) for the rows of the parts of the target that have a weight; along the
+    robot is where it lies under the present tensions (m,)."""
+    direction = target.tip_direction
+    return _weighted_errors(
+        np.ascontiguousarray(response.compliance_ea),
+        response.effector_free,
+        tension,
+        target.tip_position,
+        target.tip_position_weight,
+        _NO_DIRECTION if direction is None else direction,
+        target.tip_direction_weight,
+        target.backbone_station,
+        target.backbone_position,
+        target.backbone_weight,
+        backbone_station,
+        1.0 - math.sqrt(options.axial_weight),
+    )
+
+
+@njit(cache=True)
+def _weighted_errors(
+    change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
+):
+    """As `weighted_errors`; `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T."""
+    m = len(tension)
+    effector = change @ tension + free
+    count = int(tip_weight > 0.0) + int(direction_weight > 0.0) + int((weights > 0.0).sum())
+    jacobian, offset = np.empty((3 * count, m)), np.empty(3 * count)
+    row = 0
+    if tip_weight > 0.0:
+        axis = direction if (direction * direction).sum() > 0.0 else _unit(effector[3:6])
+        jacobian[:3], offset[:3] = change[:3], free[:3] - tip
+        _weigh(jacobian[:3], offset[:3], axis, less, tip_weight)
+        row = 3
+    if direction_weight > 0.0:
+        jacobian[row : row + 3], offset[row : row + 3] = change[3:6], free[3:6] - direction
+        _weigh(jacobian[row : row + 3], offset[row : row + 3], direction, 0.0, direction_weight)
+        row += 3
+    for index in range(len(stations)):
+        if weights[index] <= 0.0:
+            continue
+        left = min(max(np.searchsorted(backbone_station, stations[index]) - 1, 0), len(backbone_station) - 2)
+        share = (stations[index] - backbone_station[left]) / (backbone_station[left + 1] - backbone_station[left])
+        a, b = 6 + 3 * left, 9 + 3 * left
+        jacobian[row : row + 3] = (1.0 - share) * change[a : a + 3] + share * change[b : b + 3]
+        offset[row : row + 3] = (1.0 - share) * free[a : a + 3] + share * free[b : b + 3] - points[index]
+        along = _unit(effector[b : b + 3] - effector[a : a + 3])
+        _weigh(jacobian[row : row + 3], offset[row : row + 3], along, less, weights[index])
+        row += 3
+    return jacobian, offset
+
+
+@njit(cache=True)
+def _weigh(block, error, axis, less, weight):
+    """Take `less` of the part along the axis (3,) from block (3, m) and error (3,), then multiply by the root of the weight."""
+    root = np.sqrt(weight)
+    along = less * (axis[0] * error[0] + axis[1] * error[1] + axis[2] * error[2])
+    for i in range(3):
+        error[i] = root * (error[i] - along * axis[i])
+    for k in range(block.shape[1]):
+        along = less * (axis[0] * block[0, k] + axis[1] * block[1, k] + axis[2] * block[2, k])
+        for i in range(3):
+            block[i, k] = root * (block[i, k] - along * axis[i])
+
+
+@njit(cache=True)
+def _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal):
+    """Hessian, gradient and symmetric compliance of the programme; `energy` and `proximal` are relative to the errors' part."""
+    compliance = 0.5 * (compliance_aa + compliance_aa.T)
+    hessian = 2.0 * (jacobian.T @ jacobian)
+    scale = np.trace(hessian) / np.trace(compliance)
+    hessian += (scale * energy) * compliance
+    gradient = 2.0 * (jacobian.T @ offset)
+    for i in range(len(tension)):
+        hold = scale * proximal * compliance[i, i]
+        hessian[i, i] += hold
+        gradient[i] -= hold * tension[i]
+    return hessian, gradient, compliance
+
+
+@njit(cache=True)
+def _unit(vector):
+    return vector / np.sqrt((vector * vector).sum())

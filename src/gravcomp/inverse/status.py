@@ -1,0 +1,65 @@
+"""What the inverse controller says of itself; the codes are those of gravcomp_msgs/ControllerStatus."""
+
+from enum import IntEnum
+
+import numpy as np
+
+from gravcomp.description.robot import Limits
+from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.target import Target
+
+
+class ControllerCode(IntEnum):
+    INACTIVE = 0
+    OK = 1
+    AT_LIMIT = 2
+    UNREACHABLE = 3
+    STALE = 4
+    REFUSED = 5
+    SOLVER_FAILED = 6
+    RELAXING = 7
+
+
+def judge(
+    *,
+    target: Target,
+    points_missed: float,
+    tilt: float,
+    tension: np.ndarray,
+    displacement: np.ndarray,
+    rate_bound: np.ndarray,
+    limits: Limits,
+    names: tuple[str, ...],
+    options: InverseOptions,
+) -> tuple[ControllerCode, str]:
+    """Code and sentence for a step.
+
+    points_missed (m): largest predicted distance of a weighted point; rate_bound (m,): whether a cable moves as fast as it may.
+    """
+    # A micrometre and a millinewton are below what any winch resolves.
+    moving = _listed(names, rate_bound)
+    at_tension = _listed(names, tension > limits.tension_max - 1e-3)
+    at_travel = _listed(names, (displacement > limits.displacement_max - 1e-6) | (displacement < limits.displacement_min + 1e-6))
+    held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
+    if moving and not held:
+        return ControllerCode.AT_LIMIT, f"moving as fast as allowed: displacement rate of {moving}"
+    reason = f"; at the limit: {', '.join(held)}" if held else ""
+    if points_missed > options.tolerance:
+        return (
+            ControllerCode.UNREACHABLE,
+            f"the nearest shape is {1e3 * points_missed:.1f} mm from the target"
+            f" (tolerance {1e3 * options.tolerance:g} mm){reason}",
+        )
+    if target.tip_direction_weight > 0.0 and tilt > options.tilt_tolerance:
+        return (
+            ControllerCode.UNREACHABLE,
+            f"the nearest shape is tilted by {np.degrees(tilt):.1f} deg"
+            f" (tolerance {np.degrees(options.tilt_tolerance):g} deg){reason}",
+        )
+    if held:
+        return ControllerCode.AT_LIMIT, f"the nearest shape is kept{reason}"
+    return ControllerCode.OK, "the target is kept"
+
+
+def _listed(names: tuple[str, ...], which: np.ndarray) -> str:
+    return ", ".join(name for name, yes in zip(names, which.tolist()) if yes)

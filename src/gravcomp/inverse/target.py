@@ -1,0 +1,114 @@
+"""What the robot shall look like: the position and direction of its tip and points of its backbone, each with a weight.
+
+The inverse problem keeps  sum_i w_i |e_i - target_i|^2  small. Weights are relative to one another: 1 for the position
+of the tip is the usual choice; the weight of the tip's direction is in m^2 a squared unit of direction, so that 0.01
+makes 0.1 rad count like 10 mm. A weight of 0 leaves a part free. A bent shape of constant curvature stands for all of
+them: an arc of length L, bent by the angle theta into the plane at phi, has at the arc length s = station * L
+
+    p(s) = (rho cos(phi), rho sin(phi), z),   rho = L/theta (1 - cos(theta s/L)),   z = L/theta sin(theta s/L).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+class TargetError(ValueError):
+    """A target that cannot be used; the text is for people."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A shape to keep, in the robot's base frame.
+
+    tip_position (3,) m; tip_direction (3,) along the robot at its tip, normalised here, or None: then nothing is asked of it and
+    'axial' means along the tip as it stands; backbone_station (k,) from 0 at the base to 1 at the tip;
+    backbone_position (k, 3) m; backbone_weight (k,). Raises TargetError for anything that is not finite, of the wrong
+    shape or without any weight.
+    """
+
+    tip_position: np.ndarray
+    tip_position_weight: float = 1.0
+    tip_direction: np.ndarray | None = None
+    tip_direction_weight: float = 0.0
+    backbone_station: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    backbone_position: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    backbone_weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self):
+        set_ = object.__setattr__
+        set_(self, "tip_position", _finite(self.tip_position, (3,), "tip_position"))
+        if self.tip_direction is not None:
+            direction = _finite(self.tip_direction, (3,), "tip_direction")
+            length = float(np.linalg.norm(direction))
+            if length < 1e-9:
+                raise TargetError("tip_direction has length 0; a direction is needed, or none at all")
+            set_(self, "tip_direction", direction / length)
+        stations = _finite(self.backbone_station, (-1,), "backbone_station")
+        set_(self, "backbone_station", stations)
+        set_(self, "backbone_position", _finite(self.backbone_position, (stations.size, 3), "backbone_position"))
+        set_(self, "backbone_weight", _finite(self.backbone_weight, (stations.size,), "backbone_weight"))
+        if stations.size and (stations.min() < 0.0 or stations.max() > 1.0):
+            found = f"{stations.min():g} to {stations.max():g}"
+            raise TargetError(f"backbone_station runs from {found}; allowed: 0 (base) to 1 (tip)")
+        weights = np.array([self.tip_position_weight, self.tip_direction_weight, *self.backbone_weight])
+        if not np.all(np.isfinite(weights)) or weights.min() < 0.0:
+            raise TargetError(f"weights are {weights.tolist()}; finite numbers of at least 0 are needed")
+        if self.tip_direction is None and self.tip_direction_weight > 0.0:
+            raise TargetError("tip_direction_weight is given without a tip_direction")
+        if weights.max() == 0.0:
+            raise TargetError("every weight is 0; at least one part of the shape has to be asked for")
+
+
+def bend_target(
+    length: float,
+    angle: float,
+    plane: float,
+    *,
+    tip_position_weight: float = 1.0,
+    tip_direction_weight: float = 0.0,
+    backbone_station: np.ndarray = (),
+    backbone_weight: np.ndarray = (),
+) -> Target:
+    """The target of constant curvature: `length` (m) of the robot bent by `angle` (rad) into the plane at `plane` (rad,
+    about z from x)."""
+    if not np.all(np.isfinite([length, angle, plane])) or length <= 0.0 or abs(angle) > 2.0 * np.pi:
+        bend = f"a bend of {angle!r} rad at {plane!r} rad over {length!r} m"
+        raise TargetError(f"{bend}; finite numbers and at most a full turn are needed")
+    stations = np.asarray(backbone_station, float)
+    points = arc_points(length, angle, plane, np.append(stations, 1.0))
+    direction = np.array([np.sin(angle) * np.cos(plane), np.sin(angle) * np.sin(plane), np.cos(angle)])
+    return Target(
+        tip_position=points[-1],
+        tip_position_weight=tip_position_weight,
+        tip_direction=direction,
+        tip_direction_weight=tip_direction_weight,
+        backbone_station=stations,
+        backbone_position=points[:-1],
+        backbone_weight=np.asarray(backbone_weight, float),
+    )
+
+
+def straight_target(length: float, **weights) -> Target:
+    """The straight robot of `length` (m); the keyword arguments are those of `bend_target`."""
+    return bend_target(length, 0.0, 0.0, **weights)
+
+
+def arc_points(length: float, angle: float, plane: float, station: np.ndarray) -> np.ndarray:
+    """Points (k, 3) of the arc at the stations (k,)."""
+    s = np.asarray(station, float) * length
+    half = 0.5 * angle * s / length
+    chord = s * np.sinc(half / np.pi)  # np.sinc(x) is sin(pi x)/(pi x): no division by zero on the straight robot
+    return np.stack([chord * np.sin(half) * np.cos(plane), chord * np.sin(half) * np.sin(plane), chord * np.cos(half)], axis=1)
+
+
+def _finite(value, shape: tuple, name: str) -> np.ndarray:
+    array = np.array(value, dtype=float)
+    if array.size == 0 and 0 in shape:
+        array = array.reshape(shape)
+    expected = tuple(n if want == -1 else want for n, want in zip(array.shape, shape)) if array.ndim == len(shape) else shape
+    if array.shape != expected:
+        raise TargetError(f"{name} has the shape {array.shape}; {shape} is needed".replace("-1", "any"))
+    if not np.all(np.isfinite(array)):
+        raise TargetError(f"{name} is {array.tolist()}; finite numbers are needed")
+    return array

@@ -1,0 +1,75 @@
+"""How long an IMU sample takes to become motor current, read from the bus itself.
+
+The bridge sends a CommandTrace frame with the board time of the sample behind a new command, directly after the current
+frame that the command caused. The delay is the time between the sample's last frame and that current frame, both as the
+listener's kernel stamped them.
+"""
+
+import threading
+
+import can
+
+from gravcomp.canbus import codec
+from gravcomp.canbus.bus import BusError, open_bus
+from gravcomp.description.hardware import CanInterface
+
+# Listening takes a share of a core at full bus load, so it happens in short looks.
+_LOOK, _PAUSE = 1.0, 3.0  # s
+
+
+class DelayListener:
+    """A thread that looks at the bus now and then; `delays` (s) grows."""
+
+    def __init__(self, settings: CanInterface):
+        self.delays: list[float] = []
+        self.failure: str | None = None
+        self._settings = settings
+        self._ids = [codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id, 0x200, 0x1FF]
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="bus delay", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._end.set()
+        self._thread.join(_LOOK + 1.0)
+
+    def _run(self) -> None:
+        while not self._end.wait(_PAUSE):
+            try:
+                bus = open_bus(self._settings, self._ids)
+            except BusError as error:
+                self.failure = str(error)
+                return
+            with bus:
+                frames = []
+                while not self._end.is_set() and (not frames or frames[-1].timestamp - frames[0].timestamp < _LOOK):
+                    frame = bus.recv(0.2)
+                    if frame is None:
+                        break
+                    frames.append(frame)
+            self.delays += delays_of(frames)
+
+
+def delays_of(frames: list[can.Message]) -> list[float]:
+    """Seconds from each IMU sample to the first current frame that it caused, for the samples whose command was traced."""
+    imu_time, trace = codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id
+    sampled: dict[float, float] = {}
+    last_current: float | None = None
+    delays = []
+    for frame in frames:
+        if frame.arbitration_id in (0x200, 0x1FF):
+            last_current = frame.timestamp
+            continue
+        try:
+            values = codec.decode(frame).values
+        except codec.FrameError:
+            continue
+        if frame.arbitration_id == imu_time:
+            sampled[values.time] = frame.timestamp
+        elif frame.arbitration_id == trace and last_current is not None:
+            begin = sampled.pop(values.time, None)
+            if begin is not None and last_current >= begin:
+                delays.append(last_current - begin)
+    return delays

@@ -1,0 +1,31 @@
+"""What the tip's error would be with released cables, from the virtual robot's statics."""
+
+import numpy as np
+
+from gravcomp.config import from_mapping
+from gravcomp.description import RobotFile
+
+# So many directions of gravity of a run are solved; its motion is slow against their distance.
+_DIRECTIONS = 40
+
+
+def released_tip_error(robot_file: RobotFile, gravity: np.ndarray, target: np.ndarray) -> float | None:
+    """RMS distance in m of the released virtual robot's tip from `target` (3,) over the gravity (n, 3) m/s^2 of a run; None without any."""
+    from gravcomp.virtual.body import build_rod
+    from gravcomp.virtual.equilibrium import NoEquilibrium, equilibrium
+    from gravcomp.virtual.parameters import VirtualRobotParameters
+
+    parameters = from_mapping(
+        VirtualRobotParameters, robot_file.section("virtual_robot"), source=robot_file.source, key="virtual_robot"
+    )
+    rod = build_rod(robot_file.robot, parameters)
+    distances = []
+    shape = None
+    for direction in gravity[:: max(1, len(gravity) // _DIRECTIONS)]:
+        try:
+            shape = equilibrium(rod, direction, start=shape)
+        except NoEquilibrium:
+            shape = None
+            continue
+        distances.append(np.linalg.norm(shape.tip - target))
+    return float(np.sqrt(np.mean(np.square(distances)))) if distances else None

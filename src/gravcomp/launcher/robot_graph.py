@@ -1,0 +1,50 @@
+"""Which nodes make a robot's graph, and with which parameters."""
+
+from dataclasses import dataclass, field
+
+from gravcomp.launcher.node_process import NodeSpec
+
+LOOP = (
+    ("gravcomp_hw", "can_bridge"),
+    ("gravcomp_estimation", "imu_estimator"),
+    ("gravcomp_fem", "fem_simulator"),
+    ("gravcomp_fem", "inverse_controller"),
+)
+"""The four nodes of the loop: package and executable."""
+
+
+@dataclass(frozen=True)
+class RobotGraph:
+    """One robot's nodes. robot: a shipped name or a path; channel: a CAN channel in place of the file's; namespace: of all nodes;
+    parameters: {executable: {parameter: value}} beyond the robot's file."""
+
+    robot: str
+    interface: str = ""
+    channel: str = ""
+    namespace: str = ""
+    parameters: dict = field(default_factory=dict)
+
+    def loop(self) -> list[NodeSpec]:
+        """Bridge, estimator, simulator, controller."""
+        return [self.node(package, executable) for package, executable in LOOP]
+
+    def node(self, package: str, executable: str, **parameters) -> NodeSpec:
+        """One node of this robot."""
+        given = {"robot": self.robot}
+        if executable in ("can_bridge", "virtual_robot", "judge"):
+            given.update({key: value for key, value in (("interface", self.interface), ("channel", self.channel)) if value})
+        given.update(self.parameters.get(executable, {}))
+        given.update(parameters)
+        return NodeSpec(package, executable, given, self.namespace)
+
+
+def check_robot_file(robot: str) -> None:
+    """Read every section of a robot's file, so that a mistake is told before any process starts. Raises ConfigError."""
+    from gravcomp.config import from_mapping
+    from gravcomp.description import load_robot_file
+    from gravcomp.description.hardware import parse_hardware
+    from gravcomp.virtual.parameters import VirtualRobotParameters
+
+    file = load_robot_file(robot)
+    parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")

@@ -1,0 +1,129 @@
+"""Shape functions and quadrature of the elements.
+
+hex20: serendipity hexahedron on [-1, 1]^3; tet10, tet4: tetrahedra on the unit simplex. Node order as in VTK.
+Reduced integration of hex20 has 2 x 2 x 2 points (Zienkiewicz, Taylor, Too 1971): no locking in thin walls, and the
+spurious modes that it leaves cannot pass from one element to the next.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from gravcomp.mesh.quadratic import TET_EDGES
+
+_HEX_NODES = np.array(
+    [(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
+    + [(0, -1, -1), (1, 0, -1), (0, 1, -1), (-1, 0, -1), (0, -1, 1), (1, 0, 1), (0, 1, 1), (-1, 0, 1)]
+    + [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
+    dtype=float,
+)
+# Barycentric coordinates of a tetrahedron as functions of (x, y, z): l = _BARY_0 + _BARY_D @ (x, y, z).
+_BARY_0 = np.array([1.0, 0.0, 0.0, 0.0])
+_BARY_D = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclasses.dataclass(frozen=True)
+class Quadrature:
+    """Integration over the reference element: points (p, 3), weights (p,)."""
+
+    points: np.ndarray
+    weights: np.ndarray
+
+
+def shape_values(kind: str, points: np.ndarray) -> np.ndarray:
+    """Shape functions at local points (..., 3): (..., c)."""
+    points = np.asarray(points, dtype=float)
+    if kind == "hex20":
+        x = points[..., None, :]
+        a = _HEX_NODES
+        corner = np.prod(1 + x * a, axis=-1) / 8 * ((x * a).sum(-1) - 2)
+        edge = np.prod(np.where(a == 0, 1 - x**2, 1 + x * a), axis=-1) / 4
+        return np.where(np.all(a != 0, axis=-1), corner, edge)
+    bary = _BARY_0 + points @ _BARY_D.T
+    if kind == "tet4":
+        return bary
+    mids = [4 * bary[..., a] * bary[..., b] for a, b in TET_EDGES]
+    return np.concatenate([bary * (2 * bary - 1), np.stack(mids, axis=-1)], axis=-1)
+
+
+def shape_gradients(kind: str, points: np.ndarray) -> np.ndarray:
+    """Derivatives of the shape functions by the local coordinates at (..., 3): (..., c, 3)."""
+    points = np.asarray(points, dtype=float)
+    if kind == "hex20":
+        x = points[..., None, :]
+        a = _HEX_NODES
+        on_edge = ~np.all(a != 0, axis=-1)
+        factor = np.where(on_edge[:, None] & (a == 0), 1 - x**2, 1 + x * a)
+        slope = np.where(on_edge[:, None] & (a == 0), -2 * x, np.broadcast_to(a, np.broadcast_shapes(x.shape, a.shape)))
+        linear = (x * a).sum(-1) - 2
+        gradient = np.empty(factor.shape)
+        for i in range(3):
+            others = factor[..., (i + 1) % 3] * factor[..., (i + 2) % 3]
+            corner = others * (slope[..., i] * linear + factor[..., i] * a[:, i]) / 8
+            gradient[..., i] = np.where(on_edge, others * slope[..., i] / 4, corner)
+        return gradient
+    bary = _BARY_0 + points @ _BARY_D.T
+    if kind == "tet4":
+        return np.broadcast_to(_BARY_D, (*points.shape[:-1], 4, 3)).copy()
+    corners = (4 * bary - 1)[..., None] * _BARY_D
+    mids = [4 * (bary[..., a, None] * _BARY_D[b] + bary[..., b, None] * _BARY_D[a]) for a, b in TET_EDGES]
+    return np.concatenate([corners, np.stack(mids, axis=-2)], axis=-2)
+
+
+def stiffness_quadrature(kind: str) -> Quadrature:
+    """The rule for internal forces: reduced (8 points) for hex20, 4 points for tet10, one for tet4."""
+    if kind == "hex20":
+        return _gauss_cube(2)
+    if kind == "tet10":
+        inner, outer = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
+        points = np.full((4, 3), inner)
+        points[np.arange(3) + 1, np.arange(3)] = outer
+        return Quadrature(points, np.full(4, 1 / 24))
+    return Quadrature(np.full((1, 3), 0.25), np.array([1 / 6]))
+
+
+def mass_quadrature(kind: str) -> Quadrature:
+    """A rule that integrates products of two shape functions exactly on an undistorted element."""
+    return _gauss_cube(3) if kind == "hex20" else _conical_simplex(3)
+
+
+def inside(kind: str, points: np.ndarray) -> np.ndarray:
+    """How far local points (..., 3) lie outside the reference element: (...,), zero or less inside."""
+    if kind == "hex20":
+        return np.abs(points).max(-1) - 1.0
+    return -np.minimum(points.min(-1), 1.0 - points.sum(-1))
+
+
+def centre(kind: str) -> np.ndarray:
+    """(3,) the middle of the reference element."""
+    return np.zeros(3) if kind == "hex20" else np.full(3, 0.25)
+
+
+def reference_nodes(kind: str) -> np.ndarray:
+    """(c, 3) the nodes of the reference element."""
+    if kind == "hex20":
+        return _HEX_NODES.copy()
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    if kind == "tet4":
+        return corners
+    return np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in TET_EDGES]])
+
+
+def _gauss_cube(n: int) -> Quadrature:
+    x, w = np.polynomial.legendre.leggauss(n)
+    points = np.stack(np.meshgrid(x, x, x, indexing="ij"), axis=-1).reshape(-1, 3)
+    return Quadrature(points, np.einsum("i,j,k->ijk", w, w, w).ravel())
+
+
+def _conical_simplex(n: int) -> Quadrature:
+    """Stroud's conical product: the cube folded onto the simplex, exact to degree 2 n - 1."""
+    from scipy.special import roots_jacobi
+
+    rules = []
+    for power in range(3):
+        x, w = roots_jacobi(n, power, 0)
+        rules.append(((1 + x) / 2, w / 2 ** (power + 1)))
+    (a, wa), (b, wb), (c, wc) = rules
+    c, b, a = np.meshgrid(c, b, a, indexing="ij")
+    points = np.stack([c, b * (1 - c), a * (1 - b) * (1 - c)], axis=-1).reshape(-1, 3)
+    return Quadrature(points, np.einsum("i,j,k->ijk", wc, wb, wa).ravel())

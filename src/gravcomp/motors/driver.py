@@ -1,0 +1,238 @@
+"""The bridge at work: one thread that receives, controls at a fixed rate and sends, whatever the rest of the process does.
+
+    bus --frames--> Bridge (states, loops) --currents--> bus          every control period
+        --frames--> ImuStream --samples--> queue                      as they come
+    command() --> Bridge --currents--> bus                            at once, not at the next period
+
+What others shall know (IMU samples, cable states) goes into a queue that is never waited for: a reader that hangs loses
+the oldest entries, not the control.
+"""
+
+import collections
+import dataclasses
+import queue
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+from gravcomp.canbus import codec
+from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
+from gravcomp.canbus.link import CanLink, lateness
+from gravcomp.description.hardware import MOTOR_IDS, Hardware
+from gravcomp.motors.bridge import Bridge, CableSnapshot, State, ZeroRecord
+from gravcomp.motors.guard import GuardClient
+
+RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
+"""Ids that the bridge takes from the bus."""
+
+HEATER_TIMEOUT = 0.5
+"""s without a heater command after which the duty is zero."""
+
+_BEAT_PERIOD = 0.01  # s; at 40 mm/s a rotor makes half a turn in it, and the guard shall know the turns when the bridge dies
+_HEATER_PERIOD = 0.1  # s
+_LONGEST_QUEUE = 256
+_SWITCH_INTERVAL = 5e-4  # s; Python's default of 5 ms would let another thread delay the control by that
+_ZEROS_AT_END = 5
+_PAUSE_AFTER_ERROR = 0.01  # s
+
+
+@dataclasses.dataclass(frozen=True)
+class DriverOptions:
+    """rate: control periods a second; state_rate: snapshots a second, beside one at every change of the state; guard: a guard process
+    is required."""
+
+    rate: float = 250.0
+    state_rate: float = 100.0
+    zero: str = "start"
+    require_imu: bool = True
+    guard: bool = True
+    trace: bool = True
+
+
+class BridgeDriver:
+    """Runs a Bridge on its bus. Entries of `queue` are ImuSample and CableSnapshot; None ends it."""
+
+    def __init__(self, hardware: Hardware, options: DriverOptions = DriverOptions(), *, link: CanLink | None = None):
+        self.bridge = Bridge(hardware, zero=options.zero, require_imu=options.require_imu)
+        self.imu = ImuStream()
+        self.link = link or CanLink(hardware.can, RECEIVED_FRAMES)
+        self.queue: queue.SimpleQueue[ImuSample | CableSnapshot | None] = queue.SimpleQueue()
+        self.overruns = 0  # control periods that came late by more than one
+        self.delay = 0.0  # s, of the last command followed: from IMU sample to current frame
+        self._hardware, self._options = hardware, options
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+        self._guard: GuardClient | None = None
+        self._samples: collections.OrderedDict[int, ImuSample] = collections.OrderedDict()
+        self._heater = (0.0, -float("inf"))
+        self._heater_sequence = 0
+        self._told: State | None = None  # the last state in the queue
+
+    def open(self) -> None:
+        """Open the bus and begin to receive; no motor is driven. Raises BusError."""
+        self.link.open()
+        sys.setswitchinterval(_SWITCH_INTERVAL)
+        with self._lock:
+            self.bridge.configure()
+        self._ending.clear()
+        self._thread = threading.Thread(target=self._run, name="bridge", daemon=True)
+        self._thread.start()
+
+    def activate(self) -> None:
+        """Drive. Raises GuardError when no guard process watches, or another bridge drives this bus."""
+        if self._options.guard and self._guard is None:
+            self._guard = GuardClient.connect(self._hardware.can, self._hardware)
+            if self._guard.record:
+                with self._lock:
+                    self.bridge.restore(self._guard.record)
+        with self._lock:
+            self.bridge.activate(time.monotonic())
+
+    def deactivate(self) -> None:
+        """Zero current."""
+        with self._lock:
+            self.bridge.deactivate()
+            self._send_zeros()
+
+    def close(self) -> None:
+        """Zero current, close the bus, end the thread."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join(2.0)
+            self._thread = None
+        with self._lock:
+            if self.link.is_open:
+                self._send_zeros()
+            self.bridge.unconfigure()
+        if self._guard is not None:
+            self._guard.close()
+            self._guard = None
+        self.link.close()
+        self.queue.put(None)
+
+    def command(self, displacement: Sequence[float], tension: Sequence[float], stamp_ns: int) -> str | None:
+        """As Bridge.command; `stamp_ns` is that of the IMU sample behind it on the host's clock, 0 for none. Sends at once."""
+        age = time.time() - 1e-9 * stamp_ns if stamp_ns else 0.0
+        with self._lock:
+            now = time.monotonic()
+            reason = self.bridge.command(displacement, tension, now, age=age, stamp=stamp_ns)
+            if reason is None:
+                self.link.send(self.bridge.tick(now))
+                self.delay = age
+                sample = self._samples.get(stamp_ns)
+                if self._options.trace and sample is not None:
+                    self.link.send([codec.encode("CommandTrace", time=sample.board_time, sequence=sample.sequence)])
+        return reason
+
+    def request(self, action: Callable[[Bridge, float], tuple[bool, str]]) -> tuple[bool, str]:
+        """Call `action(bridge, now)` and send what follows from it at once."""
+        with self._lock:
+            now = time.monotonic()
+            answer = action(self.bridge, now)
+            self.link.send(self.bridge.tick(now))
+        return answer
+
+    def heater(self, duty: float) -> None:
+        """The heater's duty 0..1; anything else counts as 0."""
+        self._heater = (duty if 0.0 <= duty <= 1.0 else 0.0, time.monotonic())
+
+    def snapshot(self) -> CableSnapshot:
+        with self._lock:
+            return self.bridge.snapshot()
+
+    def _run(self) -> None:
+        now = time.monotonic()
+        self._next_tick = self._next_state = self._next_beat = self._next_heater = now
+        while not self._ending.is_set():
+            try:
+                self._cycle()
+            except Exception as error:  # nothing known; but a thread that ended would leave the motors to the guard, and no way back
+                self.bridge.stop(f"error in the bridge: {error!r}")
+                self.link.send(self.bridge.zero_frames())
+                time.sleep(_PAUSE_AFTER_ERROR)
+
+    def _cycle(self) -> None:
+        """Receive until the next control period, or until frames come; then do what is due."""
+        period, state_period = 1.0 / self._options.rate, 1.0 / self._options.state_rate
+        frames = self.link.receive(max(0.0, self._next_tick - time.monotonic()))
+        with self._lock:
+            now = time.monotonic()
+            self._take(frames, now)
+            if not self.link.is_open:
+                self.bridge.bus_lost(self.link.status)
+            if now >= self._next_tick:
+                self.link.send(self.bridge.tick(now))
+                self.overruns += now > self._next_tick + 2 * period
+                self._next_tick = max(self._next_tick + period, now)
+            record = self.bridge.zero_record() if now >= self._next_beat else None
+            changed = self.bridge.state is not self._told
+            snapshot = self.bridge.snapshot() if changed or now >= self._next_state else None
+        if now >= self._next_beat:
+            self._next_beat = now + _BEAT_PERIOD
+            self._beat(record)
+        if snapshot is not None:
+            self._next_state = now + state_period if changed else max(self._next_state + state_period, now)
+            self._told = snapshot.state
+            self._emit(snapshot)
+        if now >= self._next_heater:
+            self._next_heater = now + _HEATER_PERIOD
+            self._send_heater(now)
+
+    def _take(self, frames: list, now: float) -> None:
+        wall = time.time()
+        for frame in frames:
+            late = lateness(frame, wall)
+            if frame.arbitration_id not in IMU_FRAMES:
+                self.bridge.on_frame(frame, now - late)
+                continue
+            received = wall - late
+            sample = self.imu.on_frame(frame, received)
+            if sample is not None:
+                stamp_ns = round(1e9 * sample.stamp)
+                self._samples[stamp_ns] = sample
+                if len(self._samples) > _LONGEST_QUEUE:
+                    self._samples.popitem(last=False)
+                fault = self.imu.fault
+                if fault is None:
+                    self.bridge.on_imu_sample(now)
+                else:
+                    self.bridge.imu_lost(fault)
+                self._emit(sample)
+
+    def _emit(self, entry: ImuSample | CableSnapshot) -> None:
+        if self.queue.qsize() > _LONGEST_QUEUE:
+            try:
+                self.queue.get_nowait()
+            except queue.Empty:
+                pass
+        self.queue.put(entry)
+
+    def _beat(self, record: ZeroRecord | None) -> None:
+        if self._guard is not None and not self._guard.beat(record):
+            self._guard = None
+            threading.Thread(target=self._new_guard, args=[record], name="guard", daemon=True).start()
+
+    def _new_guard(self, record: ZeroRecord | None) -> None:
+        """The guard died: start another; without one, hold no motor."""
+        try:
+            guard = GuardClient.connect(self._hardware.can, self._hardware, record)
+        except Exception as error:
+            self.request(lambda bridge, now: bridge.stop(f"the guard is gone: {error}"))
+            return
+        self._guard = guard
+        if self._ending.is_set():
+            guard.close()
+
+    def _send_heater(self, now: float) -> None:
+        duty, since = self._heater
+        if self.link.is_open:
+            self._heater_sequence = (self._heater_sequence + 1) % 256
+            fresh = now - since < HEATER_TIMEOUT
+            self.link.send([codec.encode("HeaterCommand", duty=duty if fresh else 0.0, sequence=self._heater_sequence)])
+
+    def _send_zeros(self) -> None:
+        for _ in range(_ZEROS_AT_END):
+            self.link.send(self.bridge.zero_frames())
+

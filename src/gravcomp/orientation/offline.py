@@ -1,0 +1,71 @@
+"""The estimator over a whole recording at full speed: what the node would give for it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.orientation.estimator import GravityEstimator
+from gravcomp.orientation.guard import Problem
+from gravcomp.recordings import Recording
+
+PROGRESS_EVERY = 2000  # samples
+
+
+@dataclass(frozen=True)
+class EstimatedRecording:
+    """One row a sample; a rejected sample repeats the row before, NaN before the first estimate."""
+
+    stamp_ns: np.ndarray  # (n,) int64, ns
+    orientation: np.ndarray  # (n, 4) w x y z, sensor to earth
+    gravity: np.ndarray  # (n, 3) m/s^2, soft_base
+    bias: np.ndarray  # (n, 3) rad/s, of the raw rate
+    rest: np.ndarray  # (n,) bool
+    inclination_std: np.ndarray  # (n,) rad
+    problems: dict[str, int]  # what was wrong -> samples
+
+
+def estimate_recording(
+    recording: Recording, estimator: GravityEstimator | None = None, progress: Callable[[float], None] | None = None
+) -> EstimatedRecording:
+    """Run the estimator (default: one with default options) over the recording; `progress` is told the fraction done."""
+    estimator = estimator or GravityEstimator()
+    count = len(recording)
+    rows = np.full((count, 12), np.nan)
+    problems: dict[str, int] = {}
+    row: tuple | None = None
+    temperatures = _temperatures(recording)
+    next_temperature = next(temperatures, None)
+    # Python numbers: a sample through NumPy scalars takes half as long again.
+    samples = zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist())
+    for i, (stamp_ns, gyro, accel) in enumerate(samples):
+        while next_temperature is not None and next_temperature[0] <= stamp_ns:
+            estimator.add_temperature(*next_temperature)
+            next_temperature = next(temperatures, None)
+        result = estimator.update(stamp_ns, gyro, accel)
+        if isinstance(result, Problem):
+            problems[result.value] = problems.get(result.value, 0) + 1
+        else:
+            imu = result.imu
+            row = (*imu.orientation, *result.gravity, *result.bias, imu.rest, imu.inclination_std)
+            if imu.problem is not Problem.NONE:
+                problems[imu.problem.value] = problems.get(imu.problem.value, 0) + 1
+        if row is not None:
+            rows[i] = row
+        if progress is not None and i % PROGRESS_EVERY == 0:
+            progress(i / count)
+    return EstimatedRecording(
+        stamp_ns=recording.stamp_ns,
+        orientation=rows[:, :4],
+        gravity=rows[:, 4:7],
+        bias=rows[:, 7:10],
+        rest=rows[:, 10] == 1.0,
+        inclination_std=rows[:, 11],
+        problems=problems,
+    )
+
+
+def _temperatures(recording: Recording):
+    if recording.temperature is None:
+        return iter(())
+    return zip(recording.temperature_stamp_ns.tolist(), recording.temperature.tolist())

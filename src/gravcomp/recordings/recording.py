@@ -1,0 +1,78 @@
+"""What a recording holds, checked once so that whoever takes it needs no further checks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be read or used; the text says what was found and what is needed."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """An IMU stream and, where known, the truth it can be judged by. n samples, k temperature readings.
+
+    Samples that are not finite stay in: telling and rejecting them is the filter's task.
+    """
+
+    source: str  # file or folder
+    stamp_ns: np.ndarray  # (n,) int64, ns
+    gyro: np.ndarray  # (n, 3) rad/s, sensor frame
+    accel: np.ndarray  # (n, 3) m/s^2, specific force, sensor frame
+    temperature_stamp_ns: np.ndarray | None = None  # (k,) int64, ns
+    temperature: np.ndarray | None = None  # (k,) degC
+    orientation: np.ndarray | None = None  # (n, 4) true w x y z, sensor to earth; NaN where unknown
+    movement: np.ndarray | None = None  # (n,) bool, where the truth counts
+
+    def __post_init__(self):
+        count = len(self.stamp_ns)
+        if count < 2:
+            raise RecordingError(f"{self.source}: holds {count} IMU samples; at least 2 are needed")
+        for name, width in (("gyro", 3), ("accel", 3), ("orientation", 4)):
+            value = getattr(self, name)
+            if value is not None and value.shape != (count, width):
+                raise RecordingError(f"{self.source}: {name} has the shape {value.shape}; ({count}, {width}) is needed")
+        for name in ("gyro", "accel"):
+            if not np.isfinite(getattr(self, name)).all(axis=1).any():
+                raise RecordingError(f"{self.source}: {name} has no finite sample among its {count}")
+        if self.movement is not None and self.movement.shape != (count,):
+            raise RecordingError(f"{self.source}: movement has the shape {self.movement.shape}; ({count},) is needed")
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+    @property
+    def duration(self) -> float:
+        """s, first to last stamp."""
+        return float(self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9
+
+    @property
+    def rate(self) -> float:
+        """Hz, from the median distance of the stamps."""
+        step = float(np.median(np.diff(self.stamp_ns)))
+        if step <= 0:
+            raise RecordingError(f"{self.source}: the stamps do not advance (median step {step:g} ns)")
+        return 1e9 / step
+
+    def averaged(self, count: int) -> "Recording":
+        """The recording at 1/count of its rate: the mean of every `count` samples, with the stamp and truth of the last.
+
+        An orientation at the end of the averaging window is what the window's samples lead to.
+        """
+        whole = len(self) // count * count
+        last = slice(count - 1, whole, count)
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            return values[:whole].reshape(-1, count, 3).mean(axis=1)
+
+        return Recording(
+            source=self.source,
+            stamp_ns=self.stamp_ns[last],
+            gyro=mean(self.gyro),
+            accel=mean(self.accel),
+            temperature_stamp_ns=self.temperature_stamp_ns,
+            temperature=self.temperature,
+            orientation=None if self.orientation is None else self.orientation[last],
+            movement=None if self.movement is None else self.movement[last],
+        )

@@ -1,0 +1,91 @@
+"""A robot's model projected on a reduced basis: everything that a step needs, in r coordinates.
+
+u = Phi q. The elastic forces are polynomials in q (`strain_polynomials`); the weight, the straight pieces of the cables and the
+cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(0) + D_k q, sections(q) = sections(0) + S q.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.cables.routing import route_cables
+from gravcomp.cables.tendons import pieces_of
+from gravcomp.reduction.strain_polynomials import StrainPolynomials
+from gravcomp.simulation.model import RobotModel
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g of the nodal
+    forces f that the basis sees as g; elasticity; weight (r, 3): force of unit gravity;
+    piece_rest (s, 3), piece_change (s, 3, r) and piece_cable (s,): the straight pieces of the cables; rest_length (m,);
+    axial_compliance (m,); section_rest (n + 1, 3, 3), section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last;
+    reach: the largest |q| that it may serve; error (m): the worst tip error found when it was built."""
+
+    basis: np.ndarray
+    coordinates_of: np.ndarray
+    force_norm: np.ndarray
+    elasticity: StrainPolynomials
+    weight: np.ndarray
+    piece_rest: np.ndarray
+    piece_change: np.ndarray
+    piece_cable: np.ndarray
+    rest_length: np.ndarray
+    axial_compliance: np.ndarray
+    section_rest: np.ndarray
+    section_change: np.ndarray
+    reach: float
+    error: float
+
+    @property
+    def size(self) -> int:
+        return self.basis.shape[1]
+
+    def sections(self, q: np.ndarray) -> np.ndarray:
+        """(n + 1, 3, 3) sections at q (r,), as in `Effectors.sections`."""
+        return self.section_rest + self.section_change @ q
+
+    def section_changes(self, answer: np.ndarray) -> np.ndarray:
+        """(n + 1, 3, 3, k) changes of the sections for changes (r, k) of q."""
+        count, k = len(self.section_rest), answer.shape[1]
+        return (self.section_change.reshape(9 * count, -1) @ answer).reshape(count, 3, 3, k)
+
+    def tip(self, q: np.ndarray) -> np.ndarray:
+        """(3,) position of the tip at q (r,)."""
+        return self.section_rest[-1, 0] + self.section_change[-1, 0] @ q
+
+    def outside(self, q: np.ndarray) -> float:
+        """How far q (r,) lies outside of what was trained: above 1 it does. |q| is the root of twice the linear elastic
+        energy."""
+        return float(np.sqrt(q @ q)) / self.reach
+
+
+def project(
+    model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, reach: float, error: float
+) -> ReducedModel:
+    """The model on a basis (3 n_free, r). reach: largest |q| to serve; error (m): known of the basis."""
+    r = basis.shape[1]
+    fields = np.zeros((r, len(model.mesh.nodes), 3))
+    fields[:, : model.n_free] = basis.T.reshape(r, model.n_free, 3)
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    weighted = matrix.multiply(basis)
+    pieces = [(cable, *piece) for cable, route in enumerate(route_cables(model.robot, model.mesh)) for piece in pieces_of(route)]
+    section_rest = model.effectors.sections(model.mesh.nodes)
+    coordinates_of = np.linalg.solve(basis.T @ weighted, weighted.T)
+    return ReducedModel(
+        basis=basis,
+        coordinates_of=coordinates_of,
+        force_norm=coordinates_of @ coordinates_of.T,
+        elasticity=elasticity,
+        weight=np.einsum("anj,n->aj", fields, model.nodal_weight),
+        piece_rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
+        piece_change=np.array([np.einsum("n,ani->ia", w, fields[:, nodes]) for _, nodes, w in pieces]).reshape(-1, 3, r),
+        piece_cable=np.array([cable for cable, _, _ in pieces], dtype=np.int64),
+        rest_length=model.tendons.rest_length,
+        axial_compliance=model.tendons.axial_compliance,
+        section_rest=section_rest,
+        section_change=np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in fields], axis=-1)),
+        reach=reach,
+        error=error,
+    )

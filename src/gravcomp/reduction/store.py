@@ -1,0 +1,96 @@
+"""Built reductions in the cache, by content: a robot whose mesh, material, cables or load changed has another entry.
+
+Young's moduli enter by their ratios alone: the reduction of one modulus serves others in the range that it was trained for.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gravcomp.cache import cache_path, content_key
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.reduced_model import ReducedModel, project
+from gravcomp.reduction.strain_polynomials import StrainPolynomials
+from gravcomp.simulation.model import RobotModel
+
+# Part of the key; to be raised when what is stored, or how it is trained, changes.
+_FORMAT = 5
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What is built once: basis (3 n_free, r) and elasticity at the Young's modulus `modulus` (Pa) of the first
+    material; reach: the largest |q| to serve; modulus_low and modulus_high (Pa) of what was trained; samples, and the
+    median and worst tip error (m) over shapes not trained."""
+
+    basis: np.ndarray
+    elasticity: StrainPolynomials
+    reach: float
+    modulus: float
+    modulus_low: float
+    modulus_high: float
+    samples: int
+    error_median: float
+    error_worst: float
+
+    def reduced_model(self, model: RobotModel) -> ReducedModel:
+        """The reduction applied to the model, whose modulus may differ from the trained one."""
+        # With moduli s times as large a basis of energy 1 is sqrt(s) times smaller, and so are the products of its gradients.
+        root = np.sqrt(first_modulus(model) / self.modulus)
+        elasticity = StrainPolynomials(self.elasticity.linear, self.elasticity.quadratic / root)
+        return project(model, self.basis / root, elasticity, self.reach * root, self.error_worst)
+
+
+def why_not(model: RobotModel) -> str:
+    """Why a robot cannot be reduced, as a sentence; empty when it can."""
+    if not isinstance(model.elements, SolidElements):
+        return "corotational tetrahedra have no polynomial strain: the full model serves"
+    if any(material.law != "svk" for material in model.mesh.materials):
+        return "the reduction holds for the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model serves"
+    if model.tendons.friction.any():
+        return "cables with friction depend on how they moved before: the full model serves"
+    return ""
+
+
+def first_modulus(model: RobotModel) -> float:
+    """Young's modulus in Pa of the first material, to which the others are relative."""
+    return model.mesh.materials[0].youngs_modulus
+
+
+def path_of(model: RobotModel) -> Path:
+    """Where the model's reduction is kept; it may not exist yet."""
+    materials = [dataclasses.asdict(material) for material in model.mesh.materials]
+    for material in materials:
+        material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
+        for viscous in ("damping_time", "creep_ratio", "creep_time"):
+            del material[viscous]
+    mesh, robot = model.mesh, model.robot
+    cables = [dataclasses.asdict(cable) for cable in robot.cables]
+    for cable in cables:  # its elongation is outside the body: calibration must not cost a new reduction
+        del cable["axial_stiffness"]
+    key = content_key(_FORMAT, mesh.kind, mesh.nodes, mesh.elements, mesh.region, materials, cables, robot.payload)
+    return cache_path("reduction", key, ".npz")
+
+
+def save(reduction: Reduction, path: Path) -> None:
+    """Write the reduction; a reader never sees half of it."""
+    values = {f.name: getattr(reduction, f.name) for f in dataclasses.fields(Reduction) if f.name != "elasticity"}
+    part = path.with_name(path.stem + ".part.npz")
+    np.savez(part, strain_linear=reduction.elasticity.linear, strain_quadratic=reduction.elasticity.quadratic, **values)
+    part.replace(path)
+
+
+def load(model: RobotModel) -> Reduction | None:
+    """The model's reduction; None where none is built that covers its modulus."""
+    path = path_of(model)
+    if why_not(model) or not path.exists():
+        return None
+    with np.load(path) as stored:
+        values = {name: stored[name] for name in stored.files}
+    elasticity = StrainPolynomials(values.pop("strain_linear"), values.pop("strain_quadratic"))
+    numbers = {name: value.item() if value.ndim == 0 else value for name, value in values.items()}
+    reduction = Reduction(elasticity=elasticity, **numbers)
+    covered = reduction.modulus_low * (1 - 1e-9) <= first_modulus(model) <= reduction.modulus_high * (1 + 1e-9)
+    return reduction if covered else None

@@ -1,0 +1,173 @@
+"""Reduced elasticity of the St. Venant-Kirchhoff law: the strain as exact polynomials of the reduced coordinates.
+
+With u = sum_i phi_i q_i and G_i = grad phi_i, Green's strain is quadratic, E = sum e_i q_i + 1/2 sum e_ij q_i q_j with
+e_i = sym G_i and e_ij = sym G_i^T G_j. It is taken in a basis of strains s_m that is orthonormal in the elastic energy
+<a, b> = int a : C : b, as in the methods of assumed strain (Simo and Rifai 1990):
+
+    eps_m(q) = <s_m, E(q)> = a_m . q + 1/2 q . B_m q,    a_mi = <s_m, e_i>,    B_mij = <s_m, e_ij>,
+    energy U = 1/2 sum eps_m^2,    f = J^T eps,    K = J^T J + sum eps_m B_m,    J = a + B q.
+
+The integrals are exact, so nothing is sampled. Were the s_m complete, U would be the exact polynomial of degree four
+(Barbic and James 2005). Taking the r strains e_i, which make the stiffness at rest exact, and the principal strains of
+the trained shapes besides does better: a combination of a few modes cannot bend without a little stretch that the body
+does not have, and with all strains the tangle of such stretches makes the reduced body too stiff. It is also cheaper, m
+r^2 products in place of r^4 / 4. Kelvin-Voigt's law with the time beta is the stress eps + beta d eps / dt.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.basis import principal_combinations
+
+# Voigt's order 11 22 33 12 23 13 with doubled shear, as in the elements.
+_ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
+_POINTS_AT_ONCE = 400
+
+
+@dataclass(frozen=True)
+class StrainPolynomials:
+    """linear a^T (r, m) and quadratic B^T (r (r + 1) / 2, m), in sqrt(J): of each symmetric B_m the lower half, row by row.
+
+    The strains run along the last axis, because so a step reads memory in order.
+    """
+
+    linear: np.ndarray
+    quadratic: np.ndarray
+
+    def evaluate(
+        self, q: np.ndarray, scale: float = 1.0, offset: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """At q (r,): internal force (r,), tangent stiffness (r, r), and the strain eps (m,).
+
+        The stress is `scale` eps + `offset` (m,), which is how damping comes in; elastic by itself.
+        """
+        jacobian, strain = _strain(self.linear, self.quadratic, q)
+        stress = scale * strain if offset is None else scale * strain + offset
+        stiffness = jacobian @ jacobian.T
+        _add_packed(stiffness, scale, self.quadratic @ stress)
+        return jacobian @ stress, stiffness, strain
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+def _strain(linear, quadratic, q):
+    """J^T (r, m) and eps (m,)."""
+    r, modes = linear.shape
+    jacobian, strain = linear.copy(), np.zeros(modes)
+    pair = 0
+    for i in range(r):
+        to_i, q_i = jacobian[i], q[i]
+        for j in range(i):
+            entry, to_j, q_j = quadratic[pair + j], jacobian[j], q[j]
+            for m in range(modes):
+                to_i[m] += entry[m] * q_j
+                to_j[m] += entry[m] * q_i
+        entry = quadratic[pair + i]
+        for m in range(modes):
+            to_i[m] += entry[m] * q_i
+        pair += i + 1
+    for i in range(r):
+        half, constant, whole = 0.5 * q[i], linear[i], jacobian[i]
+        for m in range(modes):
+            strain[m] += half * (constant[m] + whole[m])
+    return jacobian, strain
+
+
+@njit(cache=True)
+def _add_packed(matrix, factor, packed):
+    """Multiply the symmetric matrix (r, r) by the factor and add the one whose lower half is packed row by row."""
+    start = 0
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            matrix[i, j] = factor * matrix[i, j] + packed[start + j]
+            matrix[j, i] = matrix[i, j]
+        start += i + 1
+
+
+def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray, extra: int) -> StrainPolynomials:
+    """The polynomials for a basis (3 n_free, r) that is orthonormal in the energy at rest.
+
+    snapshots (s, 3 n_free): trained shapes, whose `extra` principal strains are taken beside those of the basis.
+    """
+    r, s = basis.shape[1], len(snapshots)
+    gram, shares = np.zeros((s, s)), np.zeros((r, s))
+    for points in _parts(elements, basis, snapshots):
+        stress = points.stress(points.strains)
+        gram += points.strains.T @ stress
+        shares += points.linear.T @ stress
+    combination = principal_combinations(gram - shares.T @ shares, extra)
+    known = shares @ combination
+    linear = np.zeros((r + combination.shape[1], r))
+    first, second = np.tril_indices(r)
+    pairs = np.zeros((len(linear), first.size))
+    for points in _parts(elements, basis, snapshots):
+        strains = np.hstack([points.linear, points.strains @ combination - points.linear @ known])
+        stress = points.stress(strains)
+        linear += stress.T @ points.linear
+        pairs += stress.T @ points.products(first, second)
+    return StrainPolynomials(np.ascontiguousarray(linear.T), np.ascontiguousarray(pairs.T))
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Some quadrature points: gradient (p, 3, 3, r) of the modes, their linear strains (6 p, r), strains (6 p, s) of
+    the snapshots."""
+
+    gradient: np.ndarray
+    linear: np.ndarray
+    strains: np.ndarray
+    first_lame: np.ndarray
+    shear: np.ndarray
+    weight: np.ndarray
+
+    def stress(self, strains: np.ndarray) -> np.ndarray:
+        """C : strains (6 p, k), times the points' weights."""
+        strains = strains.reshape(len(self.weight), 6, -1)
+        stress = self.shear[:, None, None] * strains
+        stress[:, :3] = 2.0 * stress[:, :3] + (self.first_lame[:, None] * strains[:, :3].sum(axis=1))[:, None, :]
+        return (stress * self.weight[:, None, None]).reshape(6 * len(self.weight), -1)
+
+    def products(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """e_ij (6 p, k) of the pairs i = first (k,), j = second (k,)."""
+        return _voigt(np.einsum("pkia,pkja->pija", self.gradient[..., first], self.gradient[..., second], optimize=True))
+
+
+def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) -> Iterator[_Points]:
+    count = elements.weights.shape[1]
+    at_once = max(1, _POINTS_AT_ONCE // count)
+    modes, shapes = _on_nodes(elements, basis), _on_nodes(elements, snapshots.T)
+    for start in range(0, len(elements.weights), at_once):
+        part = slice(start, start + at_once)
+        gradient, moved = _gradient(elements, part, modes), _gradient(elements, part, shapes)
+        yield _Points(
+            gradient=gradient,
+            linear=_voigt(gradient),
+            strains=_voigt(moved + 0.5 * np.einsum("pkia,pkja->pija", moved, moved, optimize=True)),
+            first_lame=np.repeat(elements.lame.first[part], count),
+            shear=np.repeat(elements.lame.shear[part], count),
+            weight=elements.weights[part].ravel(),
+        )
+
+
+def _on_nodes(elements: SolidElements, columns: np.ndarray) -> np.ndarray:
+    """Fields (n, 3, k) of the unknowns (3 n_free, k), zero at the clamp."""
+    fields = np.zeros((len(elements.mesh.nodes), 3, columns.shape[1]))
+    fields[: elements.n_free] = columns.reshape(elements.n_free, 3, -1)
+    return fields
+
+
+def _gradient(elements: SolidElements, part: slice, fields: np.ndarray) -> np.ndarray:
+    """d field_i / d X_j (p, 3, 3, k) at the points of some elements."""
+    local = fields[elements.mesh.elements[part]]
+    gradient = np.einsum("kpjc,kcia->kpija", elements.gradients[part], local, optimize=True)
+    return gradient.reshape(-1, 3, 3, fields.shape[-1])
+
+
+def _voigt(tensor: np.ndarray) -> np.ndarray:
+    """Symmetric part of (p, 3, 3, k) as strain (6 p, k)."""
+    symmetric = 0.5 * (tensor[:, _ROWS, _COLUMNS] + tensor[:, _COLUMNS, _ROWS])
+    symmetric[:, 3:] *= 2.0
+    return symmetric.reshape(-1, tensor.shape[-1])

@@ -1,0 +1,69 @@
+"""A robot's backbone as a smooth curve of frames: between the few points that a message carries.
+
+Positions follow a cubic Hermite curve whose tangents are the z axes of the frames, scaled by the distance of the neighbours; orientations
+are interpolated linearly and normalised, which is exact enough for neighbours a few degrees apart.
+"""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Backbone:
+    """Frames along the robot: station (n,) 0 at the base to 1 at the tip, position (n, 3) m, orientation (n, 4) x y z w."""
+
+    station: np.ndarray
+    position: np.ndarray
+    orientation: np.ndarray
+
+    @property
+    def tip(self) -> np.ndarray:
+        """(3,) m"""
+        return self.position[-1]
+
+    def at(self, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (k, 3) and rotations (k, 3, 3) at the stations (k,); beyond the ends the end frames."""
+        s = np.clip(station, self.station[0], self.station[-1])
+        i = np.clip(np.searchsorted(self.station, s, side="right") - 1, 0, len(self.station) - 2)
+        t = ((s - self.station[i]) / (self.station[i + 1] - self.station[i]))[:, None]
+        q0, q1 = self.orientation[i], self.orientation[i + 1]
+        q1 = np.where((q0 * q1).sum(axis=1, keepdims=True) < 0.0, -q1, q1)
+        q = q0 + t * (q1 - q0)
+        rotation = rotations(q / np.linalg.norm(q, axis=1, keepdims=True))
+        p0, p1 = self.position[i], self.position[i + 1]
+        length = np.linalg.norm(p1 - p0, axis=1, keepdims=True)
+        m0, m1 = length * rotations(q0)[:, :, 2], length * rotations(q1)[:, :, 2]
+        t2, t3 = t * t, t * t * t
+        position = (2 * t3 - 3 * t2 + 1) * p0 + (t3 - 2 * t2 + t) * m0 + (3 * t2 - 2 * t3) * p1 + (t3 - t2) * m1
+        return position, rotation
+
+
+def arc_backbone(length: float, angle: float, plane: float, points: int = 33) -> Backbone:
+    """A robot of `length` (m) bent to a constant curvature by `angle` (rad) into the plane at `plane` (rad about z from x)."""
+    from gravcomp.inverse.target import arc_points
+
+    station = np.linspace(0.0, 1.0, points)
+    half = 0.5 * angle * station
+    # Turned about the axis across the plane of the bend, so that no frame twists.
+    sine = np.sin(half)
+    orientation = np.stack([-np.sin(plane) * sine, np.cos(plane) * sine, np.zeros(points), np.cos(half)], axis=1)
+    return Backbone(station, arc_points(length, angle, plane, station), orientation)
+
+
+def straight_backbone(length: float) -> Backbone:
+    """The straight robot of `length` (m)."""
+    return arc_backbone(length, 0.0, 0.0)
+
+
+def rotations(q: np.ndarray) -> np.ndarray:
+    """Rotations (k, 3, 3) of unit quaternions (k, 4) x y z w."""
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
+            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
+            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=-2,
+    )

@@ -1,0 +1,34 @@
+"""The last seconds of what is plotted."""
+
+import numpy as np
+
+
+class History:
+    """A window of rows (time, values...), oldest first; memory is fixed."""
+
+    def __init__(self, columns: int, window: float, rate: float):
+        """`window` s at up to `rate` rows a second."""
+        self._window = window
+        self._kept = int(window * rate * 1.1) + 2
+        # Twice as many, so that rows are seldom moved.
+        self._rows = np.full((2 * self._kept, columns + 1), np.nan)
+        self._count = 0
+
+    def add(self, time: float, values: np.ndarray) -> None:
+        """A row; one whose time went back begins anew."""
+        if self._count and time < self._rows[self._count - 1, 0]:
+            self._count = 0
+        if self._count == len(self._rows):
+            self._rows[: self._kept] = self._rows[-self._kept :]
+            self._count = self._kept
+        self._rows[self._count] = np.concatenate([[time], values])
+        self._count += 1
+
+    def columns(self) -> tuple[np.ndarray, ...]:
+        """Seconds before the newest row (never positive), then each value."""
+        rows = self._rows[: self._count]
+        if not len(rows):
+            return tuple(np.zeros(0) for _ in range(self._rows.shape[1]))
+        age = rows[:, 0] - rows[-1, 0]
+        shown = age >= -self._window
+        return age[shown], *(rows[shown, i] for i in range(1, rows.shape[1]))

@@ -1,0 +1,101 @@
+"""The page: scene, plots, controls and figures of one robot, served to browsers."""
+
+import socket
+
+import viser
+
+from gravcomp.config import ConfigError
+from gravcomp.description import Robot
+from gravcomp.view import colours
+from gravcomp.view.controls import Controls
+from gravcomp.view.options import PageOptions
+from gravcomp.view.plots import Plots
+from gravcomp.view.requests import Request
+from gravcomp.view.scene import Scene
+from gravcomp.view.snapshot import Snapshot
+from gravcomp.view.status import cables_html, legend_html, status_html
+
+PORTS_TRIED = 50
+_PANEL_WIDTH = 320  # px
+
+
+class Page:
+    """A live page. Raises ConfigError when no port is free or the address is not this machine's."""
+
+    def __init__(self, robot: Robot, options: PageOptions):
+        port = free_port(options.host, options.port)
+        self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
+        shown = "localhost" if options.host in ("127.0.0.1", "0.0.0.0", "::") else options.host
+        self.address = f"http://{shown}:{self._server.get_port()}"
+        self._names = robot.cable_names
+        self._frame, self._idle_frames = 0, max(1, round(options.rate))
+        gui = self._server.gui
+        gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
+        self._scene = Scene(self._server, robot, options)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(_PANEL_WIDTH)
+        self._status = gui.add_html("")
+        with gui.add_folder("Cables"):
+            self._cables = gui.add_html("")
+        self._controls = Controls(self._server, self._scene, robot.length, self._names, options.graphics)
+        self._legend = gui.add_html(legend_html(False))
+        panel = gui.add_panel()
+        with panel.add_tab(f"The last {options.window:g} s"):
+            self._plots = Plots(self._server, self._names, options.window, options.rate, options.dark)
+        panel.dock_left()
+        panel.set_width(_PANEL_WIDTH)
+
+    @property
+    def clients(self) -> int:
+        """Browsers that look at the page."""
+        return len(self._server.get_clients())
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Draw a snapshot: the scene at each call, curves at every second, words and figures at every fourth.
+
+        While nobody looks, once a second: a browser that comes finds the page as it is.
+        """
+        self._plots.add(snapshot)
+        self._frame += 1
+        alone = not self.clients
+        if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
+            return
+        with self._server.atomic():
+            self._scene.show(snapshot)
+        if alone or self._frame % 2 == 0:
+            self._plots.draw()
+        if alone or self._frame % 4 == 0:
+            self._status.content = status_html(snapshot)
+            self._cables.content = cables_html(snapshot, self._names)
+            self._legend.content = legend_html(snapshot.truth is not None)
+            self._controls.show_virtual(snapshot.virtual)
+            self._controls.show_recording(bool(snapshot.recording))
+
+    def requests(self) -> list[Request]:
+        """What people asked for since the last call."""
+        return self._controls.requests()
+
+    def notify(self, title: str, sentence: str, good: bool = False) -> None:
+        """Tell everyone who looks."""
+        for client in self._server.get_clients().values():
+            client.add_notification(title, sentence, auto_close_seconds=6.0, color="green" if good else "red")
+
+    def close(self) -> None:
+        """End the server."""
+        self._server.stop()
+
+
+def free_port(host: str, first: int) -> int:
+    """The first port from `first` on that nobody listens at. Raises ConfigError."""
+    last = min(first + PORTS_TRIED, 65536)
+    for port in range(first, last):
+        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, port))
+            except OSError as error:
+                if error.errno in (98, 13, 48):  # taken, or kept for the system
+                    continue
+                raise ConfigError(f"viewer: host is '{host}'; an address of this machine is needed ({error.strerror})") from error
+            return port
+    raise ConfigError(f"viewer: no port is free from {first} to {last - 1}; set another port")

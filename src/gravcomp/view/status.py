@@ -1,0 +1,92 @@
+"""The page's words and figures, as HTML."""
+
+import html
+import math
+
+from gravcomp.view import colours
+from gravcomp.view.snapshot import Snapshot
+
+_DOTS = {"ok": "#22c55e", "warn": "#f59e0b", "error": "#ef4444", "off": "#94a3b8"}
+_FIGURE = '<div style="flex:1"><div style="font-size:1.35em;font-weight:650;font-variant-numeric:tabular-nums">{}</div>' \
+    '<div style="font-size:.74em;opacity:.68">{}</div></div>'  # fmt: skip
+
+
+def status_html(snapshot: Snapshot) -> str:
+    """What the controller says, the errors, and how the graph runs."""
+    dot = _DOTS.get(snapshot.status_level, _DOTS["off"])
+    sentence = html.escape(snapshot.status or "waiting for the graph")
+    figures = [
+        (_mm(snapshot.tip_error), "tip to target, model"),
+        (_mm(snapshot.true_tip_error), "tip to target, virtual robot"),
+    ]
+    more = [
+        (f"{snapshot.rate:.0f} Hz" if snapshot.rate else "–", "model's rate"),
+        (_ms(snapshot.delays.get("command")), "IMU to command"),
+        (_inclination(snapshot), "inclination"),
+    ]
+    recording = ""
+    if snapshot.recording:
+        recording = f'<div style="margin-top:.4em;font-size:.8em;color:#ef4444">● recording {html.escape(snapshot.recording)}</div>'
+    return (
+        f'<div style="padding:.55em .9em .3em"><div style="display:flex;gap:.55em;align-items:baseline">'
+        f'<span style="flex:none;width:.68em;height:.68em;border-radius:50%;background:{dot};align-self:center"></span>'
+        f'<span data-gravcomp="status" style="font-size:.88em">{sentence}</span></div>'
+        f'<div style="display:flex;gap:.8em;margin-top:.5em">{_row(figures)}</div>'
+        f'<div style="display:flex;gap:.8em;margin-top:.35em">{_row(more)}</div>{recording}</div>'
+    )
+
+
+def cables_html(snapshot: Snapshot, names: tuple[str, ...]) -> str:
+    """One bar a cable in its colour of the scene, with the legend of the colours."""
+    if snapshot.tension is None:
+        return '<div style="padding:.4em .9em;font-size:.85em;opacity:.7">no model yet</div>'
+    rows = []
+    for i, name in enumerate(names):
+        tension = float(snapshot.tension[i])
+        width = min(100.0, 100.0 * tension / colours.TENSION_SCALE)
+        measured = "" if snapshot.motors_tension is None else f"{snapshot.motors_tension[i]:.2f}"
+        rows.append(
+            f'<tr style="white-space:nowrap"><td style="padding-right:.5em">{html.escape(name)}</td><td style="width:34%"><div style="height:.62em;border-radius:.3em;'
+            f'background:rgba(128,140,160,.22)"><div style="height:100%;border-radius:.3em;width:{width:.0f}%;'
+            f'background:{colours.css(colours.tension_colour(tension))}"></div></div></td>'
+            f'<td style="text-align:right">{tension:.2f} N</td><td style="text-align:right;opacity:.65">{measured}</td>'
+            f'<td style="text-align:right">{1e3 * snapshot.displacement[i]:+.2f} mm</td></tr>'
+        )
+    return (
+        '<div style="padding:.3em .9em .5em;font-size:.8em;font-variant-numeric:tabular-nums"><table style="width:100%;border-spacing:0 .14em">'
+        f'{"".join(rows)}</table><div style="display:flex;align-items:center;gap:.5em;margin-top:.4em;font-size:.92em"><span>slack</span>'
+        f'<div style="flex:1;height:.55em;border-radius:.3em;background:{colours.tension_gradient()}"></div>'
+        f"<span>{colours.TENSION_SCALE:g} N</span></div></div>"
+    )
+
+
+def legend_html(virtual: bool) -> str:
+    """What the colours of the scene mean."""
+    entries = [(colours.GHOST, "rest shape"), (colours.TARGET, "target"), (colours.GRAVITY, "gravity")]
+    if virtual:
+        entries.insert(1, (colours.TRUTH, "virtual robot's truth"))
+    chips = "".join(
+        f'<span style="display:inline-flex;align-items:center;gap:.35em;margin-right:.9em"><span style="width:.7em;height:.7em;'
+        f'border-radius:.2em;background:{colours.css(colour)}"></span>{text}</span>'
+        for colour, text in entries
+    )
+    return f'<div style="padding:.35em .9em;font-size:.78em;line-height:1.7">{chips}</div>'
+
+
+def _row(figures: list[tuple[str, str]]) -> str:
+    return "".join(_FIGURE.format(value, meaning) for value, meaning in figures)
+
+
+def _mm(metres: float) -> str:
+    return "–" if not math.isfinite(metres) else f"{1e3 * metres:.2f} mm"
+
+
+def _ms(seconds: float | None) -> str:
+    return "–" if seconds is None or not math.isfinite(seconds) else f"{1e3 * seconds:.1f} ms"
+
+
+def _inclination(snapshot: Snapshot) -> str:
+    if snapshot.gravity is None:
+        return "–"
+    x, y, z = snapshot.gravity
+    return f"{math.degrees(math.atan2(-z, math.hypot(x, y))):+.1f}°"

@@ -1,0 +1,135 @@
+"""C610 speed controllers, M2006 motors, gears with backlash, and capstans: from currents to wound-in cable.
+
+All angles and torques are counted in the sense that winds the cable in. At the rotor:
+
+    J dw/dt = k_t i - b w - F / N r - friction,    di/dt = (i_commanded - i) / lag
+
+with the cable's force F, the gear ratio N and the capstan's radius r. Coulomb friction (constant part and part proportional to
+the load) takes away at most the momentum there is, so that a standing rotor stays. The capstan has no inertia of its own: it
+lies on the flank that winds in while the cable is taut, and stays where it is inside the backlash while its drag is larger
+than the cable's torque.
+
+The speed controller keeps the last current it was told, for ever.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
+from gravcomp.virtual.parameters import Motors
+
+TICK = 0.5e-3  # s
+_MAXIMUM_CURRENT = 10.0  # A, of the C610
+
+
+class MotorBank:
+    """The motors in the order of the cables; m of them."""
+
+    def __init__(self, parameters: Motors, hardware: Hardware, slack: np.ndarray, random: np.random.Generator):
+        """slack (m,) m: cable beyond the straight robot's length at the start. Rotors start anywhere on their turn."""
+        m = len(hardware.motors)
+        self._parameters, self._random = parameters, random
+        self._ratio = hardware.drive.gear_ratio
+        self._direction = np.array([motor.direction for motor in hardware.motors])
+        self._start_count = random.integers(0, COUNTS_PER_TURN, m)
+        self._slack = slack
+        self._rotor, self._speed, self._capstan = np.zeros(m), np.zeros(m), np.zeros(m)
+        self._current = np.zeros(m)
+        self.commanded = np.zeros(m)  # A, as last received, in the motor's own sense
+        self.stalled = np.zeros(m, dtype=bool)  # rotors that are blocked
+
+    @property
+    def wound(self) -> np.ndarray:
+        """(m,) m of cable wound in, 0: the cable just reaches through the straight robot."""
+        return self._capstan * self._parameters.capstan_radius - self._slack
+
+    def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
+        """Advance by `ticks` of TICK, the robot's cable paths being `shortened` (m,) m, each cable a spring (m,) N/m."""
+        p = self._parameters
+        command = np.clip(self.commanded, -_MAXIMUM_CURRENT, _MAXIMUM_CURRENT) * self._direction
+        _step(
+            ticks,
+            self._rotor,
+            self._speed,
+            self._capstan,
+            self._current,
+            command,
+            self.stalled,
+            shortened + self._slack,
+            spring,
+            p.torque_constant / self._ratio,
+            p.rotor_inertia,
+            p.friction_torque,
+            p.load_friction,
+            p.viscous_friction,
+            p.no_load_speed,
+            p.backlash,
+            p.capstan_drag,
+            p.capstan_radius,
+            self._ratio,
+            1.0 - math.exp(-TICK / p.current_lag),
+        )
+
+    def jump(self, motors: np.ndarray) -> None:
+        """Let the encoders of `motors` (m,) bool jump by a third of a turn, as after a slipped magnet."""
+        self._start_count = np.where(motors, self._start_count + COUNTS_PER_TURN // 3, self._start_count)
+
+    def feedback(self) -> list[dict[str, float]]:
+        """Angle (counts), speed (rpm) and current (A) as the C610 of each motor sends them."""
+        turns = self._direction * self._rotor / (2 * math.pi)
+        angle = (np.floor(turns * COUNTS_PER_TURN).astype(np.int64) + self._start_count) % COUNTS_PER_TURN
+        speed = np.clip(np.rint(self._direction * self._speed * (60 / (2 * math.pi))), -32768, 32767)
+        noise = self._parameters.current_noise * self._random.standard_normal(len(angle))
+        current = np.clip(self._direction * self._current + noise, -32.0, 32.0)
+        return [{"angle": a, "speed": s, "current": i} for a, s, i in zip(angle.tolist(), speed.tolist(), current.tolist())]
+
+
+@njit(cache=True, error_model="numpy")
+def _step(
+    ticks,
+    rotor,
+    speed,
+    capstan,
+    current,
+    command,
+    stalled,
+    offset,
+    spring,
+    torque_constant,
+    inertia,
+    friction,
+    load_friction,
+    viscous,
+    no_load_speed,
+    backlash,
+    drag,
+    radius,
+    ratio,
+    current_gain,
+):
+    half = 0.5 * backlash
+    for c in range(rotor.shape[0]):
+        for _ in range(ticks):
+            current[c] += current_gain * (command[c] - current[c])
+            # The back-EMF leaves less current the faster the rotor turns in the current's direction.
+            room = 10.0 * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
+            current[c] = min(room, max(-room, current[c]))
+            force = spring[c] * max(0.0, radius * capstan[c] - offset[c])
+            at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9
+            load = force * radius / ratio if at_flank else 0.0
+            if stalled[c]:
+                speed[c] = 0.0
+            else:
+                drive = torque_constant * current[c] - viscous * speed[c] - load
+                momentum = inertia * speed[c] + TICK * drive
+                loss = TICK * (friction + load_friction * load)
+                momentum = max(0.0, momentum - loss) if momentum > 0.0 else min(0.0, momentum + loss)
+                speed[c] = momentum / inertia
+                rotor[c] += TICK * speed[c]
+            output = rotor[c] / ratio
+            # Inside the backlash the cable draws the capstan out until its drag holds it.
+            held = offset[c] / radius + (drag / (spring[c] * radius * radius) if spring[c] > 0.0 else 1e9)
+            drawn = min(capstan[c], max(held, output - half))
+            capstan[c] = min(output + half, max(output - half, drawn))

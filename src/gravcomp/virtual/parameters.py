@@ -1,0 +1,138 @@
+"""The section `virtual_robot:` of a robot's YAML: what the virtual robot really is, and the controller does not know.
+
+The shape (segments, cables, motors) comes from `robot:` and `hardware:`; what stands here deviates from them or is not in them.
+"""
+
+import dataclasses
+
+from gravcomp.config import parameter
+from gravcomp.thermal.plant import ThermalPlantOptions
+
+
+@dataclasses.dataclass(frozen=True)
+class Body:
+    """The rod's material and fineness."""
+
+    youngs_modulus: float = parameter(
+        0.75, edge="MPa", minimum=1e-3, maximum=1e6, description="long-term, of every segment; caps keep theirs"
+    )
+    poissons_ratio: float = parameter(0.46, minimum=0.0, maximum=0.499, description="Poisson's ratio")
+    density: float = parameter(1160.0, unit="kg/m^3", minimum=1.0, maximum=30000.0, description="density of every segment")
+    creep_ratio: tuple[float, ...] = parameter(
+        (0.04, 0.03, 0.03), minimum=0.0, maximum=10.0, description="stiffness of each Maxwell branch over the long-term stiffness"
+    )
+    creep_time: tuple[float, ...] = parameter(
+        (0.2, 2.0, 20.0), unit="s", minimum=1e-3, maximum=1e5, description="relaxation time of each Maxwell branch"
+    )
+    damping_time: float = parameter(
+        8.0, edge="ms", minimum=0.0, maximum=1000.0, description="Kelvin-Voigt damping over stiffness"
+    )
+    slip_ratio: float = parameter(
+        0.04, minimum=0.0, maximum=1.0, description="bending stiffness of the frictional branch over the long-term one"
+    )
+    slip_curvature: float = parameter(
+        1.5, unit="1/m", minimum=0.01, maximum=1000.0, description="curvature at which that branch slips"
+    )
+    element_length: float = parameter(5.0, edge="mm", minimum=0.5, maximum=100.0, description="longest rod element")
+
+    def __post_init__(self) -> None:
+        if len(self.creep_ratio) != len(self.creep_time):
+            raise ValueError(
+                f"creep_ratio has {len(self.creep_ratio)} entries and creep_time {len(self.creep_time)}; they come in pairs"
+            )
+
+
+@dataclasses.dataclass(frozen=True)
+class Tendons:
+    """The cables as they really are."""
+
+    axial_stiffness: float = parameter(
+        960.0, unit="N", minimum=1.0, maximum=1e9, description="E A; nylon of 0.7 mm: 2.5 GPa x 0.385 mm^2"
+    )
+    free_length: float = parameter(200.0, edge="mm", minimum=0.0, maximum=10000.0, description="between capstan and robot")
+    radius_offset: float = parameter(
+        0.03, edge="mm", minimum=-5.0, maximum=5.0, description="true pitch radius minus the one in robot.cables"
+    )
+    angle_offset: float = parameter(
+        0.7, edge="deg", minimum=-180.0, maximum=180.0, description="true angle minus the one in robot.cables"
+    )
+    friction: float = parameter(0.08, minimum=0.0, maximum=2.0, description="capstan friction coefficient")
+    guide_angle: float = parameter(
+        20.0, edge="deg", minimum=0.0, maximum=3600.0, description="turns of the cable between capstan and robot"
+    )
+    presliding: float = parameter(
+        0.05, edge="mm", minimum=0.001, maximum=10.0, description="distance over which friction turns its sign"
+    )
+    slack: float = parameter(
+        0.0, edge="mm", minimum=-50.0, maximum=50.0, description="at the start, beyond the straight robot's length"
+    )
+    slack_spread: float = parameter(
+        0.0, edge="mm", minimum=0.0, maximum=50.0, description="standard deviation of it from cable to cable"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Motors:
+    """C610 speed controllers and M2006 motors as they really are."""
+
+    feedback_rate: int = parameter(500, unit="Hz", choices=(1000, 500, 250, 125), description="as set in the C610")
+    torque_constant: float = parameter(0.175, unit="N m/A", minimum=1e-3, maximum=10.0, description="at the gear's output")
+    capstan_radius: float = parameter(5.01, edge="mm", minimum=0.1, maximum=100.0, description="to the middle of the cable")
+    rotor_inertia: float = parameter(8e-7, unit="kg m^2", minimum=1e-9, maximum=1.0, description="of rotor and first gear stage")
+    friction_torque: float = parameter(4e-4, unit="N m", minimum=0.0, maximum=1.0, description="Coulomb friction at the rotor")
+    load_friction: float = parameter(
+        0.08, minimum=0.0, maximum=1.0, description="friction at the rotor over the load torque there"
+    )
+    viscous_friction: float = parameter(1.3e-6, unit="N m s", minimum=0.0, maximum=1.0, description="at the rotor")
+    no_load_speed: float = parameter(
+        2000.0, unit="rad/s", minimum=1.0, maximum=1e5, description="rotor speed at which no current is left"
+    )
+    backlash: float = parameter(0.6, edge="deg", minimum=0.0, maximum=90.0, description="of the gear, at its output")
+    capstan_drag: float = parameter(
+        1e-3, unit="N m", minimum=0.0, maximum=1.0, description="friction at the capstan; holds it inside the backlash"
+    )
+    current_lag: float = parameter(1.0, edge="ms", minimum=0.01, maximum=100.0, description="time constant of the current loop")
+    current_noise: float = parameter(
+        0.004, unit="A", minimum=0.0, maximum=1.0, description="standard deviation of the current in the feedback"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Board:
+    """BMI088 and heater. Noise as of the data sheet; biases are drawn with the seed, their standard deviations stand here."""
+
+    accelerometer_range: int = parameter(1, minimum=0, maximum=3, description="range code: 0 to 3 = 3, 6, 12, 24 g")
+    gyroscope_range: int = parameter(0, minimum=0, maximum=4, description="range code: 0 to 4 = 2000, 1000, 500, 250, 125 deg/s")
+    accelerometer_noise: float = parameter(175e-6, unit="g/sqrt(Hz)", minimum=0.0, maximum=1.0, description="noise density")
+    gyroscope_noise: float = parameter(
+        0.014, edge="deg/s", minimum=0.0, maximum=100.0, description="noise density, (deg/s)/sqrt(Hz)"
+    )
+    bandwidth: float = parameter(40.0, unit="Hz", minimum=1.0, maximum=1000.0, description="of the chip's low-pass")
+    accelerometer_bias: float = parameter(0.003, unit="g", minimum=0.0, maximum=1.0, description="at 25 degC")
+    accelerometer_scale: float = parameter(0.001, minimum=0.0, maximum=0.5, description="relative error of scale")
+    accelerometer_drift: float = parameter(
+        0.0002, unit="g/K", minimum=0.0, maximum=0.1, description="bias over temperature, +- by axis"
+    )
+    gyroscope_bias: float = parameter(0.4, edge="deg/s", minimum=0.0, maximum=100.0, description="at 25 degC")
+    gyroscope_drift: float = parameter(
+        0.015, edge="deg/s", minimum=0.0, maximum=10.0, description="bias over temperature, deg/s a K, +- by axis"
+    )
+    gyroscope_walk: float = parameter(
+        0.0005, edge="deg/s", minimum=0.0, maximum=10.0, description="bias random walk, (deg/s)/sqrt(s)"
+    )
+    mount_error: float = parameter(
+        0.0, edge="deg", minimum=0.0, maximum=45.0, description="misalignment against robot.imu_mount, drawn with the seed"
+    )
+    clock_error: float = parameter(30e-6, minimum=-0.01, maximum=0.01, description="of the board's oscillator, relative")
+    thermal: ThermalPlantOptions = parameter(default_factory=ThermalPlantOptions, description="heater and surroundings")
+
+
+@dataclasses.dataclass(frozen=True)
+class VirtualRobotParameters:
+    """What the virtual robot really is."""
+
+    body: Body = parameter(default_factory=Body, description="material of the rod")
+    tendons: Tendons = parameter(default_factory=Tendons, description="cables")
+    motors: Motors = parameter(default_factory=Motors, description="motors, gears and capstans")
+    board: Board = parameter(default_factory=Board, description="IMU board")
+    seed: int = parameter(1, minimum=0, maximum=2**31 - 1, description="of everything random: the same seed gives the same run")

@@ -1,0 +1,14 @@
+"""Compiling the virtual robot's kernels into the cache ahead of the first run, which they would hold up for half a minute."""
+
+from gravcomp.config import from_mapping
+from gravcomp.description.hardware import parse_hardware
+from gravcomp.description.robot_file import load_robot_file
+from gravcomp.virtual.parameters import VirtualRobotParameters
+from gravcomp.virtual.robot import VirtualRobot
+
+
+def warm_up() -> None:
+    """Compile everything that the shipped robot needs."""
+    file = load_robot_file("article")
+    hardware = parse_hardware(file.section("hardware"), source=file.source)
+    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, hardware).step(0.02)

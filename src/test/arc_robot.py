@@ -1,0 +1,145 @@
+"""A small robot to test the inverse problem with: two segments of constant curvature, six cables, gravity; no finite elements.
+
+Coordinates q (6,): for each segment the curvatures about y and -x (rad/m) and the axial strain. Potential energy
+U = sum_j L_j/2 (EI |kappa_j|^2 + EA strain_j^2) - integral of w g . p ds. Cable i at the pitch radius r and angle phi_i
+has the path displacement delta_i = sum over its segments of L_j (r (cos phi_i kappa_x + sin phi_i kappa_y) - strain_j).
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from gravcomp.description.robot import Cable, Limits, Robot, Segment
+
+SEGMENT = 0.05
+LENGTH = 2 * SEGMENT
+BENDING = 0.8e6 * np.pi / 64 * (9e-3**4 - 3.6e-3**4)
+AXIAL = 0.8e6 * np.pi / 4 * (9e-3**2 - 3.6e-3**2)
+LINE_DENSITY = 1145.0 * np.pi / 4 * (9e-3**2 - 3.6e-3**2)
+RADIUS = 3.15e-3
+NAMES = ("s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3")
+ANGLES = np.radians([0, 120, 240, 60, 180, 300])
+STATIONS = np.linspace(0.0, 1.0, 9)
+_POINTS_A_SEGMENT = 16
+
+LIMITS = Limits(
+    tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, tension_rate=1e3, displacement_rate=0.05
+)
+
+
+def description(limits: Limits = LIMITS) -> Robot:
+    """What the controller knows of this robot."""
+    segments = tuple(Segment(name=f"s{j}", length=SEGMENT, outer_diameter=9e-3, lumen_diameter=3.6e-3) for j in (1, 2))
+    cables = tuple(Cable(name=n, angle=float(a), radius=RADIUS, segment=n[:2]) for n, a in zip(NAMES, ANGLES))
+    return Robot(name="arc", segments=segments, cables=cables, limits=limits)
+
+
+def cable_jacobian() -> np.ndarray:
+    """d delta / d q (6, 6): the paths of this robot are linear in its coordinates."""
+    jacobian = np.zeros((6, 6))
+    for i, angle in enumerate(ANGLES):
+        row = SEGMENT * np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), -1.0])
+        jacobian[i, :3] = row
+        if i >= 3:
+            jacobian[i, 3:] = row
+    return jacobian
+
+
+def centre_line(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (..., 33, 3), base to tip, and the directions there (..., 33, 3), for coordinates (..., 6); midpoint rule
+    along each segment."""
+    q = np.asarray(q)
+    position, frame = np.zeros(q.shape[:-1] + (3,)), np.broadcast_to(np.eye(3), q.shape[:-1] + (3, 3))
+    positions, directions = [position], [frame[..., :, 2]]
+    h = SEGMENT / _POINTS_A_SEGMENT
+    for segment in (q[..., :3], q[..., 3:]):
+        half, full = _rotation(0.5 * h * segment[..., :2]), _rotation(h * segment[..., :2])
+        for _ in range(_POINTS_A_SEGMENT):
+            position = position + h * (1.0 + segment[..., 2:]) * (frame @ half)[..., :, 2]
+            frame = frame @ full
+            positions.append(position)
+            directions.append(frame[..., :, 2])
+    return np.stack(positions, axis=-2), np.stack(directions, axis=-2)
+
+
+def effector(q: np.ndarray) -> np.ndarray:
+    """Tip position, tip direction, backbone positions, (..., 6 + 27), for coordinates (..., 6)."""
+    positions, directions = centre_line(q)
+    backbone = positions[..., :: 2 * _POINTS_A_SEGMENT // (STATIONS.size - 1), :]
+    return np.concatenate([positions[..., -1, :], directions[..., -1, :], backbone.reshape(*backbone.shape[:-2], -1)], axis=-1)
+
+
+class ArcRobot:
+    """Quasi-static, one Newton step a call, driven by cable displacements with slack: delta >= u, lambda >= 0, complementary."""
+
+    def __init__(self):
+        self.q = np.zeros(6)
+        self.tension = np.zeros(6)
+
+    def step(self, gravity: np.ndarray, displacement: np.ndarray | None, iterations: int = 1) -> SimpleNamespace:
+        """The linear answer at the new state. displacement (6,) m; None: cables released."""
+        jacobian = cable_jacobian()
+        for _ in range(iterations):
+            gradient, hessian = _derivatives(self.q, gravity)
+            compliance = jacobian @ np.linalg.solve(hessian, jacobian.T)
+            free = self.q - np.linalg.solve(hessian, gradient)
+            self.tension = _complementary(compliance, jacobian @ free, displacement)
+            self.q = free + np.linalg.solve(hessian, jacobian.T @ self.tension)
+        return self.response(gravity)
+
+    def response(self, gravity: np.ndarray) -> SimpleNamespace:
+        jacobian = cable_jacobian()
+        gradient, hessian = _derivatives(self.q, gravity)
+        answer = np.linalg.solve(hessian, jacobian.T)
+        shifts = 1e-6 * np.eye(6)
+        sensitivity = (effector(self.q + shifts) - effector(self.q - shifts)).T / 2e-6
+        compliance_aa, compliance_ea = jacobian @ answer, sensitivity @ answer
+        return SimpleNamespace(
+            compliance_aa=compliance_aa,
+            compliance_ea=compliance_ea,
+            displacement_free=jacobian @ self.q - compliance_aa @ self.tension,
+            effector_free=effector(self.q) - compliance_ea @ self.tension,
+        )
+
+
+def _rotation(bend: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) that turn z toward bend (..., 2) by its length in rad."""
+    angle = np.linalg.norm(bend, axis=-1)
+    x, y = np.moveaxis(bend / np.maximum(angle, 1e-12)[..., None], -1, 0)
+    s, c = np.sin(angle), np.cos(angle)
+    rows = [[1 + (c - 1) * x * x, (c - 1) * x * y, s * x], [(c - 1) * x * y, 1 + (c - 1) * y * y, s * y], [-s * x, -s * y, c]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _weight_energy(q: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    positions, _ = centre_line(q)
+    centres = 0.5 * (positions[..., 1:, :] + positions[..., :-1, :])
+    return -LINE_DENSITY * LENGTH / centres.shape[-2] * (centres @ gravity).sum(axis=-1)
+
+
+def _derivatives(q: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (6,) and Hessian (6, 6) of the potential energy, that of the weight by central differences."""
+    stiffness = np.diag(np.tile([BENDING, BENDING, AXIAL], 2)) * SEGMENT
+    steps = np.diag(np.tile([1e-2, 1e-2, 1e-4], 2))
+    signs = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
+    shifts = signs[:, 0, None, None, None] * steps[:, None, :] + signs[:, 1, None, None, None] * steps[None, :, :]
+    energy = _weight_energy(q + shifts, gravity)
+    size = np.diag(steps)
+    gradient = (np.diagonal(energy[0]) - np.diagonal(energy[3])) / (4 * size)
+    hessian = (energy[0] - energy[1] - energy[2] + energy[3]) / (4 * np.outer(size, size))
+    return stiffness @ q + gradient, stiffness + hessian
+
+
+def _complementary(compliance: np.ndarray, free: np.ndarray, displacement: np.ndarray | None) -> np.ndarray:
+    """Tensions with delta - u >= 0, lambda >= 0, complementary, by projected Gauss-Seidel."""
+    tension = np.zeros(free.size)
+    if displacement is None:
+        return tension
+    for _ in range(400):
+        before = tension.copy()
+        for i in range(free.size):
+            gap = compliance[i] @ tension + free[i] - displacement[i]
+            tension[i] = max(0.0, tension[i] - gap / compliance[i, i])
+        if np.abs(tension - before).max() < 1e-12:
+            break
+    return tension

@@ -1,0 +1,112 @@
+"""The arm: forward kinematics of its URDF, gravity in the robot's base, the tour, the shipped macro."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gravcomp.arm.chain import STANDARD_GRAVITY, Chain, angle_between
+from gravcomp.arm.description import expanded
+from gravcomp.arm.tour import FIVE_POSES, Tour
+from gravcomp.config import ConfigError
+
+URDF = Path(__file__).resolve().parents[2] / "gravcomp_fem" / "urdf"
+
+TWO_JOINTS = """<robot name="r"><link name="world"/><link name="a"/><link name="b"/><link name="soft_base"/>
+<joint name="j1" type="revolute"><parent link="world"/><child link="a"/><origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 2 0"/></joint>
+<joint name="j2" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+<joint name="j3" type="fixed"><parent link="b"/><child link="soft_base"/><origin xyz="0.5 0 0" rpy="0 0 1.5707963267948966"/></joint></robot>"""
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return expanded(URDF / "seven_axis_arm.urdf.xacro")
+
+
+def test_a_pose_is_the_product_of_its_joints():
+    chain = Chain(TWO_JOINTS, "soft_base", "world")
+    assert chain.moving == ("j1", "j2")
+    pose = chain.pose({"j1": math.pi / 2, "j2": 0.2})
+    np.testing.assert_allclose(pose[:3, 3], [0.2, 0.0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(pose[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(pose[:3, :3] @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+def test_gravity_is_what_turned_back_points_down(arm):
+    chain = Chain(arm, "soft_base", "world")
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        q = dict(zip(chain.moving, random.uniform(-2, 2, 7)))
+        np.testing.assert_allclose(chain.pose(q)[:3, :3] @ chain.gravity(q), [0, 0, -STANDARD_GRAVITY], atol=1e-12)
+
+
+def test_the_root_may_be_any_link_above():
+    assert Chain(TWO_JOINTS, "soft_base", "a").moving == ("j2",)
+    assert Chain(TWO_JOINTS, "soft_base").root == "world"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "tip", "root", "sentence"),
+    [
+        ("<robot", "soft_base", None, "is not a URDF"),
+        (TWO_JOINTS, "soft_tip", None, "has no link 'soft_tip'; it has: world, a, b, soft_base"),
+        (TWO_JOINTS, "soft_base", "table", "has no link 'table'"),
+        (TWO_JOINTS, "a", "b", "link 'a' does not hang on 'b'; its root is 'world'"),
+        (TWO_JOINTS.replace("revolute", "floating"), "soft_base", None, "joint 'j1' is of type 'floating'"),
+    ],
+)
+def test_what_is_wrong_with_a_urdf_is_said(urdf, tip, root, sentence):
+    with pytest.raises(ConfigError, match=sentence):
+        Chain(urdf, tip, root)
+
+
+def test_the_five_poses_are_the_articles_directions(arm):
+    chain = Chain(arm, "soft_base", "world")
+    for inclination, joints in FIVE_POSES.items():
+        axis = chain.pose(dict(zip(chain.moving, joints)))[:3, 2]
+        # Beyond the vertical the robot leans backwards: the same angle to the ground, away from the arm's front.
+        expected = min(inclination, 180.0 - inclination)
+        assert math.degrees(math.asin(axis[2])) == pytest.approx(expected, abs=0.02)
+        assert (axis[0] < -0.1) == (inclination > 90.0)
+
+
+def test_the_tour_rests_at_its_poses_and_never_jumps():
+    poses = np.array(list(FIVE_POSES.values()))
+    tour = Tour(poses, travel=2.0, hold=3.0)
+    assert tour.duration == 25.0
+    times = np.arange(0.0, 50.0, 0.01)
+    positions = np.array([tour.positions(t) for t in times])
+    # Minimum jerk peaks at 15/8 of the mean speed.
+    ways = np.abs(poses - np.roll(poses, 1, axis=0)).max()
+    assert np.abs(np.diff(positions, axis=0)).max() <= 1.875 * ways / 2.0 * 0.01 * 1.001
+    assert [tour.at_rest(t, 2.0) for t in (0.0, 3.9, 4.1, 9.5, 29.5)] == [None, None, 0, 1, 0]
+    np.testing.assert_allclose(tour.positions(14.0), poses[2])
+
+
+def test_the_macro_takes_prefix_parent_and_origin(tmp_path):
+    own = tmp_path / "own.urdf.xacro"
+    own.write_text(f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="{URDF}/soft_robot.urdf.xacro"/>
+    <link name="table"/>
+    <xacro:soft_robot prefix="left_" joint_prefix="left_" parent="table"><origin xyz="0 0.2 0" rpy="0 {math.pi / 2} 0"/></xacro:soft_robot>
+    <xacro:soft_robot prefix="right_" joint_prefix="right_" parent="table"><origin xyz="0 -0.2 0" rpy="0 0 0"/></xacro:soft_robot></robot>""")
+    urdf = expanded(own)
+    left, right = (Chain(urdf, f"{side}_imu_link", "table") for side in ("left", "right"))
+    np.testing.assert_allclose(left.pose({})[:3, 3], [0, 0.2, 0])
+    assert angle_between(left.gravity({}), right.gravity({})) == pytest.approx(math.pi / 2)
+    assert 'name="left_s2c3"' in urdf
+
+
+def test_the_macros_joints_are_the_robots_cables():
+    from gravcomp.description import load_robot_file
+
+    urdf = expanded(URDF / "soft_robot_alone.urdf.xacro")
+    for name in load_robot_file("article").robot.cable_names:
+        assert f'<joint name="{name}" type="prismatic">' in urdf
+
+
+def test_a_broken_xacro_is_named(tmp_path):
+    bad = tmp_path / "bad.xacro"
+    bad.write_text('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${nothing}"/></robot>')
+    with pytest.raises(ConfigError, match="bad.xacro"):
+        expanded(bad)

@@ -1,0 +1,142 @@
+"""Calibration: derivatives, recovery of known robots, warnings, data files, and the robot's YAML."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
+from gravcomp.calibration.fit import fit_statics
+from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, read_measured, still_windows, write_csv
+from gravcomp.calibration.motion import predict_course
+from gravcomp.calibration.statics import StaticParameters, StaticPredictor
+from gravcomp.description import load_robot_file
+from gravcomp.description.hardware import parse_hardware
+from gravcomp.experiments.known_robot import OFFSETS, known_setup, known_windows
+from gravcomp.experiments.setup import Setup
+from gravcomp.simulation import Simulator
+
+GRAVITY = np.array([-9.81, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def setup():
+    return Setup.of(load_robot_file("article"))
+
+
+@pytest.fixture(scope="module")
+def robot(setup):
+    return setup.robot
+
+
+def test_one_model_serves_all_moduli(robot):
+    windows = StillWindows(GRAVITY[None], np.array([[1e-3, np.nan, np.nan, 0.5e-3, np.nan, np.nan]]), np.zeros((1, 3)))
+    found = StaticPredictor(robot, windows).predict(StaticParameters(0.6e6, np.zeros(6), np.zeros(6)))
+    direct = Simulator(robot.with_material(youngs_modulus=0.6e6), reduced=False).solve(GRAVITY, windows.displacement[0])
+    np.testing.assert_allclose(found.tip[0], direct.tip_position, atol=2e-7)
+    np.testing.assert_allclose(found.tension[0], direct.cable_tension, atol=1e-4)
+
+
+def test_derivatives_of_tips_are_those_of_finite_differences(robot):
+    windows = StillWindows(GRAVITY[None], np.array([[1.2e-3, np.nan, np.nan, 1.0e-3, np.nan, np.nan]]), np.zeros((1, 3)))
+    predictor = StaticPredictor(robot, windows)
+    base = StaticParameters(0.8e6, np.zeros(6), np.full(6, 0.1e-3))
+    here = predictor.predict(base)
+    for cable in (0, 3):
+        unit = np.eye(6)[cable]
+        for name, step, slope in (("offset", 2e-6, here.by_offset), ("compliance", 5e-6, here.by_compliance)):
+            tips = [predictor.predict(dataclasses.replace(base, **{name: getattr(base, name) + sign * step * unit})).tip[0] for sign in (1, -1)]
+            difference = (tips[0] - tips[1]) / (2 * step)
+            # The linear answer leaves out how the stiffness changes with tension: a few per cent.
+            np.testing.assert_allclose(slope[0, :, cable], difference, atol=0.06 * np.abs(difference).max())
+
+
+def test_a_known_robot_is_recovered_within_two_per_cent(setup):
+    fit = fit_statics(setup.robot, known_windows(known_setup(setup, 0.6e6)))
+    assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)
+    # The model is softer around a cable's end than the rod, which the offsets have to make good.
+    assert np.sqrt(np.mean((fit.parameters.offset - OFFSETS) ** 2)) < 0.5 * np.sqrt(np.mean(OFFSETS**2))
+    assert fit.rms_after < 0.1 * fit.rms_before
+
+
+def test_without_taut_cables_only_the_modulus_is_fitted_and_that_is_said(setup):
+    windows = known_windows(known_setup(setup, 0.6e6))
+    released = np.isnan(windows.displacement).all(axis=1)
+    windows = StillWindows(windows.gravity[released], np.full((released.sum(), 6), -0.01), windows.tip_position[released])
+    fit = fit_statics(setup.robot, windows)
+    assert [e.name for e in fit.estimates] == ["Young's modulus"]
+    assert any("no cable is ever taut" in warning for warning in fit.warnings)
+    assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)
+
+
+def test_an_upright_robot_cannot_tell_its_modulus(robot):
+    windows = StillWindows(np.array([[0.0, 0.0, 9.81]]), np.full((1, 6), np.nan), np.array([[0.0, 0.0, 0.1]]))
+    with pytest.raises(MeasurementError, match="hardly bends"):
+        fit_statics(robot, windows)
+
+
+def course(count: int = 60) -> Measured:
+    time = 0.05 * np.arange(count)
+    tip = np.array([0.0, 0.0, 0.1]) + 5e-3 * np.outer(np.where(time < 1.0, np.sin(20 * time), 0.0), [1.0, 0.0, 0.0])
+    displacement = np.where(np.arange(6) < 3, 1e-3, np.nan) * np.ones((count, 1))
+    return Measured("here", np.zeros(count, int), time, np.tile(GRAVITY, (count, 1)), displacement, tip, np.tile([0.0, 0.0, 1.0], (count, 1)))
+
+
+def test_only_the_last_still_window_of_a_stretch_counts():
+    windows = still_windows(course())
+    assert len(windows.tip_position) == 1
+    np.testing.assert_allclose(windows.tip_position[0], [0.0, 0.0, 0.1])
+    moving = course().rows(slice(0, 20))
+    with pytest.raises(MeasurementError, match="never stands still"):
+        still_windows(moving)
+
+
+def test_csv_is_read_as_it_was_written(tmp_path, robot):
+    path = tmp_path / "tips.csv"
+    write_csv(course(), path, robot.cable_names)
+    read = read_measured(path, robot.cable_names)
+    for name in ("time", "gravity", "displacement", "tip_position", "tip_direction"):
+        np.testing.assert_allclose(getattr(read, name), getattr(course(), name), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace("tip_x_mm", "tip_x"), "column 'tip_x_mm' is missing"),
+        (lambda text: text.replace("100.0000", "ten", 1), r"line 2: tip_z_mm is 'ten'"),
+        (lambda text: text.splitlines()[0], "holds 0 samples"),
+        (lambda text: text.replace("100.0000", "nan", 1), "not finite"),
+    ],
+)
+def test_bad_csv_is_refused_with_what_is_wrong(tmp_path, robot, change, message):
+    path = tmp_path / "tips.csv"
+    write_csv(course(), path, robot.cable_names)
+    path.write_text(change(path.read_text()))
+    with pytest.raises(MeasurementError, match=message):
+        read_measured(path, robot.cable_names)
+
+
+def test_calibrated_values_are_written_and_comments_stay(tmp_path, robot):
+    source = load_robot_file("article")
+    hardware = parse_hardware(source.section("hardware"), source=source.source)
+    parameters = StaticParameters(0.7512e6, np.array([0.1e-3, 0, 0, 0, 0, -0.2e-3]), np.array([0.2e-3] * 3 + [0.0] * 3))
+    path = tmp_path / "mine.yaml"
+    write_calibrated(source.source, path, calibrated_robot(robot, parameters, 0.031), calibrated_hardware(hardware, parameters))
+    mine = load_robot_file(path)
+    motors = parse_hardware(mine.section("hardware"), source=mine.source).motors
+    assert [m.offset for m in motors] == pytest.approx(parameters.offset, abs=1e-9)
+    assert [s.material.youngs_modulus for s in mine.robot.segments] == pytest.approx([0.7512e6] * 2)
+    assert mine.robot.segments[0].material.damping_time == pytest.approx(0.031)
+    assert mine.robot.cables[0].axial_stiffness == pytest.approx(0.05 / 0.2e-3)
+    assert mine.robot.cables[3].axial_stiffness is None
+    assert "# from base to tip; z along the straight robot" in path.read_text()
+
+
+def test_a_robot_at_rest_is_predicted_to_stay(robot):
+    shape = Simulator(robot, reduced=False).solve(GRAVITY)
+    still = Measured(
+        "here", np.zeros(6, int), 0.02 * np.arange(6), np.tile(GRAVITY, (6, 1)), np.full((6, 6), np.nan), np.tile(shape.tip_position, (6, 1))
+    )
+    tip, direction = predict_course(robot, still)
+    np.testing.assert_allclose(tip, still.tip_position, atol=2e-6)
+    np.testing.assert_allclose(direction[-1], shape.tip_direction, atol=1e-4)

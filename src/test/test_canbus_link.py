@@ -1,0 +1,177 @@
+"""Buses that open, isolate runs from one another, and come back after errors."""
+
+import socket
+import time
+
+import can
+import msgpack
+import pytest
+
+from gravcomp.canbus import codec
+from gravcomp.canbus.bus import BusError, open_bus
+from gravcomp.canbus.link import CanLink
+from gravcomp.canbus.multicast import parse_channel, private_channel
+from gravcomp.description.hardware import CanInterface
+
+FRAME = codec.encode("MotorFeedback1", angle=1, speed=2, current=0.003)
+
+
+class FlakyBus:
+    """A bus whose adapter can be unplugged."""
+
+    def __init__(self):
+        self.frames, self.sent, self.failure, self.shut = [], [], None, False
+
+    def recv(self, timeout):
+        if self.failure:
+            raise self.failure
+        return self.frames.pop(0) if self.frames else None
+
+    def send(self, frame):
+        if self.failure:
+            raise self.failure
+        self.sent.append(frame)
+
+    def shutdown(self):
+        self.shut = True
+        raise OSError("no such device")  # as an adapter that is gone
+
+
+class Workshop:
+    """Opens FlakyBuses, unless told that there is none."""
+
+    def __init__(self):
+        self.buses, self.available, self.attempts, self.now = [], True, 0, 0.0
+        self.link = CanLink(CanInterface(), opener=self.open, clock=lambda: self.now)
+
+    def open(self, settings, frame_ids):
+        self.attempts += 1
+        if not self.available:
+            raise BusError("can0 cannot be opened: no such device")
+        self.buses.append(FlakyBus())
+        return self.buses[-1]
+
+
+def test_two_processes_worth_of_links_hear_each_other_but_not_themselves():
+    settings = CanInterface(channel=private_channel())
+    a, b = CanLink(settings), CanLink(settings, [0x201])
+    a.open(), b.open()
+    a.send([FRAME, codec.encode("MotorFeedback2", angle=0, speed=0, current=0)])
+    received = b.receive(0.5) + b.receive(0.05)
+    assert [(f.arbitration_id, bytes(f.data)) for f in received] == [(0x201, bytes(FRAME.data))]
+    assert a.receive(0.05) == []
+    a.close(), b.close()
+
+
+def test_frames_that_are_not_wanted_do_not_hide_those_behind_them():
+    settings = CanInterface(channel=private_channel())
+    a, b = CanLink(settings), CanLink(settings, [0x201])
+    a.open(), b.open()
+    a.send([codec.encode("MotorFeedback2", angle=0, speed=0, current=0), FRAME] * 20)
+    assert len(b.receive(0.2)) == 20
+    a.close(), b.close()
+
+
+def test_a_receiver_that_is_held_up_for_0_1_s_loses_no_frame_and_knows_when_each_came():
+    """350 frames are 0.1 s of six motors at 500 Hz and the board."""
+    settings = CanInterface(channel=private_channel())
+    a, b = CanLink(settings), CanLink(settings)
+    a.open(), b.open()
+    begin = time.time()
+    a.send([FRAME] * 175)
+    middle = time.time()
+    time.sleep(0.1)
+    a.send([FRAME] * 175)
+    time.sleep(0.05)
+    stamps = [frame.timestamp for frame in b.receive(0.0)]
+    assert len(stamps) == 350
+    assert begin <= stamps[0] <= stamps[174] <= middle and stamps[175] >= middle + 0.1
+    a.close(), b.close()
+
+
+def test_runs_on_private_channels_do_not_hear_each_other():
+    a, b = (CanLink(CanInterface(channel=private_channel())) for _ in range(2))
+    a.open(), b.open()
+    a.send([FRAME])
+    assert b.receive(0.1) == []
+    a.close(), b.close()
+
+
+def test_what_is_no_frame_does_not_reach_the_caller_and_frames_go_on():
+    channel = private_channel()
+    link, friend = CanLink(CanInterface(channel=channel)), CanLink(CanInterface(channel=channel))
+    link.open(), friend.open()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+        for datagram in (b"", b"\xc1", b"hello", msgpack.packb([1, 2]), msgpack.packb({"arbitration_id": "x"}), bytes(2000)):
+            stranger.sendto(datagram, parse_channel(channel))
+    friend.send([FRAME])
+    assert [f.arbitration_id for f in link.receive(0.5)] == [0x201]
+    link.close(), friend.close()
+
+
+def test_python_can_itself_understands_the_datagrams():
+    """So that its logger and viewer can be used beside a running robot."""
+    channel = private_channel()
+    group, port = parse_channel(channel)
+    try:
+        listener = can.Bus(interface="udp_multicast", channel=group, port=port, hop_limit=0)
+    except can.CanInitializationError:
+        pytest.skip("no route for multicast on this machine")
+    link = CanLink(CanInterface(channel=channel))
+    link.open()
+    link.send([FRAME])
+    heard = listener.recv(1.0)
+    assert heard is not None and heard.arbitration_id == 0x201 and heard.data == FRAME.data
+    link.close(), listener.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        (CanInterface(channel="10.0.0.1:5000"), "not a multicast group"),
+        (CanInterface(channel="239.1.1.1:99999"), "not a multicast group"),
+        (CanInterface(interface="semaphore", channel="0"), "'semaphore' is not available"),
+        (CanInterface(interface="socketcan", channel="can77"), "sudo ip link set can77 up type can bitrate 1000000"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_says_what_to_do(settings, complaint):
+    with pytest.raises(BusError, match=complaint):
+        open_bus(settings)
+
+
+def test_a_vanished_adapter_is_reopened_with_growing_pauses():
+    shop = Workshop()
+    shop.link.open()
+    shop.available, shop.buses[0].failure = False, OSError("device not configured")
+    assert shop.link.receive(0.0) == [] and not shop.link.is_open and shop.buses[0].shut
+    assert "device not configured" in shop.link.status
+    for _ in range(1000):  # 10 s without an adapter
+        shop.now += 0.01
+        assert shop.link.receive(0.0) == [] and not shop.link.send([FRAME])
+    assert 5 <= shop.attempts <= 12
+    shop.available, shop.now = True, shop.now + 2.0
+    assert shop.link.send([FRAME]) and shop.buses[-1].sent == [FRAME]
+
+
+def test_bus_off_and_error_frames_are_not_data():
+    shop = Workshop()
+    shop.link.open()
+    shop.buses[0].frames = [can.Message(arbitration_id=0x04, is_error_frame=True), FRAME]
+    assert shop.link.receive(0.0) == [FRAME] and shop.link.counters.error_frames == 1
+    shop.buses[0].frames = [can.Message(arbitration_id=0x40, is_error_frame=True)]
+    assert shop.link.receive(0.0) == [] and not shop.link.is_open and "bus-off" in shop.link.status
+
+
+def test_a_full_transmit_queue_is_waited_out_before_the_bus_is_reopened():
+    shop = Workshop()
+    shop.link.open()
+    shop.buses[0].failure = can.CanOperationError("No buffer space available")
+    assert not shop.link.send([FRAME]) and shop.link.is_open
+    shop.buses[0].failure = None
+    assert shop.link.send([FRAME])
+    shop.buses[0].failure = can.CanOperationError("No buffer space available")
+    for _ in range(70):
+        shop.now += 0.01
+        shop.link.send([FRAME])
+    assert shop.link.counters.lost == 1

@@ -1,0 +1,70 @@
+"""Configuration errors name the file, the key, what was found and what is allowed; units convert at the edge."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from gravcomp.config import ConfigError, declared_parameters, from_mapping, load_yaml, parameter, to_mapping
+
+
+@dataclass(frozen=True)
+class Tube:
+    length: float = parameter(edge="mm", minimum=1, maximum=2000, description="length at rest")
+    law: str = parameter("svk", choices=("svk", "neo_hookean"), description="law")
+
+
+@dataclass(frozen=True)
+class Body:
+    tubes: tuple[Tube, ...] = parameter(description="tubes")
+    angle: float = parameter(90.0, edge="deg", minimum=-180, maximum=180, description="angle")
+    offset: tuple[float, float] = parameter((1.0, 2.0), edge="mm", description="offset")
+    count: int | None = parameter(None, minimum=1, description="count")
+
+
+def test_edge_units_become_si_and_come_back():
+    body = from_mapping(Body, {"tubes": [{"length_mm": 50}]}, source="f.yaml")
+    assert body.tubes[0].length == pytest.approx(0.05)
+    assert body.angle == pytest.approx(1.5707963)
+    assert body.offset == pytest.approx((0.001, 0.002))
+    assert from_mapping(Body, to_mapping(body), source="again") == body
+    assert to_mapping(body)["tubes"][0]["length_mm"] == 50.0
+
+
+@pytest.mark.parametrize(
+    "mapping, words",
+    [
+        ({"tubes": [{"length_mm": -5}]}, ["f.yaml", "tubes[0].length_mm", "-5", "1 to 2000 mm"]),
+        ({"tubes": [{"lenght_mm": 5}]}, ["f.yaml", "tubes[0].lenght_mm", "did you mean 'length_mm'"]),
+        ({"tubes": [{}]}, ["f.yaml", "tubes[0].length_mm", "missing"]),
+        ({"tubes": 3}, ["f.yaml", "tubes", "3", "list"]),
+        ({"tubes": [], "count": 1.5}, ["count", "1.5", "whole number"]),
+        ({"tubes": [], "count": True}, ["count", "True", "whole number"]),
+        ({"tubes": [], "angle_deg": float("nan")}, ["angle_deg", "nan", "finite"]),
+        ({"tubes": [], "angle_deg": "x"}, ["angle_deg", "'x'", "number"]),
+        ({"tubes": [{"length_mm": 5, "law": "hooke"}]}, ["tubes[0].law", "'hooke'", "svk, neo_hookean"]),
+        ({"tubes": [], "offset_mm": [1]}, ["offset_mm", "1 entries", "2"]),
+        ([], ["f.yaml", "mapping"]),
+    ],
+)
+def test_bad_values_are_refused_with_what_was_found_and_what_is_allowed(mapping, words):
+    with pytest.raises(ConfigError) as error:
+        from_mapping(Body, mapping, source="f.yaml")
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_declared_parameters_list_edge_defaults():
+    declared = {p.key: p for p in declared_parameters(Body)}
+    assert declared["angle_deg"].default == 90.0
+    assert declared["offset_mm"].default == [1.0, 2.0]
+    assert declared["angle_deg"].parameter.edge_unit == "deg"
+
+
+@pytest.mark.parametrize("text, words", [("a: [1", ["line"]), ("a: 1\na: 2", ["line 2", "twice"]), ("\tb: 1", ["line 1"])])
+def test_broken_yaml_names_the_line(tmp_path, text, words):
+    path = tmp_path / "robot.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        load_yaml(path)
+    for word in [str(path), *words]:
+        assert word in str(error.value)

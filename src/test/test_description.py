@@ -1,0 +1,99 @@
+"""A robot's YAML is read into SI, and every mistake in it is named with file, key, value and what is allowed."""
+
+import copy
+
+import numpy as np
+import pytest
+import yaml
+
+from gravcomp.config import ConfigError
+from gravcomp.description import load_robot_file, shipped_robots
+
+
+@pytest.fixture
+def document():
+    return copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text()))
+
+
+def load(document, folder):
+    path = folder / "robot.yaml"
+    path.write_text(yaml.safe_dump(document))
+    return load_robot_file(path)
+
+
+def test_article_robot():
+    robot = load_robot_file("article").robot
+    assert robot.length == pytest.approx(0.1)
+    assert robot.cable_names == ("s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3")
+    assert [robot.cable_end(c) for c in robot.cables] == pytest.approx([0.05] * 3 + [0.1] * 3)
+    assert robot.segments[0].material.youngs_modulus == pytest.approx(0.8e6)
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_every_shipped_robot_is_read(name):
+    assert load_robot_file(name).robot.cables
+
+
+def test_sections_of_others_are_handed_on(document, tmp_path):
+    document["hardware"] = {"motors": [1, 2]}
+    file = load(document, tmp_path)
+    assert file.section("hardware") == {"motors": [1, 2]}
+    with pytest.raises(ConfigError, match="no section 'motor'"):
+        file.section("motor")
+
+
+def test_imu_mount_rotates_from_the_imu_into_the_base(document, tmp_path):
+    document["robot"]["imu_mount"] = {"rpy_deg": [0.0, 0.0, 90.0]}
+    rotation = load(document, tmp_path).robot.imu_mount.rotation
+    assert rotation @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
+    document["robot"]["imu_mount"] = {"rpy_deg": [30.0, -70.0, 130.0]}
+    rotation = load(document, tmp_path).robot.imu_mount.rotation
+    assert rotation @ rotation.T == pytest.approx(np.eye(3)) and np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def change(path, value):
+    """A mistake: set the entry at `path`, or remove it where the value is None."""
+
+    def apply(robot):
+        for step in path[:-1]:
+            robot = robot[step]
+        if value is None:
+            del robot[path[-1]]
+        else:
+            robot[path[-1]] = value
+
+    return apply
+
+
+MISTAKES = [
+    (change(["segments", 0, "length_mm"], -5), ["robot.segments[0].length_mm", "-5", "1 to 5000 mm"]),
+    (change(["segments", 1, "lumen_diameter_mm"], 9.5), ["robot.segments[1]", "lumen_diameter_mm is 9.5", "8.82"]),
+    (change(["segments", 1, "name"], "proximal"), ["segments", "'proximal'", "2 times"]),
+    (change(["segments", 0, "material", "law"], "mooney"), ["material.law", "mooney", "svk, neo_hookean"]),
+    (change(["segments", 0, "material", "poissons_ratio"], 0.5), ["poissons_ratio", "0.5", "0 to 0.495"]),
+    (change(["cables", 2, "segment"], "distel"), ["cables[2] ('s1c3').segment", "distel", "proximal, distal"]),
+    (change(["cables", 1, "radius_mm"], 5.0), ["cables[1] ('s1c2')", "5 mm", "1.8 to 4.5 mm"]),
+    (change(["cables", 1, "end_mm"], 40.0), ["cables[1]", "one of segment and end_mm"]),
+    (change(["cables", 1, "angle_deg"], None), ["cables[1]", "angle_deg"]),
+    (change(["cables", 1, "name"], "s1c1"), ["cables", "'s1c1'", "2 times"]),
+    (change(["limits", "tension_min"], 9.0), ["robot.limits", "tension_min is 9 N", "below tension_max = 5 N"]),
+    (change(["body"], {"file": "a.stl", "length_mm": 100.0}), ["both of segments and body"]),
+    (change(["segments"], None), ["neither of segments and body"]),
+]
+
+
+@pytest.mark.parametrize("mistake, words", MISTAKES)
+def test_mistakes_are_named(document, tmp_path, mistake, words):
+    mistake(document["robot"])
+    with pytest.raises(ConfigError) as error:
+        load(document, tmp_path)
+    for word in ["robot.yaml", *words]:
+        assert word in str(error.value)
+
+
+def test_unknown_sections_and_missing_files_are_named(document, tmp_path):
+    document["motors"] = {}
+    with pytest.raises(ConfigError, match="unknown key 'motors'; allowed: robot, hardware, virtual_robot, nodes"):
+        load(document, tmp_path)
+    with pytest.raises(ConfigError, match="does not exist; give the path of a robot's YAML or a shipped robot: article"):
+        load_robot_file("artikle")

@@ -1,0 +1,81 @@
+"""Calibration from resting poses finds what was put in, and says when the poses do not show it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.calibration import (
+    CalibrationError,
+    RestingPose,
+    fit_accelerometer,
+    fit_gyro_offset,
+    fit_mount,
+    resting_poses,
+)
+from gravcomp.recordings import Recording
+
+SIX = np.vstack([np.eye(3), -np.eye(3)])
+SCALE, OFFSET = np.array([1.01, 0.98, 1.005]), np.array([0.1, -0.05, 0.2])
+
+
+def poses_of(directions, seed=1):
+    random = np.random.default_rng(seed)
+    return [RestingPose(9.81 * d / SCALE + OFFSET + random.normal(0, 0.001, 3), np.zeros(3), 500) for d in directions]
+
+
+def test_six_poses_give_scale_and_offset():
+    fit = fit_accelerometer(poses_of(SIX))
+    assert fit.scale == pytest.approx(SCALE, abs=3 * fit.scale_std.max())
+    assert fit.offset == pytest.approx(OFFSET, abs=3 * fit.offset_std.max())
+    assert fit.residual_after < 0.1 * fit.residual_before
+
+
+def test_few_poses_correct_what_they_show_and_say_how_little_they_know():
+    fit = fit_accelerometer(poses_of(SIX[2:3]))
+    assert fit.residual_after < 0.1 * fit.residual_before
+    assert fit.scale[:2] == pytest.approx([1.0, 1.0], abs=1e-6)
+    assert fit.offset_std[0] > 10 * fit_accelerometer(poses_of(SIX)).offset_std[0]
+
+
+def test_the_mount_is_found_from_two_poses():
+    rpy = (0.2, -0.5, 1.1)
+    mount = quat.matrix(quat.from_roll_pitch_yaw(*rpy))
+    up = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    assert fit_mount(9.81 * up @ mount, up) == pytest.approx(rpy, abs=1e-9)
+
+
+def test_poses_along_one_line_do_not_tell_the_mount():
+    with pytest.raises(CalibrationError, match="one more pose"):
+        fit_mount(np.array([[0, 0, 9.81], [0, 0, -9.81]]), np.array([[0, 0, 1.0], [0, 0, -1.0]]))
+
+
+def test_rests_are_found_in_a_recording_and_the_same_pose_is_taken_once():
+    random = np.random.default_rng(2)
+    gyro, accel = [], []
+    for direction in (SIX[2], SIX[0], SIX[2]):
+        gyro.append(np.full((600, 3), 0.01) + random.normal(0, 0.002, (600, 3)))
+        accel.append(9.81 * direction + random.normal(0, 0.02, (600, 3)))
+        gyro.append(random.normal(0, 1.0, (100, 3)))  # in the hand
+        accel.append(9.81 * direction + random.normal(0, 3.0, (100, 3)))
+    gyro, accel = np.vstack(gyro), np.vstack(accel)
+    recording = Recording("made", np.arange(len(gyro)) * 10_000_000, gyro, accel)
+    poses = resting_poses(recording)
+    assert [np.argmax(np.abs(p.accel)) for p in poses] == [2, 0]
+    assert poses[0].count > poses[1].count
+    assert fit_gyro_offset(poses) == pytest.approx([0.01] * 3, abs=1e-3)
+
+
+def test_a_recording_without_rest_is_refused():
+    random = np.random.default_rng(3)
+    recording = Recording("hand.npz", np.arange(500) * 10_000_000, random.normal(0, 1.0, (500, 3)), random.normal(0, 5.0, (500, 3)))
+    with pytest.raises(CalibrationError, match="hand.npz: the sensor never rests for 1.5 s"):
+        resting_poses(recording)
+
+
+def test_half_a_turn_is_still_a_mount():
+    up = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+    flipped = up @ quat.matrix(quat.from_roll_pitch_yaw(math.pi, 0.0, 0.0))
+    roll, pitch, yaw = fit_mount(flipped, up)
+    assert (abs(roll), pitch, yaw) == pytest.approx((math.pi, 0.0, 0.0), abs=1e-9)

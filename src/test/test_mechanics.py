@@ -1,0 +1,188 @@
+"""Elements and materials: derivatives, patch test, rigid rotations, order of convergence."""
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Elements, Material, Robot, Segment
+from gravcomp.mechanics.block_matrix import BlockMatrix, NotPositiveDefinite, order_in_levels
+from gravcomp.mechanics.corotational import CorotationalElements
+from gravcomp.mechanics.total_lagrangian import SolidElements, ViscousStrain
+from gravcomp.mesh import Mesh, tube_mesh
+from gravcomp.mesh.elements import reference_nodes, shape_gradients, shape_values
+from gravcomp.mesh.quadratic import raised_to_quadratic
+
+KINDS = ("hex20", "tet10", "tet4")
+LAWS = ("svk", "neo_hookean")
+
+
+def tube(law="svk", **elements) -> Robot:
+    material = Material(law=law, poissons_ratio=0.45)
+    return Robot("tube", segments=(Segment("only", 0.02, 9e-3, 3.6e-3, material),), elements=Elements(**elements))
+
+
+def elements_of(kind: str, law: str = "svk"):
+    mesh = tube_mesh(tube(law, around=4, along=2), kind)
+    order, pattern = order_in_levels([mesh.elements], len(mesh.nodes), mesh.clamped)
+    mesh = mesh.renumbered(order)
+    return (CorotationalElements if kind == "tet4" else SolidElements)(mesh, pattern), pattern
+
+
+def some_displacements(mesh: Mesh, size: float = 2e-3) -> np.ndarray:
+    x, y, z = mesh.nodes.T / 0.02
+    u = size * np.column_stack([z**2 + 0.3 * x * z, 0.5 * z**2 - 0.2 * y * z, -0.4 * z + 0.3 * x * z])
+    u[mesh.clamped] = 0.0
+    return u
+
+
+def directional(function, u: np.ndarray, direction: np.ndarray, h: float = 1e-8):
+    return (function(u + h * direction) - function(u - h * direction)) / (2 * h)
+
+
+def some_direction(elements, n_free: int) -> np.ndarray:
+    direction = np.zeros_like(elements.mesh.nodes)
+    direction[:n_free] = np.random.default_rng(1).normal(size=(n_free, 3))
+    return direction
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shape_functions_are_one_at_their_node_and_differentiate(kind):
+    assert shape_values(kind, reference_nodes(kind)) == pytest.approx(np.eye(len(reference_nodes(kind))), abs=1e-14)
+    point, h = np.array([0.21, 0.13, 0.34]), 1e-6
+    for axis, step in enumerate(h * np.eye(3)):
+        difference = (shape_values(kind, point + step) - shape_values(kind, point - step)) / (2 * h)
+        assert shape_gradients(kind, point)[:, axis] == pytest.approx(difference, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", ("hex20", "tet10"))
+def test_force_is_the_derivative_of_energy_and_stiffness_that_of_force(kind, law):
+    elements, pattern = elements_of(kind, law)
+    n_free = pattern.n // 3
+    u, direction = some_displacements(elements.mesh), some_direction(elements, n_free)
+    force = elements.internal_force(u)
+    assert directional(elements.energy, u, direction) == pytest.approx((force * direction).sum(), rel=1e-6)
+    matrix = BlockMatrix(pattern)
+    assert elements.assemble(u, matrix) == pytest.approx(force, abs=1e-12 * np.abs(force).max())
+    change = directional(elements.internal_force, u, direction)[:n_free].ravel()
+    tangent = matrix.multiply(direction[:n_free].ravel())
+    assert tangent == pytest.approx(change, abs=1e-6 * np.abs(change).max())
+
+
+def test_stiffness_of_damping_is_the_derivative_of_its_force():
+    elements, pattern = elements_of("hex20")
+    n_free = pattern.n // 3
+    u, direction = some_displacements(elements.mesh), some_direction(elements, n_free)
+    viscous = ViscousStrain(np.full(len(elements.weights), 3.0), 2.0 * elements.strains(0.9 * u))
+    matrix = BlockMatrix(pattern)
+    elements.assemble(u, matrix, viscous)
+    change = directional(lambda at: elements.internal_force(at, viscous), u, direction)[:n_free].ravel()
+    assert matrix.multiply(direction[:n_free].ravel()) == pytest.approx(change, abs=1e-6 * np.abs(change).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_rigid_rotation_makes_no_force_and_turns_forces_with_it(kind):
+    elements, _ = elements_of(kind)
+    nodes, u = elements.mesh.nodes, some_displacements(elements.mesh)
+    angle = 1.1
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    force = elements.internal_force(u)
+    assert elements.internal_force(nodes @ turn.T - nodes) == pytest.approx(0.0 * u, abs=1e-9 * np.abs(force).max())
+    turned = elements.internal_force((nodes + u) @ turn.T - nodes)
+    assert turned == pytest.approx(force @ turn.T, abs=1e-9 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_patch(kind, law):
+    """An affine deformation of a distorted patch is in equilibrium inside it."""
+    mesh, inner = patch(kind, law)
+    order, pattern = order_in_levels([mesh.elements], len(mesh.nodes), mesh.clamped)
+    mesh, inner = mesh.renumbered(order), np.isin(order, inner)
+    elements = (CorotationalElements if kind == "tet4" else SolidElements)(mesh, pattern)
+    gradient = np.array([[0.05, 0.08, -0.02], [0.01, -0.04, 0.03], [0.06, 0.02, 0.07]])
+    force = elements.internal_force(mesh.nodes @ gradient.T)
+    assert np.abs(force[inner]).max() < 1e-10 * np.abs(force).max()
+
+
+def patch(kind: str, law: str) -> tuple[Mesh, np.ndarray]:
+    """A unit cube of 2 x 2 x 2 cells whose middle corner is moved, sides straight; the nodes inside it."""
+    corners = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    moved = corners + np.array([0.07, -0.05, 0.04]) * np.all(corners == 0.5, axis=1)[:, None]
+    index = np.arange(27).reshape(3, 3, 3)
+    cells = [
+        [index[i + a, j + b, k + c] for c in (0, 1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        for i in (0, 1) for j in (0, 1) for k in (0, 1)
+    ]  # fmt: skip
+    if kind == "hex20":
+        local = reference_nodes("hex20")
+        weights = np.prod(1 + local[:, None, :] * local[None, :8, :], axis=-1) / 8  # trilinear: the sides stay straight
+        points = np.concatenate([weights @ moved[cell] for cell in cells])
+        nodes, elements = np.unique(points.round(12), axis=0, return_inverse=True)
+        elements = elements.reshape(8, 20)
+    else:
+        tets = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+        nodes, elements = moved, np.array([[cell[i] for i in tet] for cell in cells for tet in tets])
+        if kind == "tet10":
+            nodes, elements = raised_to_quadratic(nodes, elements)
+    inner = np.flatnonzero(np.all((nodes > 1e-9) & (nodes < 1 - 1e-9), axis=1))
+    material = Material(law=law)
+    return Mesh(kind, nodes, elements, np.zeros(len(elements), dtype=int), (material,), 1.0, np.array([0.0, 1.0])), inner
+
+
+@pytest.mark.parametrize("kind, order", [("hex20", 4), ("tet10", 4), ("tet4", 2)])
+def test_energy_of_a_smooth_deformation_converges_at_the_elements_order(kind, order):
+    """The energy of an interpolated field converges with h^(2 p): p = 2 for quadratic elements, 1 for linear ones."""
+
+    exact = smooth_energy("hex20", 4)
+    coarse, fine = abs(smooth_energy(kind, 1) - exact), abs(smooth_energy(kind, 2) - exact)
+    # Less than half an order below: on meshes as coarse as these the next terms of the error still count.
+    assert np.log2(coarse / fine) > order - 0.4
+
+
+@functools.cache
+def smooth_energy(kind: str, n: int) -> float:
+    """Energy of a smooth field interpolated on a tube's mesh of fineness n."""
+    robot = dataclasses.replace(tube(), elements=Elements(around=6 * n, along=2 * n, radial=n, grading=1.0))
+    mesh = tube_mesh(robot, kind)
+    order, pattern = order_in_levels([mesh.elements], len(mesh.nodes), mesh.clamped)
+    elements = SolidElements(mesh.renumbered(order), pattern)
+    x, y, z = elements.mesh.nodes.T
+    k = np.pi / 0.04
+    return elements.energy(
+        1e-3 * np.column_stack([1 - np.cos(k * z), np.sin(k * z) * x / 4e-3, np.sin(k * z) * (1 + y / 4e-3)])
+    )
+
+
+def test_mass_is_consistent():
+    elements, pattern = elements_of("hex20")
+    volume = elements.weights.sum()
+    assert elements.nodal_mass().sum() == pytest.approx(1145.0 * volume, rel=1e-12)
+    assert elements.element_mass().sum() == pytest.approx(1145.0 * volume, rel=1e-12)
+    matrix = BlockMatrix(pattern)
+    elements.add_mass(matrix, 1.0)
+    matrix.factor()  # positive definite, as the consistent mass is and a lumped one would not be
+
+
+def test_blocks_solve_like_a_dense_matrix():
+    elements, pattern = elements_of("hex20")
+    matrix = BlockMatrix(pattern)
+    elements.assemble(np.zeros_like(elements.mesh.nodes), matrix)
+    dense = matrix.multiply(np.eye(pattern.n))
+    assert dense == pytest.approx(dense.T)
+    b = np.random.default_rng(2).normal(size=(pattern.n, 3))
+    expected = np.linalg.solve(dense, b)
+    factor = matrix.factor()
+    assert factor.solve(b) == pytest.approx(expected, rel=1e-8, abs=1e-10 * np.abs(expected).max())
+    assert factor.solve(b[:, 0]) == pytest.approx(expected[:, 0], rel=1e-8, abs=1e-10 * np.abs(expected).max())
+
+
+def test_an_indefinite_matrix_is_refused():
+    elements, pattern = elements_of("hex20")
+    matrix = BlockMatrix(pattern)
+    elements.assemble(np.zeros_like(elements.mesh.nodes), matrix)
+    matrix.add_diagonal(-2.0 * matrix.mean_diagonal())
+    with pytest.raises(NotPositiveDefinite):
+        matrix.factor()

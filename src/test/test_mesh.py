@@ -1,0 +1,132 @@
+"""Meshes: tubes of any diameters, bodies from files, what is refused, quality."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Cap, Elements, Material, MeshBody, Robot, Segment, load_robot_file
+from gravcomp.mesh import MeshError, body_mesh, tube_mesh
+from gravcomp.mesh.embedding import embed
+from gravcomp.mesh.quality import mesh_quality
+from gravcomp.mesh.sections import section_functionals
+from gravcomp.simulation import RobotModel, Simulator
+
+
+def test_stepped_tubes_and_caps_share_their_nodes():
+    robot = Robot(
+        "stepped",
+        segments=(
+            Segment("wide", 0.03, 9e-3, 3e-3, cap=Cap(2e-3, Material(youngs_modulus=1e9))),
+            Segment("narrow", 0.03, 7e-3, 4e-3),
+        ),
+        elements=Elements(around=12, along=8),
+    )
+    model = RobotModel(robot)  # raises for a part that is not connected with the base
+    assert robot.length == pytest.approx(0.062)
+    volume = np.pi / 4 * ((9e-3**2 - 3e-3**2) * 0.032 + (7e-3**2 - 4e-3**2) * 0.03)
+    assert model.elements.weights.sum() == pytest.approx(volume, rel=2e-3)  # facets of 30 deg
+
+
+def test_points_are_found_where_they_are():
+    mesh = tube_mesh(load_robot_file("article").robot)
+    angle = np.linspace(0.0, 6.0, 13)
+    points = np.column_stack([3e-3 * np.cos(angle), 3e-3 * np.sin(angle), np.linspace(0.0, 0.1, 13)])
+    found = embed(mesh, points)
+    assert np.einsum("pa,pai->pi", found.weights, mesh.nodes[found.nodes]) == pytest.approx(points, abs=1e-12)
+
+
+def test_sections_see_where_the_axis_goes():
+    mesh = tube_mesh(load_robot_file("article").robot)
+    gradient = np.array([[1.1, 0.1, 0.3], [0.0, 0.9, -0.2], [0.2, 0.0, 1.0]])
+    rows = (section_functionals(mesh, np.array([0.0, 0.037, 0.1])) @ (mesh.nodes @ gradient.T)).reshape(3, 3, 3)
+    assert rows[:, 0] == pytest.approx(np.outer([0.0, 0.037, 0.1], gradient[:, 2]), abs=1e-12)
+    assert rows[:, 1:] == pytest.approx(np.broadcast_to(gradient[:, :2].T, (3, 2, 3)), abs=1e-9)
+
+
+def test_too_few_layers_are_named():
+    robot = dataclasses.replace(load_robot_file("three_segment").robot, elements=Elements(along=2))
+    with pytest.raises(MeshError, match="elements.along is 2; the robot has 3 tubes"):
+        tube_mesh(robot)
+
+
+def test_the_shipped_body_is_computed():
+    shape = Simulator(load_robot_file("mesh_body").robot, reduced=False).solve([-9.81, 0.0, 0.0])
+    assert shape.status == 0 and shape.tip_position[0] < -5e-3
+
+
+def body(file: str, **changes) -> Robot:
+    return Robot("body", body=dataclasses.replace(MeshBody(file, 0.08), **changes))
+
+
+def shipped_mesh() -> str:
+    return load_robot_file("mesh_body").robot.body.file
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"file_unit": 1.0}, ["length_mm says 80 along z", "check file_unit_mm"]),
+        ({"length": 0.05}, ["length_mm says 50"]),
+        ({"file": "missing.vtk"}, ["does not exist"]),
+        ({"file": __file__}, ["allowed are surfaces"]),
+    ],
+)
+def test_a_body_that_does_not_fit_its_description_is_refused(changes, words):
+    with pytest.raises(MeshError) as error:
+        body_mesh(body(**{"file": shipped_mesh()} | changes))
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_a_body_lying_on_its_side_is_refused(tmp_path):
+    import meshio
+
+    content = meshio.read(shipped_mesh())
+    meshio.write(tmp_path / "side.vtk", meshio.Mesh(content.points[:, [2, 0, 1]], content.cells))
+    with pytest.raises(MeshError, match="its axis is not z"):
+        body_mesh(body(str(tmp_path / "side.vtk")))
+
+
+def test_linear_tetrahedra_are_raised_with_a_warning(tmp_path, caplog):
+    import meshio
+
+    content = meshio.read(shipped_mesh())
+    linear = meshio.Mesh(content.points, [("tetra", content.cells[0].data[:, :4])])
+    meshio.write(tmp_path / "linear.vtk", linear)
+    assert body_mesh(body(str(tmp_path / "linear.vtk"))).kind == "tet10"
+    assert "lock in bending" in caplog.text
+
+
+def cone(folder: Path, holes: bool = False) -> str:
+    import trimesh
+
+    upright = trimesh.transformations.translation_matrix([0, 0, 40])
+    surface = trimesh.creation.annulus(r_min=1.5, r_max=4.5, height=80.0, transform=upright)
+    if holes:
+        surface.update_faces(np.arange(len(surface.faces)) > 2)
+    surface.export(folder / "body.stl")
+    return str(folder / "body.stl")
+
+
+def test_an_open_surface_is_refused(tmp_path):
+    with pytest.raises(MeshError, match="the surface is not closed"):
+        body_mesh(body(cone(tmp_path, holes=True)))
+
+
+def test_a_surface_is_meshed(tmp_path):
+    pytest.importorskip("gmsh", reason="Gmsh is an optional dependency: pip install gmsh", exc_type=(ImportError, OSError))
+    mesh = body_mesh(body(cone(tmp_path)))
+    assert mesh.kind == "tet10" and mesh_quality(mesh).jacobian_ratio > 0.05
+    model = RobotModel(body(cone(tmp_path)), mesh)
+    assert model.elements.weights.sum() == pytest.approx(np.pi * (4.5e-3**2 - 1.5e-3**2) * 0.08, rel=0.02)
+
+
+def test_quality_sees_a_distorted_element():
+    mesh = tube_mesh(load_robot_file("article").robot)
+    assert mesh_quality(mesh).advice == ()
+    nodes = mesh.nodes.copy()
+    nodes[mesh.elements[0, 6]] = nodes[mesh.elements[0, 0]] + 0.3 * (nodes[mesh.elements[0, 6]] - nodes[mesh.elements[0, 0]])
+    bad = mesh_quality(dataclasses.replace(mesh, nodes=nodes))
+    assert bad.jacobian_ratio < 0.1 and "distorted" in bad.advice[0]

@@ -1,0 +1,219 @@
+"""Counting turns, the position loop, the last clamp, the knee of homing."""
+
+import dataclasses
+import math
+import random
+
+import numpy as np
+import pytest
+
+from gravcomp.canbus import codec
+from gravcomp.config import ConfigError
+from gravcomp.description.hardware import COUNTS_PER_TURN, Drive, Watchdog, parse_hardware
+from gravcomp.motors.encoder import JUMPS, Encoder
+from gravcomp.motors.homing import find_knee
+from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.monitor import MotorMonitor
+from gravcomp.motors.output import CurrentOutput
+
+RPM = 60.0 / COUNTS_PER_TURN  # a count a second
+
+
+def spin(encoder, rpm, duration, rate, start=0.0, loss=0.0):
+    """Feed a steady rotation; returns the true count at the end."""
+    true, now = start, 100.0
+    for k in range(int(duration * rate)):
+        now, true = 100.0 + k / rate, start + rpm / RPM * k / rate
+        if random.random() >= loss:
+            encoder.update(math.floor(true) % COUNTS_PER_TURN, rpm, 0.0, now)
+    return math.floor(true)
+
+
+@pytest.mark.parametrize("rpm", [0, 30, -30, 2750, -2750, 17000, -17000])
+@pytest.mark.parametrize("rate", [1000, 500, 125])
+def test_turns_are_counted_at_every_speed_of_the_motor(rpm, rate):
+    encoder = Encoder()
+    true = spin(encoder, rpm, 3.0, rate, start=5000)
+    assert encoder.count == true and encoder.rejected == 0
+
+
+def test_turns_survive_a_third_of_the_frames_being_lost():
+    random.seed(1)
+    encoder = Encoder()
+    true = spin(encoder, 2750, 5.0, 500, loss=0.33)
+    assert abs(encoder.count - true) < 2750 / RPM * 0.02 and encoder.rejected == 0
+
+
+def test_the_wrap_is_at_8192():
+    """Drivers that wrap at 8191 lose a count a turn: 36,000 turns would lose 4.4 turns."""
+    encoder = Encoder()
+    for k in range(40_000):
+        encoder.update(k * 2000 % COUNTS_PER_TURN, 2000 * 500 * RPM, 0.0, k / 500)
+    assert encoder.count == 39_999 * 2000
+
+
+def starved(rpm, pause):
+    """An encoder whose sender is starved at times: nothing for `pause` (s), then all frames at once. With the true count."""
+    encoder, late = Encoder(), round(pause / 0.002)
+    for k in range(2000):
+        count = rpm / RPM * 0.002 * k
+        arrival = 0.002 * k if k % 200 < 100 or k % 200 >= 100 + late else 0.002 * (k - k % 200 + 100 + late)
+        encoder.update(int(count // 1) % COUNTS_PER_TURN, rpm, 0.0, arrival)
+        assert encoder.jumps < JUMPS
+    return encoder, count
+
+
+@pytest.mark.parametrize("rpm", [0, 100, -300, 1500, -2750, 5000])
+@pytest.mark.parametrize("pause", [0.01, 0.03, 0.06, 0.1, 0.15])
+def test_late_frames_are_no_jumps_and_cost_no_turn_silently(rpm, pause):
+    encoder, count = starved(rpm, pause)
+    if encoder.certain:
+        assert encoder.count == pytest.approx(count, abs=1 + abs(rpm) / RPM * 0.002 * JUMPS)
+
+
+@pytest.mark.parametrize(("rpm", "pause"), [(0, 0.5), (100, 0.06), (-300, 0.06), (700, 0.03), (2750, 0.008)])
+def test_late_frames_of_a_slow_rotor_leave_the_turns_certain(rpm, pause):
+    """700 rpm are 10 mm/s of cable, 2750 are 40 mm/s."""
+    assert starved(rpm, pause)[0].certain
+
+
+@pytest.mark.parametrize("rpm", [100, -700, 1500, 2750])
+@pytest.mark.parametrize("gap", [0.004, 0.02, 0.05, 0.08, 0.2, 0.9])
+@pytest.mark.parametrize("start", [0, 3000, 6000])
+def test_lost_frames_cost_no_turn_silently(rpm, gap, start):
+    """Beside late frames, of which the encoder cannot tell them, they need another count for the same angle."""
+    encoder = Encoder()
+    for k in range(1000):
+        count = start + rpm / RPM * 0.002 * k
+        if not 0.5 <= 0.002 * k < 0.5 + gap:
+            encoder.update(int(count) % COUNTS_PER_TURN, rpm, 0.0, 0.002 * k)
+    assert not encoder.certain or encoder.count == int(count)
+
+
+def test_a_rotor_that_was_turned_by_hand_while_nobody_listened_has_uncertain_turns():
+    encoder = Encoder()
+    encoder.update(1000, 0, 0.0, 0.0)
+    assert encoder.update(4000, 0, 0.0, 0.3) and not encoder.certain
+    encoder.trust()
+    assert encoder.update(4001, 0, 0.0, 0.302) and encoder.certain
+
+
+def test_a_rotor_that_stands_where_it_stood_has_not_moved():
+    encoder = Encoder()
+    encoder.update(8190, 0, 0.0, 0.0)
+    assert encoder.update(3, 0, 0.0, 0.9) and encoder.certain and encoder.count == 8195
+
+
+def test_single_jumps_are_passed_over_and_repeated_ones_told():
+    encoder = Encoder()
+    for k in range(10):
+        assert encoder.update(4000, 0, 0.0, k * 0.002)
+    assert not encoder.update(1200, 0, 0.0, 0.022)
+    for k in range(2):
+        assert encoder.update(4001, 0, 0.0, 0.024 + k * 0.002)
+    assert encoder.count == 4001 and encoder.jumps == 0
+    for k in range(JUMPS):
+        encoder.update(1200, 0, 0.0, 0.028 + k * 0.002)
+    assert encoder.jumps == JUMPS and encoder.count == 4001
+
+
+def test_two_controllers_with_one_id_are_told_though_every_other_feedback_is_right():
+    encoder = Encoder()
+    for k in range(20):
+        encoder.update(4000 if k % 2 else 1200, 0, 0.0, k * 0.001)
+    assert encoder.jumps >= JUMPS
+
+
+def test_a_speed_that_no_motor_reaches_between_two_feedbacks_is_rejected():
+    encoder = Encoder()
+    encoder.update(4000, 0, 0.0, 0.0)
+    assert not encoder.update(4000, 15_000, 0.0, 0.002) and encoder.certain
+
+
+@pytest.mark.parametrize(("angle", "speed"), [(8192, 0), (65535, 0), (100, 32767), (100, -32768)])
+def test_impossible_feedback_is_rejected(angle, speed):
+    assert not Encoder().update(angle, speed, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("current", "velocity", "complaint"), [(1.0, 0.0, "stalled"), (-1.0, 0.03, "against"), (0.1, 0.1, "runs away")])
+def test_a_fault_of_a_motor_must_last_in_what_was_seen_of_it(current, velocity, complaint):
+    """A control that is held up sees two feedbacks half a second apart; that is no half second of the fault."""
+    monitor = MotorMonitor(Drive(), Watchdog())
+    assert not any(monitor.update(0.5 * k, current, velocity, 0.0) for k in range(3))
+    assert not any(monitor.update(1.0, current, velocity, 0.0) for _ in range(1000))  # nothing new was seen
+    assert complaint in next(filter(None, (monitor.update(1.0 + 0.002 * k, current, velocity, 0.0) for k in range(100))))
+
+
+@pytest.mark.parametrize("limit", [0.05, 1.0, 2.3456, 10.0])
+def test_no_frame_exceeds_the_limit_whatever_is_asked(limit):
+    random.seed(5)
+    output = CurrentOutput([1, 2, 5], limit)
+    wild = [math.nan, math.inf, -math.inf, 1e300, -1e300, 32.767, -32.768, limit, -limit, 0.0]
+    for _ in range(3000):
+        asked = [random.choice(wild + [random.gauss(0, 10)]) for _ in range(3)]
+        for frame in output.frames(asked, enabled=True):
+            for current in codec.decode(frame).values:
+                assert abs(current) <= limit
+    for frame in output.frames([1.0] * 3, enabled=False):
+        assert bytes(frame.data) == bytes(8)
+
+
+def test_ids_without_a_motor_get_zero_and_frames_without_a_motor_are_not_sent():
+    (frame,) = CurrentOutput([3], 1.0).frames([0.5], enabled=True)
+    assert codec.decode(frame).values == (0, 0, pytest.approx(0.5), 0)
+
+
+def test_a_nan_current_is_zero():
+    (frame,) = CurrentOutput([1], 1.0).frames([math.nan], enabled=True)
+    assert bytes(frame.data) == bytes(8)
+
+
+def test_the_setpoint_keeps_velocity_and_acceleration_limits():
+    drive = Drive()
+    loop, dt = PositionLoop(drive), 0.004
+    path = []
+    for k in range(500):
+        loop.step(0.02 if k < 200 else -0.005, 0.0, loop.setpoint, loop.setpoint_velocity, dt)
+        path.append((loop.setpoint, loop.setpoint_velocity))
+    x, v = np.array(path).T
+    assert np.abs(v).max() <= drive.velocity_limit * (1 + 1e-9)
+    assert np.abs(np.diff(v)).max() <= drive.acceleration_limit * dt * (1 + 1e-9)
+    assert x[199] == 0.02 and x[-1] == -0.005
+    assert x.max() <= 0.02 and x.min() >= -0.005
+
+
+def test_tension_feed_forward_is_the_torque_of_the_capstan():
+    drive = dataclasses.replace(Drive(), torque_constant=0.2, capstan_radius=0.01)
+    assert PositionLoop(drive).step(0.0, 2.0, 0.0, 0.0, 0.004) == pytest.approx(2.0 * 0.01 / 0.2)
+
+
+def test_the_knee_is_found_in_noise():
+    rng = np.random.default_rng(0)
+    x = np.linspace(0, 0.008, 600)
+    current = 0.11 + 9.0 * np.maximum(0, x - 0.0052) + 0.004 * rng.standard_normal(600)
+    knee = find_knee(list(x), list(current))
+    assert knee.position == pytest.approx(0.0052, abs=2e-4)  # 4 mA of noise on 9 A/m
+    assert knee.slope == pytest.approx(9.0, rel=0.1) and knee.current == pytest.approx(0.11, abs=0.002)
+
+
+MOTORS = [{"cable": "a", "can_id": 1}, {"cable": "b", "can_id": 2}]
+
+
+@pytest.mark.parametrize(
+    ("section", "complaint"),
+    [
+        ({}, "hardware.motors' is missing"),
+        ({"motors": []}, "0 motors; allowed: 1 to 8"),
+        ({"motors": [MOTORS[0], {"cable": "b", "can_id": 1}]}, "can_id 1 is given to more than one motor"),
+        ({"motors": [MOTORS[0], {"cable": "a", "can_id": 2}]}, "cable a is given to more than one motor"),
+        ({"motors": [MOTORS[0], {"cable": "b", "can_id": 9}]}, r"hardware.motors\[1\].can_id is 9; allowed: 1 to 8"),
+        ({"motors": [MOTORS[0], {"cable": "b", "can_id": 2, "direction": 0}]}, "direction is 0; allowed: one of 1, -1"),
+        ({"motors": MOTORS[::-1]}, "needed, in this order: a, b"),
+        ({"motors": MOTORS, "drive": {"current_limit": 11}}, "hardware.drive.current_limit is 11.*; allowed: 0.05 to 10 A"),
+        ({"motors": MOTORS, "drive": {"capstan_radius": 5}}, "did you mean 'capstan_radius_mm'"),
+        ({"motors": MOTORS, "watchdog": {"command_timeout_ms": 0}}, "command_timeout_ms is 0.*; allowed: 20 to 5000 ms"),
+    ],
+)
+def test_bad_hardware_is_refused_with_file_and_key(section, complaint):
+    with pytest.raises(ConfigError, match=f"robot.yaml.*{complaint}"):
+        parse_hardware(section, source="robot.yaml", cables=("a", "b"))

@@ -1,0 +1,134 @@
+"""Recordings: BROAD's layout and rosbag2 folders are read; whatever cannot be used is refused with what was found and what is needed."""
+
+import numpy as np
+import pytest
+
+from gravcomp.recordings import Recording, RecordingError, read_recording
+
+
+def write_npz(path, **changes):
+    arrays = {
+        "gyr": np.zeros((10, 3), np.float32),
+        "acc": np.tile(np.array([0, 0, 9.81], np.float32), (10, 1)),
+        "rate": 100.0,
+        "quat": np.tile(np.array([1.0, 0, 0, 0]), (10, 1)),
+        "movement": np.ones(10, bool),
+    } | changes
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
+    return path
+
+
+def test_broads_layout_is_read_with_truth_and_stamps(tmp_path):
+    recording = read_recording(write_npz(tmp_path / "a.npz"))
+    assert recording.stamp_ns.tolist()[:3] == [0, 10_000_000, 20_000_000]
+    assert recording.rate == pytest.approx(100.0)
+    assert recording.orientation.shape == (10, 4) and recording.movement.all()
+
+
+def test_truth_is_optional(tmp_path):
+    recording = read_recording(write_npz(tmp_path / "a.npz", quat=None, movement=None))
+    assert recording.orientation is None and recording.movement is None
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"gyr": None}, "lacks gyr"),
+        ({"gyr": np.zeros((10, 4))}, r"gyr has the shape \(10, 4\); \(N, 3\)"),
+        ({"acc": np.zeros(10)}, r"acc has the shape \(10,\)"),
+        ({"acc": np.zeros((9, 3))}, "gyr has 10 samples, acc has 9"),
+        ({"acc": np.full((10, 3), np.nan)}, "accel has no finite sample among its 10"),
+        ({"gyr": np.full((10, 3), "x")}, "gyr is of type"),
+        ({"quat": np.zeros((8, 4))}, r"orientation has the shape \(8, 4\)"),
+        ({"rate": 0.0}, "rate is 0"),
+        ({"rate": np.array([1.0, 2.0])}, "one positive number in Hz"),
+        ({"movement": np.full(10, 7)}, "booleans are needed"),
+        ({"gyr": np.zeros((1, 3)), "acc": np.zeros((1, 3)), "quat": None, "movement": None}, "at least 2"),
+    ],
+)
+def test_an_unusable_npz_is_refused_with_what_was_found(tmp_path, changes, words):
+    path = write_npz(tmp_path / "bad.npz", **changes)
+    with pytest.raises(RecordingError, match=words) as refusal:
+        read_recording(path)
+    assert "bad.npz" in str(refusal.value)
+
+
+def test_files_of_other_kinds_are_refused(tmp_path):
+    (tmp_path / "text.npz").write_text("hello")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "a.csv").write_text("1,2")
+    for name, words in (("text.npz", "is not an .npz"), ("folder", "is not a bag"), ("a.csv", "neither"), ("none", "does not exist")):
+        with pytest.raises(RecordingError, match=words):
+            read_recording(tmp_path / name)
+
+
+def test_averaging_keeps_the_truth_at_the_end_of_each_window():
+    stamp = np.arange(7) * 1000
+    truth = np.arange(28.0).reshape(7, 4)
+    recording = Recording("x", stamp, np.arange(21.0).reshape(7, 3), np.ones((7, 3)), orientation=truth).averaged(3)
+    assert recording.stamp_ns.tolist() == [2000, 5000]
+    assert recording.gyro[0].tolist() == [3.0, 4.0, 5.0]
+    assert recording.orientation.tolist() == [truth[2].tolist(), truth[5].tolist()]
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_rosbag_gives_samples_temperature_and_truth_by_their_stamps(tmp_path, storage):
+    recording = read_recording(write_bag(tmp_path / "bag", storage))
+    assert recording.stamp_ns.tolist() == [10**18 + k * 10_000_000 for k in range(5)]
+    assert recording.gyro[3].tolist() == [3.0, 0.0, 0.0]
+    assert recording.accel[3].tolist() == [0.0, 0.0, 9.81]
+    assert recording.temperature.tolist() == [30.0]
+    # Every second sample has its truth; the others lie beyond half a period from it.
+    assert np.isfinite(recording.orientation[:, 0]).tolist() == [True, False, True, False, True]
+
+
+def test_a_bag_with_several_imus_wants_a_name(tmp_path):
+    bag = write_bag(tmp_path / "bag", "mcap", topics=("/a/imu/data", "/b/imu/data"))
+    with pytest.raises(RecordingError, match="/a/imu/data, /b/imu/data; name one"):
+        read_recording(bag)
+    assert len(read_recording(bag, "/b/imu/data")) == 5
+
+
+def test_a_bag_without_imu_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="no topic of type sensor_msgs/msg/Imu"):
+        read_recording(write_bag(tmp_path / "bag", "mcap", topics=()))
+
+
+def write_bag(path, storage, topics=("/robot/imu/data_raw",)):
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = store.types
+    time_, header = types["builtin_interfaces/msg/Time"], types["std_msgs/msg/Header"]
+    vector, quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
+    nine = np.zeros(9)
+
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3) as writer:
+
+        def write(connection, kind, k, **fields):
+            stamp = 10**18 + k * 10_000_000
+            head = header(stamp=time_(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="imu_link")
+            # The time of arrival differs from the stamp, and must not matter.
+            writer.write(connection, stamp + 3_000_000, store.serialize_cdr(types[kind](header=head, **fields), kind))
+
+        temperature = writer.add_connection("/robot/imu/temperature", "sensor_msgs/msg/Temperature", typestore=store)
+        truth = writer.add_connection("/robot/virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", typestore=store)
+        write(temperature, "sensor_msgs/msg/Temperature", 2, temperature=30.0, variance=0.0)
+        for topic in topics:
+            imu = writer.add_connection(topic, "sensor_msgs/msg/Imu", typestore=store)
+            for k in range(5):
+                write(
+                    imu,
+                    "sensor_msgs/msg/Imu",
+                    k,
+                    orientation=quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+                    orientation_covariance=nine,
+                    angular_velocity=vector(x=float(k), y=0.0, z=0.0),
+                    angular_velocity_covariance=nine,
+                    linear_acceleration=vector(x=0.0, y=0.0, z=9.81),
+                    linear_acceleration_covariance=nine,
+                )
+        for k in (0, 2, 4):
+            write(truth, "geometry_msgs/msg/QuaternionStamped", k, quaternion=quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+    return path

@@ -1,0 +1,207 @@
+"""The reduced model is exact where it claims to be, follows the full one, knows its range, and steps back where it has to."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.description import load_robot_file
+from gravcomp.description.robot import Elements
+from gravcomp.inverse import InverseController, straight_target
+from gravcomp.mesh import MeshError
+from gravcomp.reduction import BuildOptions, TrainingOptions, build, load, path_of, why_not
+from gravcomp.reduction.basis import energy_basis
+from gravcomp.reduction.strain_polynomials import strain_polynomials
+from gravcomp.simulation import DynamicsOptions, DynamicSimulator, RobotModel, ShapeStatus, Simulator
+
+# Little training for a coarse mesh: enough to keep this robot straight.
+SMALL = BuildOptions(
+    modes=30,
+    strains=24,
+    training=TrainingOptions(paths=24, steps=12, bend=0.3),
+    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
+)
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GRAVCOMP_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def built(robot, cache):
+    model = RobotModel(robot)
+    reduction, _ = build(model, SMALL)
+    return model, reduction
+
+
+@pytest.fixture(scope="module")
+def modes(robot):
+    """A model, three smooth modes of it and shapes that they make."""
+    model = RobotModel(robot)
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    x, y, z = model.mesh.nodes[: model.n_free].T / model.length
+    fields = [(z**2, 0 * z, -2 * x * z), (0 * z, z**3, -3 * y * z**2), (0 * z, 0 * z, z)]
+    raw = np.array([np.stack(field, axis=1).ravel() for field in fields])
+    basis = energy_basis(raw, matrix.multiply, 3)
+    shapes = np.random.default_rng(0).normal(size=(30, 3)) @ (0.1 * basis.T)
+    return model, matrix, basis, shapes
+
+
+def test_basis_is_orthonormal_in_energy_and_holds_its_snapshots(modes):
+    _, matrix, basis, shapes = modes
+    assert basis.T @ matrix.multiply(basis) == pytest.approx(np.eye(3), abs=1e-10)
+    again = energy_basis(shapes, matrix.multiply, 10)
+    assert again.shape[1] == 3
+    assert again @ (again.T @ matrix.multiply(shapes.T)) == pytest.approx(shapes.T, abs=1e-9)
+
+
+def test_with_all_strains_forces_and_stiffness_are_those_of_the_elements(modes):
+    # Three modes have nine different strains e_i and e_ij; the principal strains of thirty shapes hold all of them.
+    model, matrix, basis, shapes = modes
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=6)
+    for q in 0.1 * np.random.default_rng(1).normal(size=(3, 3)):
+        u = np.zeros_like(model.mesh.nodes)
+        model.free(u)[:] = basis @ q
+        matrix.values[:] = 0.0
+        force = basis.T @ model.free(model.elements.assemble(u, matrix))
+        own_force, own_stiffness, _ = polynomials.evaluate(q)
+        assert own_force == pytest.approx(force, rel=1e-6, abs=1e-9)
+        assert own_stiffness == pytest.approx(basis.T @ matrix.multiply(basis), rel=1e-6, abs=1e-7)
+
+
+def test_stiffness_is_the_derivative_of_the_force(modes):
+    model, _, basis, shapes = modes
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=2)
+    q, h = np.array([0.05, -0.08, 0.02]), 1e-6
+    difference = [(polynomials.evaluate(q + d)[0] - polynomials.evaluate(q - d)[0]) / (2 * h) for d in h * np.eye(3)]
+    assert polynomials.evaluate(q)[1] == pytest.approx(np.array(difference), rel=1e-6, abs=1e-8)
+
+
+def test_reduced_model_follows_the_full_one_in_the_closed_loop(built):
+    model, _ = built
+    reduced, full = Simulator(model), Simulator(RobotModel(model.robot), reduced=False)
+    controller, target = InverseController(model.robot), straight_target(model.length, tip_direction_weight=1e-3)
+    angles = np.radians(0.9) * np.arange(70)  # 90 deg/s
+    served = 0
+    for angle in angles:
+        gravity = 9.81 * np.array([-np.cos(angle), 0.6 * np.sin(angle), -0.8 * np.sin(angle)])
+        shape = reduced.step(gravity) if angle == 0.0 else reduced.step(gravity, command.displacement)
+        exact = full.step(gravity) if angle == 0.0 else full.step(gravity, command.displacement)
+        command = controller.step(
+            shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension
+        )
+        assert np.linalg.norm(shape.tip_position - exact.tip_position) < 0.1e-3  # what it may serve with; trained little
+        served += shape.model == "reduced"
+    assert served > 60
+    largest = np.abs(exact.response.compliance_ea).max()
+    assert shape.response.compliance_ea == pytest.approx(exact.response.compliance_ea, abs=0.02 * largest)
+    assert shape.tip_orientation == pytest.approx(exact.tip_orientation, abs=1e-3)
+    assert 0.0 < shape.error_estimate < 0.1e-3  # measured by now
+
+
+def test_slack_is_entered_and_left_without_chatter(built):
+    """Pulling one cable of the upright robot in and out again, it and the one opposite go taut and slack once each."""
+    model, _ = built
+    simulator = Simulator(model)
+    pull = 1.5e-3 * np.sin(np.linspace(0.0, np.pi, 61))
+    shapes = [simulator.step([0.0, 0.0, -9.81], displacement=np.array([p, 0, 0, 0, 0, 0])) for p in pull]
+    assert {(shape.model, shape.status) for shape in shapes} == {("reduced", ShapeStatus.OK)}
+    taut = np.array([shape.cable_tension > 1e-9 for shape in shapes])
+    assert np.abs(np.diff(taut.astype(int), axis=0)).sum(axis=0).tolist() == [2, 0, 0, 0, 2, 0]
+    # The way back is the way there: both within the tracker's tolerance, 5e-5 of the length.
+    tips = np.array([shape.tip_position for shape in shapes])
+    assert tips[:30] == pytest.approx(tips[:30:-1], abs=1e-5)
+
+
+def test_reduction_serves_other_moduli_in_its_range_and_no_others(built):
+    model, _ = built
+    softer = RobotModel(model.robot.with_material(youngs_modulus=0.65e6))
+    assert path_of(softer) == path_of(model)
+    gravity = np.array([-9.81, 0.0, 0.0])
+    simulator = Simulator(softer)
+    shape = [simulator.step(gravity) for _ in range(2)][-1]
+    assert shape.model == "reduced"
+    exact = Simulator(softer, reduced=False).solve(gravity)
+    assert np.linalg.norm(shape.tip_position - exact.tip_position) < 0.3e-3
+    assert load(RobotModel(model.robot.with_material(youngs_modulus=0.4e6))) is None
+    assert load(RobotModel(model.robot.with_material(poissons_ratio=0.4))) is None
+
+
+def test_full_model_serves_out_of_range_and_hands_back(built):
+    model, _ = built
+    simulator = Simulator(model)
+    simulator.step(np.array([-9.81, 0.0, 0.0]))
+    heavy = np.array([-60.0, 0.0, 0.0])
+    shape = simulator.step(heavy)
+    exact = Simulator(RobotModel(model.robot), reduced=False).solve(heavy)
+    assert (shape.model, shape.status) == ("full", ShapeStatus.FALLBACK)
+    assert "full model serves" in shape.message
+    assert shape.tip_position == pytest.approx(exact.tip_position, abs=1e-5)
+    models = [simulator.step(np.array([-9.81, 0.0, 0.0])).model for _ in range(60)]
+    assert models[-1] == "reduced"
+
+
+def test_measured_error_takes_the_reduced_model_out_of_service(built):
+    model, _ = built
+    simulator = Simulator(model)
+    serving = simulator._serving
+    # As if the basis were worn out: the elasticity of a body that is 30 % stiffer.
+    wrong = dataclasses.replace(serving.reduced.elasticity, linear=1.14 * serving.reduced.elasticity.linear)
+    serving._tracker.model = serving.reduced = dataclasses.replace(serving.reduced, elasticity=wrong)
+    serving.reset()
+    models = [simulator.step(np.array([-9.81, 0.0, 0.0])).model for _ in range(40)]
+    assert models[-1] == "full"
+    assert "off by" in serving.reason
+
+
+def test_robots_without_polynomial_strain_are_refused_with_the_reason(robot, cache):
+    neo_hookean = RobotModel(robot.with_material(law="neo_hookean"))
+    assert "neo-Hookean" in why_not(neo_hookean)
+    with pytest.raises(MeshError, match="full model serves"):
+        build(neo_hookean, SMALL)
+    cables = tuple(dataclasses.replace(cable, friction=0.1) for cable in robot.cables)
+    assert "friction" in why_not(RobotModel(dataclasses.replace(robot, cables=cables)))
+
+
+@pytest.mark.parametrize("damping", ["kelvin_voigt", "rayleigh"])
+def test_reduced_motion_is_the_full_models(built, damping):
+    """Let go from its equilibrium upside down, cables held, the robot swings; every step is the reduced model's."""
+    model, _ = built
+    options = DynamicsOptions(damping=damping, rayleigh_mass=1.0, rayleigh_stiffness=0.02)
+    movers = DynamicSimulator(model, options), DynamicSimulator(model, options, reduced=False)
+    for mover in movers:
+        mover.settle([0.0, 0.0, 9.81], np.zeros(6))
+    turned = 9.81 * np.array([-0.6, 0.3, 0.7])
+    tips = []
+    for _ in range(40):
+        own, exact = (mover.step(turned, np.zeros(6)) for mover in movers)
+        assert (own.model, own.status, exact.model) == ("reduced", ShapeStatus.OK, "full")
+        tips.append((own.tip_position, exact.tip_position))
+    own, exact = np.array(tips).transpose(1, 0, 2)
+    assert np.ptp(exact, axis=0).max() > 2e-3
+    assert np.linalg.norm(own - exact, axis=1).max() < 0.1e-3
+
+
+def test_motion_beyond_the_trained_range_is_handed_to_the_full_model_and_back(built):
+    model, _ = built
+    simulator = DynamicSimulator(model)
+    exact = DynamicSimulator(model, reduced=False)
+    gravity = [np.array([-9.81, 0.0, 0.0])] * 10 + [np.array([-60.0, 0.0, 0.0])] * 10 + [np.array([-9.81, 0.0, 0.0])] * 150
+    for mover in (simulator, exact):
+        mover.settle(gravity[0])
+    models, apart = [], []
+    for g in gravity:
+        shape = simulator.step(g)
+        models.append(shape.model)
+        apart.append(np.linalg.norm(shape.tip_position - exact.step(g).tip_position))
+    assert (models[5], models[15], models[-1]) == ("reduced", "full", "reduced")
+    assert max(apart) < 1e-3 and apart[-1] < 0.1e-3

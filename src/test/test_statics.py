@@ -1,0 +1,160 @@
+"""Static equilibrium of whole robots: balance, small loads, symmetry, cables, slack, and the linear answer."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Payload, load_robot_file
+from gravcomp.simulation import ShapeStatus, Simulator
+
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return Simulator(load_robot_file("article").robot, reduced=False)
+
+
+def test_the_clamp_carries_the_weight(simulator):
+    simulator.solve([-G, 0.0, 0.0])
+    model = simulator.model
+    force = model.elements.internal_force(simulator.displacements)
+    clamped = slice(model.n_free, None)
+    reaction = force[clamped].sum(axis=0) - model.nodal_weight[clamped].sum() * np.array([-G, 0.0, 0.0])
+    assert reaction == pytest.approx([model.mass * G, 0.0, 0.0], abs=1e-8)
+
+
+def test_small_loads_follow_euler_bernoulli(simulator):
+    tiny, robot = 1e-3 * G, simulator.robot
+    outer, inner = robot.segments[0].outer_diameter, robot.segments[0].lumen_diameter
+    stiffness = 0.8e6 * np.pi * (outer**4 - inner**4) / 64
+    load = simulator.model.mass / robot.length * tiny
+    sag = -simulator.solve([-tiny, 0.0, 0.0]).tip_position[0]
+    # Shear adds about 4 E I / (k G A L^2) = 2 %, the clamp's held lateral contraction takes a little away.
+    assert sag == pytest.approx(load * robot.length**4 / (8 * stiffness), rel=0.03)
+
+
+def test_turning_gravity_and_cables_by_120_degrees_turns_the_shape(simulator):
+    angle = np.deg2rad(120.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    gravity, tension = np.array([-6.0, 2.0, -5.0]), np.array([0.3, 0.0, 0.1, 0.2, 0.05, 0.0])
+    one = simulator.solve(gravity, tension=tension)
+    other = simulator.solve(turn @ gravity, tension=np.concatenate([np.roll(tension[:3], 1), np.roll(tension[3:], 1)]))
+    assert other.backbone_position == pytest.approx(one.backbone_position @ turn.T, abs=1e-9)
+
+
+def test_displacement_and_tension_are_two_sides_of_one_shape(simulator):
+    tension = np.array([0.3, 0.1, 0.05, 0.2, 0.1, 0.15])
+    pulled = simulator.solve([-G, 0.0, 0.0], tension=tension)
+    wound = simulator.solve([-G, 0.0, 0.0], displacement=pulled.cable_displacement)
+    assert wound.cable_tension == pytest.approx(tension, abs=1e-5)
+    assert wound.tip_position == pytest.approx(pulled.tip_position, abs=1e-7)
+
+
+def test_axially_soft_cables_are_wound_in_further():
+    robot = load_robot_file("article").robot
+    soft = dataclasses.replace(robot, cables=tuple(dataclasses.replace(c, axial_stiffness=100.0) for c in robot.cables))
+    simulator = Simulator(soft, reduced=False)
+    tension = np.full(6, 0.2)
+    shape = simulator.solve([0.0, 0.0, -G], tension=tension)
+    path = simulator.solver.state.tendons.displacement
+    assert shape.cable_displacement - path == pytest.approx(np.array([0.05] * 3 + [0.1] * 3) * 0.2 / 100.0, rel=1e-6)
+
+
+def test_released_cables_are_free(simulator):
+    released = simulator.solve([-G, 0.0, 0.0])
+    by_name = simulator.solve([-G, 0.0, 0.0], displacement=np.full(6, np.nan))
+    assert by_name.tip_position == pytest.approx(released.tip_position, abs=1e-12)
+    assert not by_name.cable_tension.any()
+
+
+def test_the_response_is_the_derivative(simulator):
+    gravity, tension, h = [-G, 0.0, 0.0], np.array([0.3, 0.05, 0.05, 0.2, 0.1, 0.05]), 1e-4
+    response = simulator.solve(gravity, tension=tension).response
+
+    def observed(tension):
+        shape = simulator.solve(gravity, tension=tension)
+        effector = [shape.tip_position, shape.tip_direction, shape.backbone_position.ravel()]
+        return shape.cable_displacement, np.concatenate(effector)
+
+    here = observed(tension)
+    assert response.compliance_aa @ tension + response.displacement_free == pytest.approx(here[0], abs=1e-9)
+    assert response.compliance_ea @ tension + response.effector_free == pytest.approx(here[1], abs=1e-7)
+    for cable in (0, 4):
+        step = h * np.eye(6)[cable]
+        more, less = observed(tension + step), observed(tension - step)
+        for compliance, one, other in zip((response.compliance_aa, response.compliance_ea), more, less):
+            difference = (one - other) / (2 * h)
+            # The response is that of the last but one iterate: equal up to what the last correction turned.
+            assert compliance[:, cable] == pytest.approx(difference, abs=1e-3 * np.abs(difference).max())
+
+
+def test_following_equals_solving(simulator):
+    simulator.reset()
+    for step in range(90):
+        angle = np.deg2rad(step)
+        gravity = -G * np.array([np.cos(angle), 0.0, np.sin(angle)])
+        shape = simulator.step(gravity, displacement=np.zeros(6))
+    assert shape.tip_position == pytest.approx(simulator.solve(gravity, displacement=np.zeros(6)).tip_position, abs=1e-6)
+
+
+def test_slack_is_entered_and_left_without_chatter(simulator):
+    """Pulling one cable of the upright robot in and out again, it and the one opposite go taut and slack once each."""
+    simulator.reset()
+    pull = 1.5e-3 * np.sin(np.linspace(0.0, np.pi, 61))
+    shapes = [simulator.step([0.0, 0.0, -G], displacement=np.array([p, 0, 0, 0, 0, 0])) for p in pull]
+    taut = np.array([shape.cable_tension > 1e-9 for shape in shapes])
+    assert np.abs(np.diff(taut.astype(int), axis=0)).sum(axis=0).tolist() == [2, 0, 0, 0, 2, 0]
+    assert all(shape.status == ShapeStatus.OK for shape in shapes)
+    # The way back is the way there: both within the solver's tolerance, a millionth of the length.
+    tips = np.array([shape.tip_position for shape in shapes])
+    assert tips[:30] == pytest.approx(tips[:30:-1], abs=2e-7)
+
+
+@pytest.mark.parametrize("law, tension", [("svk", 1.0), ("svk", 2.0), ("svk", 2.8), ("neo_hookean", 3.0), ("neo_hookean", 5.0)])
+def test_far_equilibria_are_found_from_the_straight_robot(simulator, law, tension):
+    far = simulator if law == "svk" else Simulator(simulator.robot.with_material(law=law), reduced=False)
+    shape = far.solve([-G, 0.0, 0.0], tension=np.array([tension, 0, 0, 0, 0, 0]))
+    assert shape.status == ShapeStatus.OK and shape.residual < 1e-6
+
+
+def test_a_load_beyond_the_limit_is_reported_with_its_reason(simulator):
+    """On the way to 3 N the branch ends at 2.92 N: the compressed side falls below 1 / sqrt(3) of its length, and folds."""
+    before = simulator.solve([-G, 0.0, 0.0])
+    shape = simulator.step([-G, 0.0, 0.0], tension=np.array([3.0, 0, 0, 0, 0, 0]))
+    assert shape.status == ShapeStatus.NOT_CONVERGED
+    assert "'svk' gives way" in shape.message
+    assert 2.8 < shape.cable_tension[0] < 2.93
+    after = simulator.step([-G, 0.0, 0.0])
+    assert after.status == ShapeStatus.OK and after.tip_position == pytest.approx(before.tip_position, abs=1e-6)
+
+
+def test_a_payload_is_carried(simulator):
+    robot = dataclasses.replace(simulator.robot, payload=Payload(0.002))
+    loaded = Simulator(robot, reduced=False)
+    assert loaded.model.mass == pytest.approx(simulator.model.mass + 0.002)
+    assert loaded.solve([-G, 0, 0]).tip_position[0] < simulator.solve([-G, 0, 0]).tip_position[0] - 0.01
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"tension": [1.0]}, r"tension has the shape \(1,\); \(6,\)"),
+        ({"tension": [-1.0] + [0.0] * 5}, "cannot push"),
+        ({"displacement": [np.inf] + [0.0] * 5}, "finite"),
+        ({"displacement": np.zeros(6), "tension": np.zeros(6)}, "both given"),
+    ],
+)
+def test_wrong_input_is_named(simulator, arguments, words):
+    with pytest.raises(ValueError, match=words):
+        simulator.step([0.0, 0.0, -G], **arguments)
+
+
+def test_an_unloaded_robot_at_rest_stays_there(simulator):
+    simulator.reset()
+    for displacement in (np.zeros(6), None, None):
+        shape = simulator.step(np.zeros(3), displacement)
+        assert shape.status == ShapeStatus.OK
+        assert shape.tip_position == pytest.approx([0.0, 0.0, 0.1], abs=1e-12)
+        assert np.diag(shape.response.compliance_aa).min() > 0.0

@@ -1,0 +1,280 @@
+"""The page without a browser: geometry on the backbone, the world from gravity, the plots' memory, its port."""
+
+import math
+import socket
+import types
+
+import numpy as np
+import pytest
+
+from gravcomp.config import ConfigError
+from gravcomp.description import load_robot_file
+from gravcomp.view.backbone import Backbone, arc_backbone, straight_backbone
+from gravcomp.view.colours import tension_colour
+from gravcomp.view.history import History
+from gravcomp.view.page import free_port
+from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
+from gravcomp.view.scene import SCALE
+from gravcomp.view.skin import cable_skin, joined, lumen_skin, wall_skins
+from gravcomp.view.snapshot import Snapshot, TargetView
+from gravcomp.view.status import cables_html, status_html
+from gravcomp.view.world import BaseInWorld, quaternion_wxyz
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot_file("article").robot
+
+
+def test_eleven_points_of_an_arc_are_enough_to_draw_it():
+    coarse, fine = arc_backbone(0.1, 1.2, 0.4, points=11), arc_backbone(0.1, 1.2, 0.4, points=201)
+    position, rotation = coarse.at(fine.station)
+    # A hundredth of a millimetre is below what a screen shows.
+    assert np.abs(position - fine.position).max() < 1e-5
+    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, atol=1e-9)
+    _, exact = fine.at(fine.station)
+    np.testing.assert_allclose(rotation[:, :, 2], exact[:, :, 2], atol=2e-3)
+
+
+def test_stations_beyond_the_ends_are_the_ends():
+    backbone = arc_backbone(0.1, 0.5, 0.0)
+    position, _ = backbone.at(np.array([-0.1, 1.1]))
+    np.testing.assert_allclose(position, [[0, 0, 0], backbone.tip], atol=1e-12)
+
+
+def test_quaternions_of_opposite_sign_are_the_same_frame():
+    backbone = arc_backbone(0.1, 0.8, 1.0, points=9)
+    flipped = Backbone(backbone.station, backbone.position, backbone.orientation * np.where(np.arange(9) % 2, -1.0, 1.0)[:, None])
+    stations = np.linspace(0, 1, 50)
+    for a, b in zip(backbone.at(stations), flipped.at(stations)):
+        np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+def test_walls_at_rest_have_the_robots_measures(robot):
+    straight = straight_backbone(robot.length)
+    vertices = np.concatenate([skin.on(straight) for skin in wall_skins(robot)])
+    assert np.hypot(vertices[:, 0], vertices[:, 1]).max() == pytest.approx(0.0045, rel=1e-5)
+    assert vertices[:, 2].min() == pytest.approx(0.0, abs=1e-9) and vertices[:, 2].max() == pytest.approx(0.1, rel=1e-6)
+    lumen = lumen_skin(robot).on(straight)
+    np.testing.assert_allclose(np.hypot(lumen[:, 0], lumen[:, 1]), 0.0018, rtol=1e-4)
+
+
+def test_a_bent_wall_keeps_its_distance_from_the_backbone(robot):
+    backbone = arc_backbone(robot.length, 1.0, 0.7)
+    skin = wall_skins(robot)[0]
+    centre, rotation = backbone.at(skin.station)
+    away = skin.on(backbone) - centre
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), 0.0045, rtol=1e-4)
+    np.testing.assert_allclose(np.einsum("vi,vi->v", away, rotation[:, :, 2]), 0.0, atol=1e-8)
+
+
+def test_surfaces_face_outward(robot):
+    straight = straight_backbone(robot.length)
+    for skin in wall_skins(robot):
+        v = skin.on(straight).astype(float)
+        a, b, c = (v[skin.faces[:, i]] for i in range(3))
+        normal, middle = np.cross(b - a, c - a), (a + b + c) / 3
+        side = np.abs(normal[:, 2]) < 1e-3 * np.linalg.norm(normal, axis=1)
+        assert (np.einsum("fi,fi->f", normal[side, :2], middle[side, :2]) > 0.0).all()
+
+
+def test_a_cable_runs_at_its_angle_to_the_end_of_its_segment(robot):
+    for cable in robot.cables:
+        vertices = cable_skin(robot, cable).on(straight_backbone(robot.length))
+        middle = vertices.reshape(-1, 8, 3).mean(axis=1)
+        np.testing.assert_allclose(middle[:, :2], np.tile(0.00315 * np.array([math.cos(cable.angle), math.sin(cable.angle)]), (len(middle), 1)), atol=1e-7)
+        assert middle[-1, 2] == pytest.approx(robot.cable_end(cable))
+
+
+def test_joined_skins_are_deformed_as_each_alone(robot):
+    skins = [*wall_skins(robot), lumen_skin(robot), cable_skin(robot, robot.cables[3])]
+    together, parts = joined(skins)
+    backbone = arc_backbone(robot.length, 0.9, -0.3)
+    vertices = together.on(backbone)
+    for skin, part in zip(skins, parts):
+        np.testing.assert_allclose(vertices[part], skin.on(backbone), atol=1e-8)
+
+
+def test_gravity_points_down_whatever_it_does():
+    world, random = BaseInWorld(), np.random.default_rng(1)
+    gravity = np.array([-9.81, 0.0, 0.0])
+    for _ in range(500):
+        gravity = gravity + random.normal(0.0, 1.5, 3)
+        rotation = world.follow(gravity)
+        np.testing.assert_allclose(rotation @ gravity / np.linalg.norm(gravity), [0, 0, -1], atol=1e-9)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
+
+
+def test_the_robot_passes_the_vertical_without_turning_round():
+    """Tilted from 30 to 150 degrees, the horizontal axis across the robot stays where it is."""
+    world = BaseInWorld()
+    for inclination in np.radians(np.arange(30.0, 150.0, 1.0)):
+        rotation = world.follow(9.81 * np.array([-math.cos(inclination), 0.0, -math.sin(inclination)]))
+        np.testing.assert_allclose(rotation[:, 1], [0, -1, 0], atol=1e-6)
+
+
+def test_no_gravity_changes_nothing():
+    world = BaseInWorld()
+    before = world.follow(np.array([0.0, -9.81, 0.0])).copy()
+    np.testing.assert_array_equal(world.follow(np.zeros(3)), before)
+
+
+def test_quaternions_give_the_rotation_back():
+    random = np.random.default_rng(2)
+    for _ in range(20):
+        q = random.normal(size=4)
+        q /= np.linalg.norm(q) * np.sign(q[0])
+        w, x, y, z = q
+        rotation = Backbone(np.array([0.0, 1.0]), np.array([[0, 0, 0], [0, 0, 1.0]]), np.array([[x, y, z, w]] * 2)).at(np.array([0.0]))[1][0]
+        np.testing.assert_allclose(quaternion_wxyz(rotation), q, atol=1e-7)
+
+
+def test_the_plots_remember_their_window_and_no_more():
+    history = History(1, window=2.0, rate=20.0)
+    for i in range(1000):
+        history.add(i * 0.05, np.array([float(i)]))
+    time, value = history.columns()
+    assert time[-1] == 0.0 and time[0] == pytest.approx(-2.0) and len(time) == 41
+    assert value[-1] == 999.0 and value[0] == 959.0
+
+
+def test_a_time_that_goes_back_begins_the_plots_anew():
+    history = History(1, window=2.0, rate=20.0)
+    for t in (10.0, 11.0, 5.0):
+        history.add(t, np.array([t]))
+    assert history.columns()[1].tolist() == [5.0]
+
+
+def test_errors_are_distances_to_the_target(robot):
+    target = TargetView(np.array([0.0, 0.0, 0.1]))
+    snapshot = Snapshot(time=0.0, backbone=arc_backbone(0.1, 0.5, 0.0), truth=straight_backbone(0.1), target=target)
+    assert snapshot.tip_error == pytest.approx(np.linalg.norm(arc_backbone(0.1, 0.5, 0.0).tip - [0, 0, 0.1]))
+    assert snapshot.true_tip_error == pytest.approx(0.0, abs=1e-12)
+    assert math.isnan(Snapshot(time=0.0).tip_error)
+
+
+def test_words_from_the_graph_cannot_become_markup(robot):
+    snapshot = Snapshot(time=0.0, status="<script>alert(1)</script>", tension=np.zeros(6), displacement=np.zeros(6))
+    assert "<script>" not in status_html(snapshot)
+    assert "<b>" not in cables_html(snapshot, ("<b>",) * 6)
+
+
+def test_colours_of_tension_run_from_dark_to_bright():
+    brightness = [sum(tension_colour(t)) for t in np.linspace(0.0, 1.0, 11)]
+    assert all(a < b for a, b in zip(brightness, brightness[1:]))
+    assert tension_colour(-1.0) == tension_colour(0.0) and tension_colour(9.0) == tension_colour(1.0)
+
+
+def test_the_next_free_port_is_taken():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert port < free_port("127.0.0.1", port) <= port + 50
+
+
+def test_an_address_that_is_not_this_machines_is_refused():
+    with pytest.raises(ConfigError, match="host is '203.0.113.7'; an address of this machine is needed"):
+        free_port("203.0.113.7", 8080)
+
+
+class Clicks:
+    """A page's controls, worked as a browser works them."""
+
+    def __init__(self, robot):
+        from gravcomp.view.options import PageOptions
+        from gravcomp.view.page import Page
+
+        self.page = Page(robot, PageOptions(port=8890))
+        self.controls, self.scene = self.page._controls, self.page._scene
+
+    def set(self, handle, value=None) -> list:
+        """Give a control a value (a button none), and what was asked for by it."""
+        if value is not None:
+            handle._impl.value = value
+        for callback in handle._impl.update_cb:
+            callback(types.SimpleNamespace(client=object(), target=handle))
+        return self.page.requests()
+
+    def handle(self, label: str):
+        """The control of that label."""
+        (found,) = [h for h in self.page._server.gui._gui_input_handle_from_uuid.values() if getattr(h, "label", None) == label]
+        return found
+
+
+@pytest.fixture
+def clicks(robot):
+    clicks = Clicks(robot)
+    yield clicks
+    clicks.page.close()
+
+
+def test_sliders_set_target_and_tilt(clicks):
+    clicks.set(clicks.handle("bend °"), 40.0)
+    assert clicks.set(clicks.handle("plane °"), 90.0) == [SetTarget(math.radians(40.0), math.radians(90.0))]
+    assert clicks.set(clicks.handle("inclination °"), -45.0) == [TiltBase(math.radians(-45.0), 0.0)]
+    assert clicks.set(clicks.handle("presets"), "135°") == [TiltBase(math.radians(135.0), 0.0)]
+    assert clicks.set(clicks.handle("Straight")) == [SetTarget(0.0, math.radians(90.0))]
+
+
+def test_a_dragged_handle_asks_for_the_arc_through_it(clicks, robot):
+    asked = arc_backbone(robot.length, math.radians(50.0), math.radians(-30.0))
+    gizmo = clicks.scene.gizmo
+    gizmo.position = SCALE * asked.tip
+    for callback in gizmo._impl_aux.update_cb:
+        callback(types.SimpleNamespace(client=object(), target=gizmo))
+    (request,) = clicks.page.requests()
+    assert math.degrees(request.angle) == pytest.approx(50.0, abs=0.01) and math.degrees(request.plane) == pytest.approx(-30.0, abs=0.01)
+    # The sliders follow the hand.
+    assert clicks.handle("bend °").value == pytest.approx(50.0, abs=0.1)
+
+
+def test_the_handle_appears_when_it_is_asked_for(clicks):
+    assert not clicks.scene.gizmo.visible
+    clicks.set(clicks.handle("drag the target"), True)
+    assert clicks.scene.gizmo.visible
+
+
+def test_buttons_say_what_they_do(clicks):
+    for label, mode in (("Compensate", "compensate"), ("Hold", "hold"), ("Release", "relax")):
+        assert clicks.set(clicks.handle("cables"), label) == [Compensate(mode)]
+    assert clicks.set(clicks.handle("motors"), "Stop") == [BridgeService("stop")]
+    assert clicks.set(clicks.handle("Record a bag")) == [Record(True)]
+    clicks.controls.show_recording(True)
+    assert clicks.set(clicks.handle("Stop recording")) == [Record(False)]
+
+
+def test_every_fault_that_is_offered_is_one_of_the_virtual_robot(clicks, robot):
+    import yaml
+
+    from gravcomp.virtual.faults import Fault
+
+    kinds = clicks.handle("fault")
+    clicks.set(clicks.handle("cable"), robot.cable_names[4])
+    for option in kinds.options:
+        clicks.set(kinds, option)
+        (request,) = clicks.set(clicks.handle("Inject"))
+        fault = Fault.parse(yaml.safe_load(request.text), "page")
+        assert fault.duration == 2.0
+        assert fault.cable == (robot.cable_names[4] if "the cable" in option else "")
+    assert clicks.set(clicks.handle("Clear all")) == [InjectFault("clear")]
+
+
+def test_light_graphics_leave_out_what_a_processor_draws_slowly(clicks):
+    scene = clicks.scene
+    assert scene._key.cast_shadow and scene._rim.visible and not scene._sky.visible
+    clicks.set(clicks.handle("graphics"), "light")
+    assert not scene._key.cast_shadow and not scene._rim.visible and scene._sky.visible
+    clicks.set(clicks.handle("graphics"), "full")
+    assert scene._key.cast_shadow and not scene._sky.visible
+
+
+def test_a_lumen_is_drawn_where_there_is_one(robot):
+    from gravcomp.view.options import LumenOptions, PageOptions
+    from gravcomp.view.page import Page
+
+    for lumen, there in ((LumenOptions(diameter=0.03, bend=0.5), True), (LumenOptions(), False)):
+        page = Page(robot, PageOptions(port=8890, lumen=lumen))
+        names = [name for name in page._server.scene._handle_from_node_name if "lumen_wall" in name]
+        page.close()
+        assert bool(names) == there

@@ -1,0 +1,133 @@
+"""The IMU board of the virtual robot: its frames, its errors, its heater."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from gravcomp.canbus.bmi088 import STANDARD_GRAVITY, accelerometer_scale, gyroscope_scale
+from gravcomp.canbus.codec import decode
+from gravcomp.thermal.plant import ThermalPlantOptions
+from gravcomp.virtual.board import VirtualBoard
+from gravcomp.virtual.parameters import Board
+
+UP = np.array([0.0, 0.0, STANDARD_GRAVITY])
+PERFECT = {
+    "accelerometer_noise": 0.0,
+    "gyroscope_noise": 0.0,
+    "accelerometer_bias": 0.0,
+    "accelerometer_scale": 0.0,
+    "accelerometer_drift": 0.0,
+    "gyroscope_bias": 0.0,
+    "gyroscope_drift": 0.0,
+    "gyroscope_walk": 0.0,
+    "clock_error": 0.0,
+}
+
+
+def board(seed=1, **changes) -> VirtualBoard:
+    return VirtualBoard(dataclasses.replace(Board(), **changes), np.random.default_rng(seed))
+
+
+def samples(board, count, rate=(0.0, 0.0, 0.0), force=UP, recorded=False):
+    """Specific force (count, 3), angular rate (count, 3) and the ImuTime values as a host reads them."""
+    forces, rates, times = [], [], []
+    for _ in range(count):
+        acceleration, gyroscope, time = (
+            decode(frame).values for frame in board.sample(np.array(rate), np.array(force), recorded)
+        )
+        assert acceleration.sequence == gyroscope.sequence == time.sequence
+        forces.append(np.array(acceleration[:3]) * accelerometer_scale(Board().accelerometer_range))
+        rates.append(np.array(gyroscope[:3]) * gyroscope_scale(Board().gyroscope_range))
+        times.append(time)
+    return np.array(forces), np.array(rates), times
+
+
+def test_a_perfect_board_differs_by_half_a_count_only():
+    force, rate, _ = samples(board(**PERFECT), 5, rate=(0.1, -0.2, 0.3), force=(1.0, 2.0, 9.0))
+    np.testing.assert_allclose(force, [[1.0, 2.0, 9.0]] * 5, atol=accelerometer_scale(1) / 2 * 1.001)
+    np.testing.assert_allclose(rate, [[0.1, -0.2, 0.3]] * 5, atol=gyroscope_scale(0) / 2 * 1.001)
+
+
+def test_noise_is_that_of_the_data_sheet():
+    force, rate, _ = samples(board(gyroscope_walk=0.0), 4000)
+    p = Board()
+    # 4000 samples: the standard deviation is known to 1.1 %; the quantisation adds 4 % of variance.
+    assert force.std(axis=0) == pytest.approx(p.accelerometer_noise * STANDARD_GRAVITY * math.sqrt(p.bandwidth), rel=0.06)
+    assert rate.std(axis=0) == pytest.approx(p.gyroscope_noise * math.sqrt(p.bandwidth), rel=0.06)
+
+
+def test_the_gyroscope_drifts_by_0_015_deg_s_a_kelvin():
+    quiet = PERFECT | {"gyroscope_drift": Board().gyroscope_drift}
+    means = [samples(board(**quiet, thermal=ThermalPlantOptions(ambient=t)), 10)[1].mean(axis=0) for t in (20.0, 40.0)]
+    np.testing.assert_allclose(np.abs(means[1] - means[0]), math.radians(0.015) * 20.0, atol=gyroscope_scale(0) * 1.001)
+
+
+def test_a_recorded_sample_keeps_its_own_errors():
+    force, rate, _ = samples(board(), 3, rate=(0.1, 0.0, 0.0), force=(0.0, 1.0, 9.7), recorded=True)
+    np.testing.assert_allclose(force, [[0.0, 1.0, 9.7]] * 3, atol=accelerometer_scale(1))
+    np.testing.assert_allclose(rate, [[0.1, 0.0, 0.0]] * 3, atol=gyroscope_scale(0))
+
+
+def test_sequence_and_time_run_on_and_begin_anew_after_a_restart():
+    b = board(**PERFECT)
+    _, _, times = samples(b, 300)
+    assert [t.sequence for t in times] == [i % 256 for i in range(300)]
+    assert times[-1].time == pytest.approx(3_000_000, abs=2)
+    b.restart()
+    _, _, times = samples(b, 1)
+    assert times[0].sequence == 0 and times[0].time == pytest.approx(10_000, abs=2)
+
+
+def test_temperature_is_renewed_every_1_28_seconds_in_eighths_of_a_degree():
+    b = board()
+    readings = []
+    for _ in range(1000):
+        b.command_heater(1.0)
+        readings.append(samples(b, 1)[2][0].temperature)
+    changes = np.flatnonzero(np.diff(readings))
+    assert len(changes) >= 5 and (np.diff(changes) >= 127).all()
+    assert all(reading % 0.125 == 0 for reading in readings)
+    assert readings[-1] == pytest.approx(b.temperature, abs=1.0)
+
+
+def test_the_heater_goes_off_without_commands_and_above_65_degrees():
+    b = board()
+    b.command_heater(0.5)
+    samples(b, 10)
+    status = decode(b.status()).values
+    assert status.heater_duty == pytest.approx(0.5, abs=0.003) and status.flags == 0
+    samples(b, 60)
+    status = decode(b.status()).values
+    assert status.heater_duty == 0 and status.flags == 4
+    hot = board(thermal=ThermalPlantOptions(ambient=20.0, rise=80.0, time_constant=5.0))
+    seen = []
+    for _ in range(3000):
+        hot.command_heater(1.0)
+        samples(hot, 1)
+        seen.append(hot.temperature)
+    assert 64.9 < max(seen) < 65.3
+    assert min(seen[2000:]) > 59.5
+
+
+def test_faults_of_imu_and_heater_show_in_the_frames():
+    b = board()
+    b.imu_fault = "stuck"
+    force, rate, times = samples(b, 3)
+    assert (np.ptp(force, axis=0) == 0).all() and (np.ptp(rate, axis=0) == 0).all()
+    assert [t.sequence for t in times] == [0, 1, 2]
+    b.imu_fault = "saturated"
+    assert np.abs(samples(b, 1)[1]).min() == pytest.approx(math.radians(2000), rel=1e-4)
+    b.imu_fault = "invalid"
+    assert decode(b.sample(np.zeros(3), UP, False)[0]).values[:3] == (-32768,) * 3
+    b.imu_fault = "silent"
+    assert b.sample(np.zeros(3), UP, False) == []
+    assert decode(b.status()).values.flags & 1
+    dead = board()
+    dead.heater_fault = "dead"
+    for _ in range(500):
+        dead.command_heater(1.0)
+        samples(dead, 1)
+    assert dead.temperature == pytest.approx(ThermalPlantOptions().ambient)
+    assert decode(dead.status()).values.heater_duty == 1.0

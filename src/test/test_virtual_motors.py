@@ -1,0 +1,122 @@
+"""Motors, gears and capstans of the virtual robot."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from virtual_article import article
+
+from gravcomp.virtual.motors import TICK, MotorBank
+from gravcomp.virtual.parameters import Motors
+
+SPRING = np.full(6, 3000.0)
+
+
+def bank(slack=0.0, directions=(1,) * 6, **changes) -> MotorBank:
+    _, hardware = article()
+    motors = tuple(dataclasses.replace(motor, direction=d) for motor, d in zip(hardware.motors, directions))
+    hardware = dataclasses.replace(hardware, motors=motors)
+    return MotorBank(dataclasses.replace(Motors(), **changes), hardware, np.full(6, slack), np.random.default_rng(1))
+
+
+def run(motors, seconds, shortened=0.0):
+    motors.step(round(seconds / TICK), np.full(6, shortened), SPRING)
+
+
+def test_the_last_current_is_kept_for_ever():
+    motors = bank(slack=10.0)
+    motors.commanded[:] = 0.5
+    run(motors, 1.0)
+    speed = motors.feedback()[0]["speed"]
+    run(motors, 5.0)
+    assert motors.feedback()[0]["speed"] >= speed > 1000
+    assert motors.feedback()[0]["current"] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_current_below_friction_does_not_move_and_above_does():
+    friction_current = Motors().friction_torque / (Motors().torque_constant / 36)
+    motors = bank(slack=10.0, capstan_drag=0.0)
+    motors.commanded[0], motors.commanded[1] = 0.9 * friction_current, 1.1 * friction_current
+    run(motors, 0.5)
+    assert motors.wound[0] == pytest.approx(-10.0, abs=1e-9)
+    assert motors.wound[1] > -10.0 + 1e-5
+
+
+def test_cable_force_and_current_balance_at_the_capstan():
+    motors = bank(backlash=0.0)
+    motors.commanded[:] = 0.4
+    run(motors, 3.0)
+    tension = 3000.0 * motors.wound[0]
+    p = Motors()
+    friction = p.friction_torque * 36 / p.capstan_radius
+    wanted = (0.4 * p.torque_constant / p.capstan_radius - friction) / (1 + p.load_friction)
+    # Winding in, friction keeps part of the torque; an overshoot can only leave more tension than that.
+    assert wanted * 0.99 < tension < (0.4 * p.torque_constant / p.capstan_radius + friction) / (1 - p.load_friction)
+
+
+def test_backlash_shows_only_when_the_cable_is_slack():
+    backlash = math.radians(2.0)
+    motors = bank(slack=5.0, backlash=backlash)
+    motors.commanded[0] = 0.3
+    run(motors, 0.3)
+    motors.commanded[0] = 0.0
+    run(motors, 2.0)
+    wound, angle = motors.wound[0], motors._rotor[0] / 36
+    motors.commanded[0] = -0.3
+    while motors._rotor[0] / 36 > angle - 0.9 * backlash:
+        run(motors, TICK)
+    assert motors.wound[0] == wound, "the gear turns inside its backlash"
+    run(motors, 1.0)
+    turned = angle - motors._rotor[0] / 36
+    assert wound - motors.wound[0] == pytest.approx((turned - backlash) * Motors().capstan_radius, rel=1e-6)
+
+    taut = bank(backlash=backlash)
+    taut.commanded[0] = 0.4
+    run(taut, 2.0)
+    wound, angle = taut.wound[0], taut._rotor[0] / 36
+    taut.commanded[0] = 0.1
+    run(taut, 0.3)
+    turned = angle - taut._rotor[0] / 36
+    assert wound - taut.wound[0] == pytest.approx(turned * Motors().capstan_radius, abs=1e-9)
+
+
+def test_feedback_counts_the_rotor_wraps_at_8192_and_has_the_motors_own_sense():
+    motors = bank(slack=10.0, directions=(1, -1, 1, 1, 1, 1))
+    start = [motors.feedback()[i]["angle"] for i in range(2)]
+    motors.commanded[0], motors.commanded[1] = 0.3, -0.3
+    travelled, last, wraps = np.zeros(2), list(start), 0
+    for _ in range(500):
+        run(motors, 1e-3)
+        for i in range(2):
+            angle = motors.feedback()[i]["angle"]
+            assert 0 <= angle < 8192
+            step = (angle - last[i] + 4096) % 8192 - 4096
+            wraps += abs(angle - last[i]) > 4096
+            travelled[i] += step
+            last[i] = angle
+    assert wraps > 10
+    assert travelled[0] > 0 > travelled[1]
+    wound = motors.wound[:2] + 10.0
+    np.testing.assert_allclose(wound, abs(travelled) / 8192 / 36 * 2 * math.pi * Motors().capstan_radius, atol=1e-4)
+    assert motors.feedback()[0]["speed"] > 0 > motors.feedback()[1]["speed"]
+
+
+def test_currents_beyond_ten_amperes_and_speeds_beyond_the_motors_are_not_reached():
+    motors = bank(slack=100.0)
+    motors.commanded[:] = 32.0
+    run(motors, 2.0)
+    assert motors.feedback()[0]["speed"] * 2 * math.pi / 60 < Motors().no_load_speed
+    assert abs(motors.feedback()[0]["current"]) < 10.0
+
+
+def test_a_stalled_rotor_stands_and_an_encoder_jumps():
+    motors = bank(slack=10.0)
+    motors.commanded[:] = 0.5
+    motors.stalled[2] = True
+    run(motors, 0.5)
+    assert motors.wound[2] == -10.0 and motors.feedback()[2]["speed"] == 0
+    assert motors.wound[1] > -10.0
+    before = motors.feedback()[2]["angle"]
+    motors.jump(np.arange(6) == 2)
+    assert (motors.feedback()[2]["angle"] - before) % 8192 == 8192 // 3

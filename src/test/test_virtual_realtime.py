@@ -1,0 +1,82 @@
+"""The virtual robot on a bus at the pace of the clock."""
+
+import threading
+
+import can
+import pytest
+from virtual_article import virtual_robot
+
+from gravcomp.canbus.bus import BusError
+from gravcomp.canbus.codec import decode, encode
+from gravcomp.description.hardware import CanInterface
+from gravcomp.virtual.realtime import RealtimeRobot
+
+
+class Truths:
+    """What the robot told last, and waiting for what it shall tell."""
+
+    def __init__(self):
+        self.last = None
+        self._arrived = threading.Condition()
+
+    def __call__(self, truth):
+        with self._arrived:
+            self.last = truth
+            self._arrived.notify()
+
+    def wait(self, condition=lambda truth: True):
+        with self._arrived:
+            self.last = None
+            assert self._arrived.wait_for(lambda: self.last is not None and condition(self.last), timeout=20.0)
+
+
+@pytest.fixture
+def running(request):
+    truths = Truths()
+    live = RealtimeRobot(virtual_robot(), CanInterface("virtual", request.node.name), truths, truth_rate=100.0)
+    with can.Bus(interface="virtual", channel=request.node.name) as bus:
+        live.start()
+        yield live, bus, truths
+        live.stop()
+
+
+def test_frames_go_out_and_commands_come_in(running):
+    live, bus, truths = running
+    truths.wait()
+    # The status comes every 100 ms, among some 320 other frames.
+    seen = {decode(bus.recv(5.0)).name for _ in range(700)}
+    assert seen >= {"MotorFeedback1", "MotorFeedback6", "ImuAccelerometer", "ImuGyroscope", "ImuTime", "BoardStatus"}
+    bus.send(encode("MotorCommand1to4", current_1=0.25, current_2=0.0, current_3=0.0, current_4=0.0))
+    bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=b"noise"))
+    truths.wait(lambda truth: truth.current[0] == 0.25)
+    assert live.error is None and live.robot.refused == 0, "frames for others do not get past the filter"
+
+
+def test_after_stop_nothing_is_sent_and_a_new_start_goes_on(running):
+    live, bus, truths = running
+    truths.wait()
+    live.stop()
+    time = live.robot.time
+    while bus.recv(0.0) is not None:
+        pass
+    assert bus.recv(0.05) is None
+    live.start()
+    truths.wait(lambda truth: truth.time > time)
+
+
+def test_an_error_in_the_thread_is_kept_for_the_node(running):
+    live, _, truths = running
+    truths.wait()
+
+    def broken(*_):
+        raise RuntimeError("broken on purpose")
+
+    with live.lock:
+        live.robot.step = broken
+    live._thread.join(timeout=20.0)
+    assert str(live.error) == "broken on purpose"
+
+
+def test_a_bus_that_does_not_exist_is_refused_in_words():
+    with pytest.raises(BusError, match="nosuch"):
+        RealtimeRobot(virtual_robot(), CanInterface("nosuch", "0"), lambda truth: None, 100.0).start()

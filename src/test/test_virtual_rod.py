@@ -1,0 +1,209 @@
+"""The rod at rest: against three-dimensional finite elements, and its derivatives against finite differences."""
+
+import csv
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_article import article, horizontal, reference_robot, with_body
+
+import gravcomp
+from gravcomp.config import ConfigError
+from gravcomp.description.robot import MeshBody
+from gravcomp.virtual.body import build_rod
+from gravcomp.virtual.equilibrium import advance, equilibrium
+from gravcomp.virtual.parameters import VirtualRobotParameters
+from gravcomp.virtual.rod import assemble, newton_step, strains, tendon_lengths
+from gravcomp.virtual.se3 import motion_exp, motion_log
+
+TABLE = Path(gravcomp.__file__).parent / "experiments" / "calculix_h20r.csv"
+
+
+def rows(material):
+    with TABLE.open() as file:
+        return [row for row in csv.DictReader(file) if row["material"] == material]
+
+
+def rod(**changes):
+    return build_rod(reference_robot(), with_body(**({"density": 1150.0, "poissons_ratio": 0.45} | changes)))
+
+
+def forces(model, orientation, position, tension):
+    """Residual of the free cross-sections, band, gradient and path lengths at a state."""
+    n, m = model.elements, model.tendons
+    strain, path, direction = np.empty((n, 6)), np.empty((m, n)), np.zeros((m, n, 3))
+    gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
+    strains(orientation, position, model.length, strain)
+    tendon_lengths(strain, model.length, model.tendon_offset, model.tendon_start, model.tendon_end, direction, path)
+    residual = assemble(
+        orientation,
+        model.length,
+        strain,
+        model.stiffness,
+        np.zeros((n, 6)),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros((n, 2)),
+        model.tendon_offset,
+        model.tendon_start,
+        model.tendon_end,
+        direction,
+        path,
+        tension,
+        np.ones((m, n)),
+        model.mass[:, None] * horizontal(),
+        gradient,
+        pull,
+        band,
+    )
+    return residual[1:].ravel(), band, gradient, pull, path.sum(axis=1)
+
+
+@pytest.mark.parametrize("material", ["svk", "nh"])
+def test_tip_agrees_with_calculix_without_cables(material):
+    # The rod's law is linear in its strains and lies between the two laws of the table, which differ by up to 0.48 mm.
+    worst = 0.0
+    for row in rows(material):
+        inclination = math.radians(float(row["incl_deg"]))
+        model = rod(youngs_modulus=float(row["E_MPa"]) * 1e6, poissons_ratio=float(row["nu"]))
+        shape = equilibrium(model, 9.81 * np.array([-math.cos(inclination), 0.0, -math.sin(inclination)]))
+        reference = np.array([float(row["tip_ux_mm"]), 0.0, float(row["tip_uz_mm"])])
+        worst = max(worst, float(np.linalg.norm(shape.tip * 1e3 - [0.0, 0.0, 100.0] - reference)))
+    assert worst < 0.3
+
+
+def test_solution_converges_with_the_second_order_of_the_element_length():
+    # Without Poisson's effect: the correction at the clamp belongs to a point and is spread over the first element.
+    sizes = (10e-3, 5e-3, 2.5e-3, 0.625e-3)
+    tips = [equilibrium(rod(element_length=size, poissons_ratio=0.0), horizontal()).tip for size in sizes]
+    errors = [float(np.linalg.norm(tip - tips[-1])) for tip in tips[:-1]]
+    assert errors[0] / errors[1] > 3.3
+    assert errors[1] / errors[2] > 3.3
+
+
+def test_exponential_and_logarithm_of_motions_are_inverse():
+    random = np.random.default_rng(4)
+    for scale in (1e-9, 1e-3, 0.1, 1.0, 1.8):
+        xi = scale * random.standard_normal(6)
+        xi[3:] *= min(1.0, 3.1 / float(np.linalg.norm(xi[3:])))
+        rotation, translation, back = np.empty((3, 3)), np.empty(3), np.empty(6)
+        motion_exp(xi, rotation, translation)
+        motion_log(rotation, translation, back)
+        np.testing.assert_allclose(back, xi, atol=1e-9)
+
+
+def test_tangent_and_tendon_gradient_agree_with_finite_differences():
+    model = rod(element_length=10e-3)
+    tension = np.array([0.3, 0.0, 0.0, 0.1, 0.0, 0.2])
+    shape = equilibrium(model, horizontal(), tension=tension)
+    _, band, gradient, _, _ = forces(model, shape.orientation, shape.position, tension)
+    size = 6 * model.elements
+    tangent, numeric, lengths = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, model.tendons))
+    for i in range(size):
+        for j in range(max(0, i - 11), min(size, i + 12)):
+            tangent[i, j] = band[i, j - i + 11]
+    step = 1e-6
+    for k in range(size):
+        sides = []
+        for sign in (1.0, -1.0):
+            orientation, position = shape.orientation.copy(), shape.position.copy()
+            xi, turn, shift = np.zeros(6), np.empty((3, 3)), np.empty(3)
+            xi[k % 6] = sign * step
+            motion_exp(xi, turn, shift)
+            advance(orientation[1 + k // 6], position[1 + k // 6], turn, shift, np.empty((3, 3)))
+            sides.append(forces(model, orientation, position, tension))
+        numeric[:, k] = (sides[0][0] - sides[1][0]) / (2 * step)
+        lengths[k] = (sides[0][4] - sides[1][4]) / (2 * step)
+    np.testing.assert_allclose(gradient, lengths, atol=1e-6)
+    # The turning of the stress is kept to first order in the strain: the tangent is good to 1 %, the residual exact.
+    scale = np.sqrt(np.abs(np.diag(numeric)))
+    assert np.max(np.abs(tangent - numeric) / np.outer(scale, scale)) < 0.01
+
+
+def test_newton_step_solves_with_the_tendons_springs():
+    model = rod(element_length=10e-3)
+    shape = equilibrium(model, horizontal())
+    residual, band, gradient, pull, _ = forces(model, shape.orientation, shape.position, np.full(6, 0.1))
+    spring = np.array([2000.0, 0.0, 500.0, 0.0, 1000.0, 0.0])
+    size = 6 * model.elements
+    matrix = (pull * spring) @ gradient.T
+    for i in range(size):
+        for j in range(max(0, i - 11), min(size, i + 12)):
+            matrix[i, j] += band[i, j - i + 11]
+    full = np.concatenate([np.zeros((1, 6)), residual.reshape(-1, 6)])
+    increment = newton_step(band, full, gradient, pull, spring)
+    np.testing.assert_allclose(increment, -np.linalg.solve(matrix, residual), rtol=1e-6, atol=1e-12)
+
+
+def test_one_tendon_bends_a_weightless_rod_into_a_circle_of_the_right_curvature():
+    model = rod()
+    tension = np.array([0.0, 0.0, 0.0, 0.0, 0.2, 0.0])  # s2c2, at 180 deg plus the true offset
+    shape = equilibrium(model, np.zeros(3), tension=tension)
+    strain = np.empty((model.elements, 6))
+    strains(shape.orientation, shape.position, model.length, strain)
+    radius, bending, axial = float(np.linalg.norm(model.tendon_offset[4])), model.stiffness[5, 3], model.stiffness[5, 2]
+    np.testing.assert_allclose(np.hypot(strain[1:, 3], strain[1:, 4]), 0.2 * radius / bending, rtol=0.01)
+    np.testing.assert_allclose(strain[1:, 2], 1.0 - 0.2 / axial, atol=1e-4)
+    shortened = 0.1 * (0.2 / axial + 0.2 * radius**2 / bending)
+    assert shape.displacement[4] == pytest.approx(shortened, rel=0.02)
+
+
+def test_displacement_and_the_tension_it_makes_give_the_same_shape():
+    model = rod()
+    wound = np.array([1e-3, -8e-3, -8e-3, 1.5e-3, -8e-3, -8e-3])
+    by_displacement = equilibrium(model, horizontal(), displacement=wound)
+    by_tension = equilibrium(model, horizontal(), tension=by_displacement.tension)
+    np.testing.assert_allclose(by_displacement.tip, by_tension.tip, atol=1e-8)
+    assert (by_displacement.tension[[1, 2, 4, 5]] == 0.0).all()
+
+
+def test_cables_paid_out_carry_nothing_and_change_nothing():
+    model = rod()
+    free, slack = equilibrium(model, horizontal()), equilibrium(model, horizontal(), displacement=np.full(6, -8e-3))
+    assert (slack.tension == 0.0).all()
+    np.testing.assert_allclose(slack.tip, free.tip, atol=1e-9)
+
+
+def test_cables_held_at_the_straight_length_hold_the_robot_up():
+    model = rod()
+    held = equilibrium(model, horizontal(), displacement=np.zeros(6))
+    assert held.tip[0] > 0.6 * equilibrium(model, horizontal()).tip[0]
+    assert held.tension.max() > 0.1
+
+
+def test_every_gravity_and_displacement_has_an_equilibrium_that_is_found():
+    model, random = rod(), np.random.default_rng(0)
+    for _ in range(200):
+        gravity = random.standard_normal(3)
+        shape = equilibrium(model, 9.81 * gravity / np.linalg.norm(gravity), displacement=random.uniform(-6e-3, 2.5e-3, 6))
+        assert (shape.tension >= 0.0).all() and np.linalg.norm(shape.tip) < 0.101
+
+
+def test_element_ends_meet_segments_caps_and_cables():
+    robot, _ = article()
+    model = build_rod(
+        dataclasses.replace(robot, segments=(robot.segments[0], dataclasses.replace(robot.segments[1], length=80e-3))),
+        VirtualRobotParameters(),
+    )
+    np.testing.assert_allclose(model.length.sum(), 0.13)
+    np.testing.assert_allclose(model.tendon_length, [0.05] * 3 + [0.13] * 3)
+
+
+def test_robots_that_no_rod_can_be_are_refused():
+    robot, _ = article()
+    with pytest.raises(ConfigError, match="body from a file"):
+        build_rod(dataclasses.replace(robot, segments=(), cables=(), body=MeshBody("a.stl", 0.1)), VirtualRobotParameters())
+    bent = dataclasses.replace(
+        robot.cables[0], angle=None, radius=None, segment=None, via_points=((3e-3, 0.0, 0.0), (3e-3, 0.0, 0.05))
+    )
+    with pytest.raises(ConfigError, match="s1c1.*via_points_mm"):
+        build_rod(dataclasses.replace(robot, cables=(bent, *robot.cables[1:])), VirtualRobotParameters())
+
+
+def test_values_of_the_wrong_shape_are_refused():
+    with pytest.raises(ValueError, match="6 finite values"):
+        equilibrium(rod(), horizontal(), displacement=np.zeros(5))
+    with pytest.raises(ValueError, match="not by both"):
+        equilibrium(rod(), horizontal(), displacement=np.zeros(6), tension=np.zeros(6))

@@ -1,0 +1,101 @@
+"""The main job: processes, DDS and CAN frames, judged by the virtual robot's truth."""
+
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]
+
+
+def marked(mark: str) -> list[str]:
+    """Command lines of the processes that have the mark in their environment."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark.encode() in (folder / "environ").read_bytes():
+                found.append((folder / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+        except OSError:
+            continue
+    return [line for line in found if line]
+
+
+def check_compensation(figures: dict) -> None:
+    assert set(figures["nodes"]) == set(LOOP) and set(figures["nodes"].values()) == {"active"}
+    assert figures["sag_mm"] > 20.0
+    assert figures["residual_lateral_mm"] < figures["sag_mm"] / 5.0
+    assert figures["command_rate_hz"] == pytest.approx(figures["imu_rate_hz"], rel=0.02)
+    assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.02)
+    assert figures["gravity_error_deg"] < 2.0
+    assert figures["delay_ms"]["median"] > 0.0
+
+
+def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
+    mark = f"GRAVCOMP_TEST={os.getpid()}-scenario"
+    answer = gravcomp("demo", "--headless", "--duration", "25", "--json", GRAVCOMP_TEST=mark.split("=")[1])
+    assert answer.code == 0, answer.err
+    check_compensation(answer.json)
+    # Truth and model sag, straighten and turn alike.
+    assert answer.json["correlation"] > 0.9
+    assert marked(mark) == []
+
+
+def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
+    trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
+    answer = gravcomp("demo", "--headless", "--duration", "30", "--imu", str(trial[0]), "--json")
+    assert answer.code == 0, answer.err
+    check_compensation(answer.json)
+    assert answer.json["source"] == trial[0].name
+    assert answer.json["tip_error_without_mm"] > 2.0 * answer.json["tip_error_with_mm"]
+
+
+@pytest.mark.parametrize("delay", [0.3, 2.5, 9.0])
+def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, delay, monkeypatch):
+    mark = f"{os.getpid()}-ctrl-c-{delay}"
+    monkeypatch.setenv("GRAVCOMP_TEST", mark)
+    process = gravcomp_process("demo", "--headless", "--duration", "60")
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    process.wait(timeout=20.0)
+    assert process.returncode == 130
+    assert marked(f"GRAVCOMP_TEST={mark}") == []
+
+
+def test_a_launcher_that_is_killed_takes_its_nodes_along(gravcomp_process, monkeypatch):
+    mark = f"{os.getpid()}-kill"
+    monkeypatch.setenv("GRAVCOMP_TEST", mark)
+    process = gravcomp_process("demo", "--headless", "--duration", "60")
+    time.sleep(6.0)
+    assert len(marked(f"GRAVCOMP_TEST={mark}")) > 4
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 25.0
+    while marked(f"GRAVCOMP_TEST={mark}") and time.monotonic() < deadline:
+        time.sleep(0.2)
+    assert marked(f"GRAVCOMP_TEST={mark}") == []
+
+
+def test_a_node_that_dies_ends_the_run_with_its_name(gravcomp_process, monkeypatch):
+    mark = f"{os.getpid()}-node"
+    monkeypatch.setenv("GRAVCOMP_TEST", mark)
+    process = gravcomp_process("demo", "--headless", "--duration", "120")
+    victim = None
+    deadline = time.monotonic() + 60.0
+    while victim is None and time.monotonic() < deadline:
+        time.sleep(0.2)
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                own = f"GRAVCOMP_TEST={mark}".encode() in (folder / "environ").read_bytes()
+                if own and b"lib/gravcomp_fem/fem_simulator" in (folder / "cmdline").read_bytes():
+                    victim = int(folder.name)
+            except OSError:
+                continue
+    time.sleep(1.0)
+    os.kill(victim, signal.SIGKILL)
+    _, error = process.communicate(timeout=30.0)
+    assert process.returncode == 2
+    assert re.search(r"fem_simulator was ended by SIGKILL", error)
+    assert marked(f"GRAVCOMP_TEST={mark}") == []

@@ -1,0 +1,155 @@
+"""The running graph: its nodes take, give and serve what the table of nodes says, and the doctor sees how it does."""
+
+import functools
+import importlib
+import os
+import time
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="it looks at the running graph: ./gravcomp test")
+
+from gravcomp.graph.nodes import NODES, node  # noqa: E402
+from gravcomp.launcher import Graph  # noqa: E402
+from gravcomp.launcher.robot_graph import LOOP, RobotGraph  # noqa: E402
+
+pytestmark = pytest.mark.timeout(600)
+
+# A namespace, because nothing may depend on there being none.
+NAMESPACE = "/left"
+DOMAIN = str(20 + os.getpid() % 40)
+START = 300.0  # s; a machine that has never run the graph compiles first
+# What every node has: rclpy's own topics, those of the parameters and of the lifecycle.
+COMMON_TOPICS = {"/rosout", "/parameter_events", "/clock"}
+COMMON_SERVICES = ("rcl_interfaces/", "lifecycle_msgs/", "type_description_interfaces/")
+RATED = {port.name: port.type for entry in NODES for port in entry.gives if port.rate is not None}
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory):
+    """The loop on a virtual robot; hands over the processes, to which more may be added."""
+    from gravcomp.canbus.multicast import private_channel
+
+    motion = {"motion": "topic", "truth_rate": 50.0, "feedback_rate": 250}
+    graph = RobotGraph("article", "udp_multicast", private_channel(), NAMESPACE, {"virtual_robot": motion})
+    specs = [*graph.loop(), graph.node("gravcomp_hw", "virtual_robot")]
+    with Graph(specs, tmp_path_factory.mktemp("logs"), {"ROS_DOMAIN_ID": DOMAIN}) as processes:
+        processes.start()
+        yield graph, processes
+
+
+@pytest.fixture(scope="module")
+def observer(robot):
+    """A node that asks the middleware who is there."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=int(DOMAIN))
+    observer = rclpy.create_node("doctors_test", context=context)
+    yield observer
+    observer.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def until(done, what, processes, patience=START):
+    end = time.monotonic() + patience
+    while not done():
+        processes.check()
+        assert time.monotonic() < end, what
+        time.sleep(0.2)
+
+
+def is_there(observer, executable: str) -> bool:
+    return (executable, NAMESPACE) in observer.get_node_names_and_namespaces()
+
+
+def interface(observer, executable: str) -> tuple[dict, dict, dict]:
+    """What a running node takes, gives and serves, name to type; what every node has left out."""
+    found = []
+    for query in (observer.get_subscriber_names_and_types_by_node, observer.get_publisher_names_and_types_by_node):
+        topics = {name: kinds[0] for name, kinds in query(executable, NAMESPACE)}
+        found.append({n: k for n, k in topics.items() if n not in COMMON_TOPICS and not n.endswith("/transition_event")})
+    services = {name: kinds[0] for name, kinds in observer.get_service_names_and_types_by_node(executable, NAMESPACE)}
+    return *found, {n: k for n, k in services.items() if not k.startswith(COMMON_SERVICES)}
+
+
+def resolved(ports, executable: str) -> dict[str, str]:
+    """Full names of ports to their types."""
+    names = {p.name: p.name.replace("~", f"{NAMESPACE}/{executable}") for p in ports}
+    return {n if n.startswith("/") else f"{NAMESPACE}/{n}": next(p.type for p in ports if p.name == k) for k, n in names.items()}
+
+
+def agrees(found: dict, ports: tuple, executable: str) -> bool:
+    """All ports that are not optional are found, and nothing that is no port."""
+    declared = resolved([p for p in ports if p.name not in COMMON_TOPICS], executable)
+    needed = resolved([p for p in ports if not p.optional and p.name not in COMMON_TOPICS], executable)
+    return needed.items() <= found.items() <= declared.items()
+
+
+def test_the_doctor_finds_rates_delays_and_fitting_qos(gravcomp, robot, observer):
+    graph, processes = robot
+    # Once everything is compiled and follows: until then the topics are silent.
+    heard = set()
+    for name, kind in RATED.items():
+        take = functools.partial(lambda n, _: heard.add(n), name)
+        observer.create_subscription(message_class(kind), f"{NAMESPACE}/{name}", take, rclpy.qos.qos_profile_sensor_data)
+    executor = rclpy.executors.SingleThreadedExecutor(context=observer.context)
+    executor.add_node(observer)
+    until(lambda: executor.spin_once(0.1) or heard == set(RATED), f"silent: {set(RATED) - heard}", processes)
+    executor.remove_node(observer)
+    answer = gravcomp("doctor", "--graph", "--namespace", NAMESPACE, "--json", ROS_DOMAIN_ID=DOMAIN)
+    found = {f["subject"]: f for f in answer.json["findings"]}
+    for name in RATED:
+        assert found[name]["level"] == "ok" and "behind its IMU sample" in found[name]["found"], found[name]
+    assert found["QoS"]["level"] == "ok"
+
+
+def test_the_doctor_names_a_subscription_that_cannot_be_served(gravcomp, robot, observer):
+    from geometry_msgs.msg import Vector3Stamped
+
+    demanding = observer.create_subscription(Vector3Stamped, f"{NAMESPACE}/gravity", lambda _: None, 10)
+    answer = gravcomp("doctor", "--graph", "--namespace", NAMESPACE, "--json", ROS_DOMAIN_ID=DOMAIN)
+    observer.destroy_subscription(demanding)
+    wrong = [f for f in answer.json["findings"] if f["subject"] == f"{NAMESPACE}/gravity"]
+    assert answer.code == 1 and len(wrong) == 1
+    assert "imu_estimator to doctors_test" in wrong[0]["found"] and "reliab" in wrong[0]["found"].lower()
+
+
+def test_the_doctor_says_when_nothing_runs(gravcomp):
+    answer = gravcomp("doctor", "--graph", "--json", ROS_DOMAIN_ID=str(60 + os.getpid() % 30))
+    assert answer.code == 1
+    silent = {f["subject"] for f in answer.json["findings"] if f["found"] == "nothing is published"}
+    assert silent == set(RATED)
+
+
+def test_every_node_takes_gives_and_serves_what_the_table_says(robot, observer, tmp_path):
+    from gravcomp.arm.description import expanded, shipped_xacro
+
+    graph, processes = robot
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(expanded(shipped_xacro("seven_axis_arm.urdf.xacro")))
+    more = [
+        graph.node("gravcomp_fem", "viewer", port=8860),
+        graph.node("gravcomp_estimation", "arm_gravity", urdf=str(urdf)),
+        graph.node("gravcomp_fem", "arm_player", urdf=str(urdf)),
+        graph.node("gravcomp_hw", "judge"),
+    ]
+    for spec in more:
+        processes.start_one(spec)
+    names = [executable for _, executable in LOOP] + ["virtual_robot"] + [spec.executable for spec in more]
+    for executable in names:
+        entry = node(executable)
+
+        def fits() -> bool:
+            takes, gives, services = interface(observer, executable)
+            return agrees(takes, entry.takes, executable) and agrees(gives, entry.gives, executable) and agrees(services, entry.services, executable)
+
+        until(lambda: is_there(observer, executable), f"no {executable}", processes)
+        try:
+            # The last of a node's ports come with its activation.
+            until(fits, "", processes, 60.0)
+        except AssertionError:
+            raise AssertionError(f"{executable} is not what the table says: {interface(observer, executable)}") from None
+
+
+def message_class(kind: str) -> type:
+    package, _, name = kind.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)

@@ -1,0 +1,249 @@
+"""What the documents say exists: commands with their options, links, topics, services, parameters, modules.
+
+Command lines that are cheap are run as they stand.
+"""
+
+import argparse
+import ast
+import importlib
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from gravcomp.commands import COMMANDS
+from gravcomp.config import load_yaml
+from gravcomp.config.parameters import declared_parameters
+from gravcomp.description import shipped_robots
+from gravcomp.description.hardware import Hardware
+from gravcomp.graph.nodes import NODES, node
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("gravcomp_hw", "gravcomp_estimation", "gravcomp_fem", "gravcomp_msgs")
+FOLDERS = ("src", *PACKAGES)
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.md"))])
+NAMES = [str(path.relative_to(ROOT)) for path in DOCUMENTS]
+
+# What stands for a value that the reader puts in.
+PLACEHOLDERS = {"COMMAND": "demo", "S": "10", "N": "1"}
+SUBCOMMANDS = {"bench": "engine", "reproduce": "static"}  # for NAME
+# Not the product's: calibrate takes it from a bag of the user's.
+FOREIGN_TOPICS = {"measured/tip"}
+FOREIGN_PACKAGES = {"robot_state_publisher", "foxglove_bridge", "plotjuggler"}
+
+
+class StrictParser(argparse.ArgumentParser):
+    """Says what is wrong by an exception and takes no shortened options, in its subparsers as well."""
+
+    def __init__(self, **options):
+        super().__init__(**{**options, "allow_abbrev": False})
+
+    def error(self, message):
+        raise ValueError(message)
+
+
+def code_of(path: Path) -> list[str]:
+    """Code lines, without comments, and inline code of a document."""
+    text = path.read_text()
+    lines = re.findall(r"^ {4}(\S.*)$", text, re.MULTILINE)
+    lines += [line for block in re.findall(r"```(?:bash|sh)?\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    return [re.sub(r"\s+# .*", "", line).strip() for line in lines] + inline_of(text)
+
+
+def inline_of(text: str) -> list[str]:
+    """What stands between single backticks."""
+    return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
+
+
+def commands_of(path: Path) -> list[list[str]]:
+    """Every `./gravcomp ...` line with words, one for each alternative a|b."""
+    found = []
+    for line in code_of(path):
+        if not line.startswith("./gravcomp "):
+            continue
+        words = shlex.split(line.replace("\\|", "|"))[1:]
+        choices = next((w for w in words if re.fullmatch(r"\w+(\|\w+)+", w)), None)
+        found += [[c if w == choices else w for w in words] for c in choices.split("|")] if choices else [words]
+    return found
+
+
+def parser_of(command: str) -> StrictParser:
+    parser = StrictParser(prog=f"./gravcomp {command}")
+    importlib.import_module(f"gravcomp.commands.{command.replace('-', '_')}").add_arguments(parser)
+    return parser
+
+
+def filled(words: list[str]) -> list[str]:
+    """The words with values in place of the placeholders."""
+    words = [PLACEHOLDERS.get(word, word) for word in words]
+    return [SUBCOMMANDS.get(words[0], word) if word == "NAME" else word for word in words]
+
+
+COMMAND_LINES = sorted({tuple(words) for path in DOCUMENTS for words in commands_of(path)})
+
+
+def test_there_are_commands_to_check():
+    assert {words[0] for words in COMMAND_LINES} >= set(COMMANDS)
+
+
+@pytest.mark.parametrize("words", COMMAND_LINES, ids=" ".join)
+def test_a_command_line_names_what_exists(words):
+    command, *rest = filled(list(words))
+    assert command in COMMANDS
+    if rest and rest != ["--help"]:  # a command alone may be meant as such
+        parser_of(command).parse_args(rest)
+    for word in rest:
+        if re.match(r"src/|test/", word):
+            assert (ROOT / word).exists(), f"{word} does not exist"
+
+
+SUBHELPS = {words[:2] for words in COMMAND_LINES if words[0] in ("bench", "model") and words[1].islower()}
+
+
+@pytest.mark.parametrize("words", sorted({(name,) for name in COMMANDS} | SUBHELPS), ids=" ".join)
+def test_help_is_given(gravcomp, words):
+    answer = gravcomp(*words, "--help")
+    assert answer.code == 0 and f"gravcomp {' '.join(words)}" in answer.out
+
+
+# Cheap enough to be run as they stand: they start no node and build nothing.
+CHEAP = (("model", "solve"), ("model", "view"), ("doctor", "--robot"))
+RUN = [words for words in COMMAND_LINES if words[:2] in CHEAP and len(words) > 2 and not {"ROBOT", "ROBOT.yaml"} & set(words)]
+
+
+@pytest.mark.parametrize("words", RUN, ids=" ".join)
+def test_a_cheap_command_line_runs(gravcomp, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    answer = gravcomp(*(str(ROOT / word) if word.startswith("src/") else word for word in words))
+    # The doctor ends with 1 where this machine lacks something; that is an answer.
+    assert answer.code in ((0, 1) if words[0] == "doctor" else (0,)), answer.err
+    if "--out" in words:
+        assert (tmp_path / words[words.index("--out") + 1]).exists()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_link_leads_somewhere(name):
+    path = ROOT / name
+    for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text()):
+        if re.match(r"https?:|mailto:", target):
+            continue
+        file, _, anchor = target.partition("#")
+        place = (path.parent / file).resolve() if file else path
+        assert place.exists(), f"{target} does not exist"
+        if anchor:
+            headings = re.findall(r"^#+ (.+)$", place.read_text(), re.MULTILINE)
+            slugs = [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
+            assert anchor in slugs, f"{target}: no such heading"
+
+
+def parameters_of(executable: str) -> set[str]:
+    """Names of a node's ROS parameters."""
+    return {leaf.key for leaf in node(executable).declared_parameters()}
+
+
+def ports(*kinds: str) -> dict[str, str]:
+    return {port.name: port.type for entry in NODES for kind in kinds for port in getattr(entry, kind)}
+
+
+def executables_of(package: str) -> list[str]:
+    """What `ros2 run` finds in a package."""
+    return re.findall(r"^\s+\"(\w+) = ", (ROOT / package / "setup.py").read_text(), re.MULTILINE)
+
+
+EXECUTABLES = {name: package for package in PACKAGES[:3] for name in executables_of(package)}
+NODE_PARAMETERS = {key for entry in NODES for key in parameters_of(entry.executable)}
+
+
+def check_ros2(words: list[str]) -> None:
+    """Hold a `ros2 ...` line against the graph's interface."""
+    match words[1:]:
+        case ["run" | "launch", package, *_] if package in FOREIGN_PACKAGES:
+            for word in words:
+                if word.startswith(PACKAGES):
+                    assert (ROOT / word).exists(), f"{word} does not exist"
+        case ["run", package, executable, *rest]:
+            assert EXECUTABLES.get(executable) == package
+            for word in rest:
+                if ":=" in word:
+                    key = word.partition(":=")[0]
+                    assert key in parameters_of(executable) | {"use_sim_time"}, f"{executable} has no parameter {key}"
+        case ["service", "call", name, kind, *_]:
+            _, executable, service = name.split("/")
+            assert (f"~/{service}", kind) in [(port.name, port.type) for port in node(executable).services]
+        case ["topic", "pub", *rest]:
+            name, kind, *content = [word for word in rest if not word.startswith("-")]
+            assert ports("takes").get(name.lstrip("/")) == kind
+            if content and kind.startswith("gravcomp_msgs/"):
+                fields = re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
+                assert set(re.findall(r"(\w+):", content[0])) <= set(fields)
+        case ["param", "set" | "get" | "describe", name, key, *_]:
+            assert key in parameters_of(name.lstrip("/"))
+        case ["lifecycle", "get", name]:
+            assert parameters_of(name.lstrip("/"))
+        case ["lifecycle", "set", name, transition]:
+            assert parameters_of(name.lstrip("/")) and transition in ("configure", "activate", "deactivate", "cleanup", "shutdown")
+        case ["topic", "hz", name]:
+            assert name.lstrip("/") in ports("gives")
+        case ["topic", "echo", name, "--field", field]:
+            kind = ports("gives")[name.lstrip("/")]
+            assert field in re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
+        case _:
+            raise AssertionError(f"no check is known for {' '.join(words)}")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_ros2_lines_fit_the_graph(name):
+    for line in code_of(ROOT / name):
+        if line.startswith("ros2 ") and len(line.split()) > 3:
+            check_ros2(shlex.split(line))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_topics_and_services_exist(name):
+    topics = set(ports("gives", "takes")) | FOREIGN_TOPICS
+    services = set(ports("services"))
+    for word in inline_of((ROOT / name).read_text()):
+        if re.fullmatch(r"(imu|cable|robot|controller|target|truth|virtual|measured)/[a-z_]+", word):
+            assert word in topics, f"no topic {word}"
+        if word.startswith("~/") and "." not in word:
+            assert word in services, f"no service {word}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parameters_and_keys_exist(name):
+    article = load_yaml(shipped_robots()["article"])
+    hardware = {f"hardware.{leaf.key}" for leaf in declared_parameters(Hardware)}
+    for word in inline_of((ROOT / name).read_text()):
+        if re.fullmatch(r"(inverse|prediction|calibration|filter|heater|lumen)\.[a-z_.]+", word):
+            assert word in NODE_PARAMETERS, f"no parameter {word}"
+        if re.fullmatch(r"(robot|hardware|virtual_robot)\.[a-z_.]+", word) and word not in hardware:
+            section = article
+            for key in word.split("."):
+                assert isinstance(section, dict) and key in section, f"no key {word}"
+                section = section[key]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_modules_exist(name):
+    text = (ROOT / name).read_text()
+    words = {w for w in inline_of(text) if re.fullmatch(r"gravcomp(\.\w+)+", w) and not (ROOT / name).with_name(w).exists()}
+    for word in words:
+        assert exists(word), f"no module {word}"
+    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        for statement in ast.walk(ast.parse(block)):
+            if isinstance(statement, ast.ImportFrom):
+                module = importlib.import_module(statement.module)
+                assert all(hasattr(module, alias.name) for alias in statement.names)
+
+
+def exists(dotted: str) -> bool:
+    """Whether it is a module, or a name in one."""
+    try:
+        if importlib.util.find_spec(dotted):
+            return True
+    except ModuleNotFoundError:
+        pass
+    module, _, attribute = dotted.rpartition(".")
+    return hasattr(importlib.import_module(module), attribute)

@@ -1,0 +1,61 @@
+"""The running graph under faults: the bus is the judge. The whole campaign is `./gravcomp bench faults`."""
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from gravcomp.bench.faults import CASES, Campaign, Case
+from gravcomp.bench.running_graph import RunningGraph
+from gravcomp.motors.bridge import State
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    with RunningGraph({"virtual_robot": {"motion": "tremor"}}) as graph:
+        graph.wait_for_commands()
+        campaign = Campaign(graph, seed=7)
+        yield campaign
+        campaign.close()
+
+
+@pytest.fixture(autouse=True)
+def driving(campaign):
+    """Every test begins with a bridge that follows commands and ends with one that does so again."""
+    assert campaign.make_active()
+    yield
+    campaign.mend()
+    campaign.note_dead()
+    assert campaign.make_active()
+    assert campaign.crashes == [] and campaign.monitor.violations == 0
+
+
+@pytest.mark.parametrize("name", ["imu silent", "feedback of a motor lost", "bus-off", "command nan", "controller hangs", "bridge hangs"])
+def test_a_fault_leads_to_zero_current_or_holding(campaign, name):
+    case = next(case for case in CASES if case.name == name)
+    assert campaign.time_to_safe(case) is not None
+
+
+@pytest.mark.parametrize("executable", ["can_bridge", "virtual_robot", "inverse_controller"])
+def test_a_killed_process_may_be_started_again(campaign, executable):
+    case = Case(executable, lambda c: c.graph.process(executable).send_signal(signal.SIGKILL), zero=executable != "inverse_controller")
+    assert campaign.time_to_safe(case) is not None
+    campaign.graph.restart(executable)
+    assert campaign.make_active()
+
+
+def test_a_killed_bridge_comes_back_with_the_cables_zeros(campaign):
+    """Without current the robot sags and takes its cables along; a bridge without zeros would call that place zero."""
+    killed = time.time()
+    campaign.graph.process("can_bridge").send_signal(signal.SIGKILL)
+    campaign.graph.restart("can_bridge")
+    assert campaign.probe.wait_for({State.HOLDING}, killed, 10.0)
+    time.sleep(0.05)
+    assert np.abs(campaign.probe.displacement()).max() > 0.3e-3
+
+
+def test_hostile_frames_and_messages_end_no_process(campaign):
+    campaign.hostile_frames(5000)
+    campaign.probe.flood(500)
+    assert campaign.graph.dead() == {}

@@ -1,0 +1,152 @@
+"""The viewer in a real browser, headless: it renders, follows the graph, a control changes the robot, nothing leaves the machine."""
+
+import io
+import os
+import shutil
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="the viewer's test publishes gravity: it runs inside the environment, by ./gravcomp test")
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+# Drawing by the processor alone on a busy machine.
+PATIENCE = 240.0
+# The processor draws the scene, and nothing else of the page by way of OpenGL.
+ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization"]
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: apt-get install chromium"),
+    pytest.mark.timeout(900),
+]
+
+
+class Robot:
+    """Plays gravity into the graph and listens to the model's tip."""
+
+    def __init__(self):
+        from geometry_msgs.msg import PoseStamped, Vector3Stamped
+
+        from rclpy.executors import SingleThreadedExecutor
+
+        from gravcomp_node import SENSOR
+
+        rclpy.init()
+        self.node = rclpy.create_node("viewer_test")
+        self.tip = None
+        self._gravity = self.node.create_publisher(Vector3Stamped, "gravity", SENSOR)
+        self._message = Vector3Stamped()
+        self._message.vector.x = -9.81
+        self.node.create_subscription(PoseStamped, "robot/tip", self._on_tip, SENSOR)
+        self.node.create_timer(0.02, self._publish)
+        # An executor of its own: rclpy's common one does not come back after another test's shutdown.
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._spin)
+        self._thread.start()
+
+    def _spin(self):
+        while not self._stopped.is_set():
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _publish(self):
+        self._message.header.stamp = self.node.get_clock().now().to_msg()
+        self._gravity.publish(self._message)
+
+    def _on_tip(self, message):
+        p = message.pose.position
+        self.tip = np.array([p.x, p.y, p.z])
+
+    def close(self):
+        self._stopped.set()
+        self._thread.join()
+        self.node.destroy_node()
+        rclpy.try_shutdown()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """The page of a viewer beside simulator and controller, in a ROS domain of their own."""
+    from gravcomp.launcher import Graph
+    from gravcomp.launcher.robot_graph import RobotGraph
+
+    os.environ["ROS_DOMAIN_ID"] = str(60 + os.getpid() % 40)
+    graph = RobotGraph("article")
+    viewer = graph.node("gravcomp_fem", "viewer", port=8800, rate=10.0, graphics="light")
+    specs = [graph.node("gravcomp_fem", "fem_simulator"), graph.node("gravcomp_fem", "inverse_controller"), viewer]
+    with Graph(specs, tmp_path_factory.mktemp("logs")) as processes:
+        processes.start()
+        log = processes.processes[viewer.name].log
+        processes.wait(lambda: "the page is at" in log.read_text(), PATIENCE, "the viewer's start")
+        yield log.read_text().split("the page is at ")[1].split()[0]
+
+
+@pytest.fixture(scope="module")
+def robot(address):
+    robot = Robot()
+    yield robot
+    robot.close()
+
+
+@pytest.fixture(scope="module")
+def page(address, robot):
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": 1100, "height": 500})
+        page.set_default_timeout(1e3 * PATIENCE)
+        page.foreign = []
+        page.on("request", lambda r: page.foreign.append(r.url) if not r.url.startswith((address, "data:", "blob:")) else None)
+        page.goto(address, wait_until="commit")
+        page.wait_for_selector("[data-gravcomp=status]", state="attached")
+        yield page
+        browser.close()
+
+
+def test_it_says_what_the_controller_says(page):
+    page.wait_for_function("document.querySelector('[data-gravcomp=status]').innerText.includes('target')", polling=500)
+
+
+def test_the_robot_is_drawn(page):
+    """Thousands of colours beside the panels: shaded surfaces on the background's gradient, not an empty canvas."""
+    from PIL import Image
+
+    page.wait_for_function("[...document.querySelectorAll('canvas')].some(c => c.clientWidth > 200 && c.clientHeight > 200)", polling=500)
+    end = time.monotonic() + PATIENCE
+    while True:
+        picture = np.asarray(Image.open(io.BytesIO(page.screenshot(timeout=1e3 * PATIENCE))).convert("RGB"))
+        middle = picture[:, 420:680].reshape(-1, 3)
+        colours = len(np.unique(middle, axis=0))
+        if colours > 800:
+            return
+        assert time.monotonic() < end, f"{colours} colours in the middle of the page"
+        time.sleep(2.0)
+
+
+def test_a_control_bends_the_robot(page, robot):
+    end = time.monotonic() + PATIENCE
+    slider = page.locator("text=bend °").locator("xpath=ancestor::*[.//input][1]").locator("input").last
+    slider.fill("40")
+    # An arc of 100 mm bent by 40 degrees ends 33.5 mm beside the axis.
+    while robot.tip is None or np.hypot(*robot.tip[:2]) < 0.028:
+        assert time.monotonic() < end, f"the tip is at {robot.tip}"
+        time.sleep(0.2)
+    assert robot.tip[0] > 0.028 and abs(robot.tip[1]) < 0.005
+
+
+def test_it_works_offline(page):
+    assert not page.foreign
+
+
+def test_it_listens_on_this_machine_only(address):
+    port = int(address.rsplit(":", 1)[1])
+    own = {a[4][0] for a in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1", "127.0.1.1"}
+    for host in own:
+        with socket.socket() as probe:
+            probe.settimeout(2.0)
+            assert probe.connect_ex((host, port)) != 0
