@@ -38,7 +38,8 @@ class FemSimulator(ManagedNode):
         self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
         self._cables: np.ndarray | None = None
         # The first step compiles what is not cached yet; better now than at the first sample.
-        self._simulator.step(np.zeros(3))
+        for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
+            self._simulator.step(np.zeros(3), cables)
         self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
         self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)

@@ -7,7 +7,7 @@ from rclpy.time import Time
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
-from gravcomp.inverse import Command, ControllerCode, InverseController as InverseProblem, Target, TargetError, straight_target
+from gravcomp.inverse import Command, ControllerCode, InverseController as InverseProblem, Target, TargetError, straight_target, warm_up
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
@@ -30,6 +30,8 @@ class InverseController(ManagedNode):
     parameters_class = InverseControllerParameters
 
     def configure(self) -> None:
+        # Better now than at the first deformation.
+        warm_up(self.robot_file.robot, self.parameters.inverse)
         self._problem = InverseProblem(self.robot_file.robot, self.parameters.inverse)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled

@@ -1,5 +1,7 @@
 """Shapes and targets survive their messages; messages that do not fit are refused."""
 
+import subprocess
+import sys
 import dataclasses
 
 import numpy as np
@@ -91,3 +93,40 @@ def test_a_pose_points_along_its_z_axis():
 def test_a_target_without_any_weight_is_refused():
     with pytest.raises(TargetError, match="weight"):
         shape_target(ShapeTarget(), 0.1)
+
+
+# In a process of its own: what other tests have compiled would hide what the warm-up leaves out.
+COMPILED_IN_THE_LOOP = """
+import sys
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from std_msgs.msg import Header
+from gravcomp.description import load_robot_file
+from gravcomp.inverse import InverseController, bend_target, straight_target, warm_up
+from gravcomp.simulation import Simulator
+from gravcomp_fem.conversion import deformation_message, response_of
+
+def signatures():
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("gravcomp.inverse")]
+    return {(name, str(s)) for module in modules for name, f in vars(module).items() if isinstance(f, Dispatcher) for s in f.signatures}
+
+robot = load_robot_file("article").robot
+warm_up(robot)
+before = signatures()
+assert before
+simulator, controller, cables = Simulator(robot), InverseController(robot), None
+targets = [straight_target(robot.length), bend_target(robot.length, 1, 0, tip_position_weight=1, backbone_station=[0.4], backbone_weight=[1])]
+for target in targets:
+    for gravity in ([0.0, 0.0, 9.81], [-9.81, 0.0, 0.0]):
+        message = deformation_message(simulator.step(np.array(gravity), cables), Header())
+        answer = response_of(message)
+        cables = controller.step(
+            answer, target, backbone_station=message.backbone_station, tension=message.cable_tension, interval=0.01).displacement
+controller.relax(answer)
+print(sorted(signatures() - before))
+"""
+
+
+def test_the_warm_up_compiles_all_that_the_loop_runs():
+    ended = subprocess.run([sys.executable, "-c", COMPILED_IN_THE_LOOP], capture_output=True, text=True)
+    assert ended.stdout == "[]\n", ended.stdout + ended.stderr

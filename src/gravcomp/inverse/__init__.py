@@ -6,6 +6,7 @@ from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.solver import SolverFailed
 from gravcomp.inverse.status import ControllerCode
 from gravcomp.inverse.target import Target, TargetError, bend_target, straight_target
+from gravcomp.inverse.warm_up import warm_up
 
 __all__ = [
     "Command",
@@ -17,4 +18,5 @@ __all__ = [
     "TargetError",
     "bend_target",
     "straight_target",
+    "warm_up",
 ]

@@ -85,13 +85,13 @@ def weighted_errors(
         response.effector_free,
         tension,
         target.tip_position,
-        target.tip_position_weight,
+        float(target.tip_position_weight),
         _NO_DIRECTION if direction is None else direction,
-        target.tip_direction_weight,
+        float(target.tip_direction_weight),
         target.backbone_station,
         target.backbone_position,
         target.backbone_weight,
-        backbone_station,
+        np.asarray(backbone_station, dtype=float),
         1.0 - math.sqrt(options.axial_weight),
     )
 

@@ -1,0 +1,27 @@
+"""Compiling the controller's kernels ahead of the first command: compiling takes half a minute on a new machine, in which the
+motors would be sent nothing but stale commands."""
+
+import numpy as np
+
+from gravcomp.description.robot import Robot
+from gravcomp.inverse.controller import InverseController
+from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.target import straight_target
+from gravcomp.simulation.shape import Response
+
+
+def warm_up(robot: Robot, options: InverseOptions = InverseOptions()) -> None:
+    """Compile, or load from the cache, everything that a command for the robot needs."""
+    m, stations = len(robot.cables), np.linspace(0.0, 1.0, 3)
+    if not m:
+        return
+    controller = InverseController(robot, options)
+    points = np.linspace(0.0, robot.length, len(stations))[:, None] * [0.0, 0.0, 1.0]
+    effector = np.concatenate([points[-1], [0.0, 0.0, 1.0], points.ravel()])
+    # Numbers of no meaning, but with the types and the layout of a real answer.
+    compliance = np.sin(np.arange(effector.size * m, dtype=float)).reshape(effector.size, m)
+    response = Response(1e-3 * np.eye(m), 1e-3 * compliance, np.zeros(m), effector)
+    target = straight_target(robot.length, tip_direction_weight=1e-3, backbone_station=[0.5], backbone_weight=[0.1])
+    for tension in (None, np.zeros(m)):
+        controller.step(response, target, backbone_station=stations, tension=tension)
+    controller.relax(response)
