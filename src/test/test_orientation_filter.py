@@ -219,7 +219,7 @@ def test_a_stuck_gyroscope_is_reported_and_the_accelerometer_goes_on_alone():
 def test_a_stuck_sensor_is_reported_and_its_uncertainty_grows():
     filter_ = OrientationFilter()
     before = at_rest(filter_, 300)
-    for k in range(400):
+    for k in range(600):
         estimate = filter_.update((300 + k) * STEP, (0.1, 0.2, 0.3), UP)
     assert estimate.problem is Problem.STUCK
     assert estimate.inclination_std > 10.0 * before.inclination_std
@@ -281,3 +281,29 @@ def test_translations_do_not_drive_the_bias_about_the_vertical_away():
         gyro = (0.0, (pitch - before) / 0.01, 0.0)
         estimate = filter_.update(k * STEP, noisy(gyro, random, 0.1 * DEG), noisy(accel, random, 0.05))
     assert abs(estimate.bias[2]) < 0.5 * DEG
+
+
+def test_an_inclination_that_a_rest_contradicts_starts_anew():
+    """What wrong stamps leave: the filter is sure of itself and wrong, and its bias with it. The next rest ends that."""
+    filter_, random = OrientationFilter(), np.random.default_rng(3)
+    at_rest(filter_, 1000)
+    rate, stamp, said = math.radians(20.0), 1000 * STEP, []
+
+    def sample(gyro, turned, step):
+        nonlocal stamp
+        stamp += step
+        accel = (0.0, 9.81 * math.sin(turned), 9.81 * math.cos(turned))
+        return filter_.update(stamp, noisy(gyro, random, 0.1 * DEG), noisy(accel, random, 0.02))
+
+    def tilt(estimate):
+        return math.atan2(-estimate.gravity[1], -estimate.gravity[2])
+
+    for k in range(100):
+        estimate = sample((rate, 0.0, 0.0), rate * 0.01 * k, 2 * STEP)  # the stamps advance twice as fast as time
+    assert abs(tilt(estimate) - rate) > 10.0 * DEG
+    for k in range(600):
+        estimate = sample((0.0, 0.0, 0.0), rate, STEP)
+        said.append(estimate.problem)
+    assert said.count(Problem.CONTRADICTED) == 1
+    assert tilt(estimate) == pytest.approx(rate, abs=0.3 * DEG)
+    assert math.hypot(*estimate.bias) < 0.3 * DEG

@@ -33,6 +33,7 @@ SATURATED_RATE_NOISE = 2.0  # rad/s/sqrt(Hz): faster than the gyroscope can tell
 STUCK_RATE_NOISE = 0.3  # rad/s/sqrt(Hz): the gyroscope says nothing, the sensor turns as a hand turns it
 UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer says nothing
 CONTRADICTION = 0.5  # m/s: a repeated value that leads to such a velocity is a stuck sensor's, not that of a sensor at rest
+CONTRADICTED_TILT = math.radians(2.0)  # at rest between specific force and gravity: more than a calibration to be believed explains
 MISSED_PERIODS = 2.5  # a longer step than so many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: how far |a| at rest may be off and still be made good
@@ -66,6 +67,7 @@ class OrientationFilter:
         self.rejected = 0  # samples not used, since construction
         self._guard = SampleGuard(self.options.sensor)
         self._rest = RestDetector(self.options.rest)
+        self._stillness = RestDetector(self.options.rest)  # told without the bias, which is wrong where the inclination is
         self._kalman = KalmanFilter(dim_x=9, dim_z=3)
         self._transition = np.eye(9)
         self._process = np.zeros((9, 9))
@@ -136,8 +138,14 @@ class OrientationFilter:
                 resting = self._first_rest(dt, gyro, accel, deviation)
             else:
                 resting = self._rest.update(dt, gyro, accel, self._bias, deviation)
+            still = self._stillness.update(dt, gyro, accel, (0.0,) * 3, (math.inf,) * 3)
+            if still and self._contradicted_tilt() > CONTRADICTED_TILT:
+                self._set_bias_std(self.options.bias_initial)
+                self._start(gyro, tuple(self._stillness.mean_accel), dt)
+                return self._estimate(stamp_ns, gyro, False, Problem.CONTRADICTED)
         else:
             self._rest.reset()
+            self._stillness.reset()
             resting = False
         self._predict(dt, gyro, accel, gyro_usable, accel_usable)
         if accel_usable:
@@ -145,6 +153,15 @@ class OrientationFilter:
         if resting:
             self._learn_gravity(dt)
         return self._estimate(stamp_ns, gyro if gyro_usable else self._bias, resting, verdict.problem)
+
+    def _contradicted_tilt(self) -> float:
+        """Angle (rad) between the mean specific force and what the inclination makes of gravity.
+
+        A sensor at rest tells gravity by itself. Samples that were lost in a fast turn, or stamps that were wrong, leave an error that the
+        covariance does not know of: corrected with the gain of a filter that is sure of itself, it would stay for a minute.
+        """
+        x, y, z = quat.rotate(self._orientation, self._stillness.mean_accel)
+        return math.atan2(math.hypot(x, y), z)
 
     def _first_rest(self, dt: float, gyro: tuple, accel: tuple, deviation: list[float]) -> bool:
         """Whether the sensor rests, told without the bias, which nothing seen has confirmed yet: it may be that of another board."""
@@ -174,6 +191,7 @@ class OrientationFilter:
         self._velocity = (0.0, 0.0, 0.0)
         self._contradicted = False
         self._rest.reset()
+        self._stillness.reset()
         self._last_gyro = gyro
         self._period = 0.0
         self._started = True

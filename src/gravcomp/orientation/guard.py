@@ -21,6 +21,7 @@ class Problem(Enum):
     REORDERED_STAMP = "the stamp is older than the one before"
     CLOCK_RESTARTED = "the stamps went back for good: started anew"
     GAP = "samples are missing: the inclination started anew"
+    CONTRADICTED = "a sensor at rest contradicts the inclination: started anew"
     GYRO_SATURATED = "the gyroscope is saturated"
     ACCEL_SATURATED = "the accelerometer is saturated"
     GYRO_STUCK = "the gyroscope is stuck: it repeats the same values"
