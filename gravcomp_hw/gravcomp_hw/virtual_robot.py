@@ -7,10 +7,12 @@ take truth/*.
 import dataclasses
 import sys
 
+import numpy as np
 import yaml
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3Stamped
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.polled import Polled
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
@@ -57,24 +59,28 @@ class VirtualRobotNode(ManagedNode):
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
-        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate)
+        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate, self._steer)
+        self._base: Polled | None = None
 
     def activate(self) -> None:
+        # Who offers to steer sees by the subscription whether anybody obeys. The robot's thread asks for it: an arm steers a hundred times
+        # a second, and an executor that woke each time would take as much of a processor as the robot.
+        if self.parameters.steerable or self.parameters.motion == "topic":
+            self._base = Polled(self, QuaternionStamped, "virtual/base_orientation", COMMAND)
         try:
             self._live.start()
         except BusError as error:
             raise ConfigError(str(error)) from error
-        self._inputs = [self.create_subscription(String, "virtual/fault", self._inject, _FAULTS)]
-        # Who offers to steer sees by the subscription whether anybody obeys.
-        if self.parameters.steerable or self.parameters.motion == "topic":
-            self._inputs.append(self.create_subscription(QuaternionStamped, "virtual/base_orientation", self._turn_base, COMMAND))
+        self._fault_orders = self.create_subscription(String, "virtual/fault", self._inject, _FAULTS)
         self._watch = self.create_timer(0.5, self._report)
 
     def deactivate(self) -> None:
         self.destroy_timer(self._watch)
-        for subscription in self._inputs:
-            self.destroy_subscription(subscription)
+        self.destroy_subscription(self._fault_orders)
         self._live.stop()
+        if self._base is not None:
+            self._base.destroy()
+            self._base = None
 
     def cleanup(self) -> None:
         for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity"):
@@ -94,15 +100,17 @@ class VirtualRobotNode(ManagedNode):
             message.header.stamp, message.header.frame_id = stamp, frame
             publisher.publish(message)
 
-    def _turn_base(self, message: QuaternionStamped) -> None:
-        q = message.quaternion
+    def _steer(self) -> np.ndarray | None:
+        """Called from the robot's thread."""
+        received = self._base.take() if self._base is not None else None
+        if received is None:
+            return None
+        q = received.message.quaternion
         try:
-            orientation = rotation_from_quaternion(q.x, q.y, q.z, q.w)
+            return rotation_from_quaternion(q.x, q.y, q.z, q.w)
         except ValueError as error:
             self.get_logger().warning(f"virtual/base_orientation: {error}")
-            return
-        with self._live.lock:
-            self._live.robot.turn_base(orientation)
+            return None
 
     def _inject(self, message: String) -> None:
         """`{kind: drop, frames: imu, duration: 2}` begins a fault, `clear` ends all."""

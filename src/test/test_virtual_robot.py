@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from virtual_article import article, virtual_robot, with_body
 
+from gravcomp.canbus.bmi088 import gyroscope_scale
 from gravcomp.canbus.codec import decode, encode
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description.robot_file import load_robot_file
 from gravcomp.virtual.faults import KINDS, Fault
-from gravcomp.virtual.motion import TremorMotion, base_orientation, tilting
+from gravcomp.virtual.motion import RotationMotion, TremorMotion, base_orientation, tilting
 from gravcomp.virtual.parameters import Board, Tendons, VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 
@@ -111,6 +112,27 @@ def test_a_base_that_is_taken_over_turns_on_from_where_it_is():
     # 9.81 m/s^2 turned at the limit of 360 deg/s for 10 ms, and no jump.
     assert np.linalg.norm(np.diff(gravity, axis=0), axis=1).max() < 1.05 * 9.81 * np.radians(3.6)
     np.testing.assert_allclose(gravity[-1], wanted.T @ [0.0, 0.0, -9.81], atol=0.01)
+
+
+def test_skipped_time_is_lost_samples_and_nothing_else():
+    """Rates times the board's time give the base's turn, the skipped time taken as turning on; the rod keeps its shape."""
+    rate = np.radians(60.0)
+    still = dataclasses.replace(Board(), gyroscope_noise=0.0, gyroscope_bias=0.0, gyroscope_drift=0.0, mount_error=0.0)
+    motion = RotationMotion(base_orientation(0.0), np.array([0.0, 1.0, 0.0]), rate, hold=0.0)
+    robot = virtual_robot(VirtualRobotParameters(board=still), motion=motion)
+    before = [decode(frame) for frame in robot.step(0.2)]
+    tip = robot.truth.tip_position
+    assert robot.skip(0.117) == pytest.approx(0.11)
+    assert robot.time == pytest.approx(0.31)
+    np.testing.assert_allclose(robot.truth.tip_position, tip, atol=1e-9)
+    np.testing.assert_allclose(robot.truth.gravity, motion.pose(0.31)[0].T @ [0.0, 0.0, -9.80665], atol=1e-9)
+    after = [decode(frame) for frame in robot.step(0.05)]
+    first, last = ([f.values for f in frames if f.name == "ImuTime"][k] for frames, k in ((after, 0), (before, -1)))
+    assert first.sequence - last.sequence == 12
+    assert first.time - last.time == pytest.approx(120_000, rel=1e-3)
+    gyro = [f.values for f in after if f.name == "ImuGyroscope"][0]
+    assert np.linalg.norm(gyro[:3]) * gyroscope_scale(still.gyroscope_range) == pytest.approx(rate, rel=0.01)
+    assert robot.unresolved == 0
 
 
 def test_every_kind_of_fault_can_be_injected_and_cleared():

@@ -87,6 +87,14 @@ class VirtualBoard:
             encode("ImuTime", time=time, temperature=self._reading, sequence=sequence),
         ]
 
+    def skip(self, samples: int) -> None:
+        """Let the time of so many samples pass without sending them."""
+        for _ in range(samples):
+            self._time += SAMPLE_PERIOD
+            self._since_command += SAMPLE_PERIOD
+            self._heat()
+        self._sequence = (self._sequence + samples) % 256
+
     def status(self) -> can.Message:
         """The BoardStatus frame."""
         flags = _FLAG_SILENT_IMU if self.imu_fault == "silent" else 0

@@ -172,6 +172,13 @@ class MovingRod:
             return False
         return iterations < _MOST_ITERATIONS
 
+    def carry(self, base_orientation: np.ndarray, base_position: np.ndarray) -> None:
+        """Put the base elsewhere and the rod with it, as one rigid body: shape, strains and body velocities stay as they are."""
+        turn = base_orientation @ self.orientation[0].T
+        self.orientation = turn @ self.orientation
+        self.orientation[0] = base_orientation  # otherwise the rounding in it doubles from time to time
+        self.position = base_position + (self.position - self.position[0]) @ turn.T
+
     def _measure(self) -> None:
         model = self.model
         strains(self.orientation, self.position, model.length, self.strain)
@@ -192,11 +199,8 @@ class MovingRod:
         )
 
     def _carry(self, before: list[np.ndarray], base_orientation: np.ndarray, base_position: np.ndarray) -> None:
-        orientation, position, self._branch_strain, self._slip_strain = before
-        turn = base_orientation @ orientation[0].T
-        self.orientation = turn @ orientation
-        self.orientation[0] = base_orientation  # otherwise the rounding in it doubles from time to time
-        self.position = base_position + (position - position[0]) @ turn.T
+        self.orientation, self.position, self._branch_strain, self._slip_strain = before
+        self.carry(base_orientation, base_position)
         for rates in (self.velocity, self._acceleration, self._velocity_rate):
             rates[:] = 0.0
         self._sliding[:] = 0.0

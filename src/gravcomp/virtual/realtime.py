@@ -1,8 +1,8 @@
 """The virtual robot at the pace of the clock, on a real CAN bus.
 
 A thread of its own: every period it takes what has arrived, steps the robot, sends what the robot sent. After a pause of the
-machine it catches up, not faster than a wire of 1 Mbit/s carries the frames; what is later than `_LONGEST_LAG` is given up,
-and virtual time then lags behind the clock (counted in `lost_time`).
+machine it catches up, not faster than a wire of 1 Mbit/s carries the frames; what is later than `_LONGEST_LAG` is skipped:
+frames are lost then (counted in `lost_time`), but virtual time keeps to the clock, so that rates and stamps fit together.
 """
 
 import contextlib
@@ -11,6 +11,8 @@ import os
 import threading
 import time
 from collections.abc import Callable
+
+import numpy as np
 
 from gravcomp.canbus.codec import layout
 from gravcomp.canbus.link import CanLink
@@ -22,21 +24,31 @@ _FRAME_TIME = 0.11e-3  # s on a wire of 1 Mbit/s
 _BURST = 0.02  # s of frames at once after a pause; receivers' socket buffers hold about 30 ms
 _LONGEST_LAG = 0.1  # s
 _NICENESS = -10
+_STEER_PERIOD = 5  # periods
 
 RECEIVED_FRAMES = ("MotorCommand1to4", "MotorCommand5to8", "HeaterCommand")
 
 
 class RealtimeRobot:
-    """Runs `robot` on the bus `settings`; `on_truth` is called from the thread `truth_rate` times a second.
+    """Runs `robot` on the bus `settings`; `on_truth` is called from the thread `truth_rate` times a second, and `steer` every 10 ms:
+    where to turn the base from now on, (3, 3) world from soft_base, or None.
 
     Whoever touches the robot from outside holds `lock`.
     """
 
-    def __init__(self, robot: VirtualRobot, settings: CanInterface, on_truth: Callable[[Truth], None], truth_rate: float):
+    def __init__(
+        self,
+        robot: VirtualRobot,
+        settings: CanInterface,
+        on_truth: Callable[[Truth], None],
+        truth_rate: float,
+        steer: Callable[[], np.ndarray | None] = lambda: None,
+    ):
         self.robot, self.lock = robot, threading.Lock()
         self.link = CanLink(settings, [layout(name).frame_id for name in RECEIVED_FRAMES])
         self.lost_time = 0.0
         self.error: BaseException | None = None
+        self._steer = steer
         self._on_truth, self._truth_period = on_truth, max(1, round(1.0 / truth_rate / _PERIOD))
         # A copy takes the first step, so that compiling is over before the bus is open.
         copy.deepcopy(robot).step(0.02)
@@ -46,6 +58,7 @@ class RealtimeRobot:
     def start(self) -> None:
         """Open the bus and start. Raises BusError."""
         self.link.open()
+        _take_precedence()
         self._stop.clear()
         self._thread = threading.Thread(target=self._run, name="virtual_robot", daemon=True)
         self._thread.start()
@@ -59,9 +72,7 @@ class RealtimeRobot:
         self.link.close()
 
     def _run(self) -> None:
-        # Hardware does not wait for other processes; where the user may not ask for it, the thread takes its turn.
-        with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        _take_precedence()
         try:
             self._loop()
         except Exception as error:  # the node reports it; a thread that dies silently would look like a dead bus
@@ -74,14 +85,19 @@ class RealtimeRobot:
             now = time.monotonic()
             deadline += _PERIOD
             if now - deadline > _LONGEST_LAG:
-                self.lost_time += now - deadline
-                deadline = now
+                with self.lock:
+                    skipped = self.robot.skip(now - deadline)
+                self.lost_time += skipped
+                deadline += skipped
             frames, until = [], max(deadline, wire_free)
             while (remaining := until - time.monotonic()) > 0.0:
                 frames += self.link.receive(remaining)
             if not frames:
                 frames = self.link.receive(0.0)
+            wanted = self._steer() if count % _STEER_PERIOD == 0 else None
             with self.lock:
+                if wanted is not None:
+                    self.robot.turn_base(wanted)
                 sent = self.robot.step(_PERIOD, frames)
                 count += 1
                 truth = self.robot.truth if count % self._truth_period == 0 else None
@@ -90,3 +106,13 @@ class RealtimeRobot:
                 wire_free = max(wire_free, time.monotonic() - _BURST) + len(sent) * _FRAME_TIME
             if truth is not None:
                 self._on_truth(truth)
+
+
+def _take_precedence() -> None:
+    """Hardware does not wait for other processes; where the user may not ask for it, the calling thread takes its turn.
+
+    Both threads of the node ask: the one that spins holds the interpreter and the robot's lock now and then, and while it waits for a
+    processor the robot would wait for it.
+    """
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)

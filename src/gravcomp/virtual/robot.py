@@ -147,6 +147,22 @@ class VirtualRobot:
             sent += self._outward.through(self._act(), self.time, self._frame_faults())
         return sent
 
+    def skip(self, duration: float) -> float:
+        """Let time pass that nobody computes, in whole periods of the IMU; returns how much passed (s).
+
+        The base goes on as its motion says and takes the rod along as it is bent; the board's clock goes on, its samples are lost; the
+        motors stand. To whoever listens it is a bus on which frames were lost, with stamps and rates that still fit the motion.
+        """
+        samples = int(duration / SAMPLE_PERIOD)
+        if samples < 1:
+            return 0.0
+        self._tick += samples * _SAMPLE_TICKS
+        last = len(self._poses) - 1
+        self._poses = [self.motion.pose(self.time - (last - k) * _ROD_TICKS * TICK) for k in range(last + 1)]
+        self._rod.carry(*self._poses[-1])
+        self._board.skip(samples)
+        return samples * SAMPLE_PERIOD
+
     @property
     def truth(self) -> Truth:
         """What is so now."""
