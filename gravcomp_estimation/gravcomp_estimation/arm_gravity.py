@@ -10,6 +10,7 @@ import numpy as np
 from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.polled import Polled
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -19,6 +20,8 @@ from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_gravity import ArmGravityParameters
 from gravcomp.virtual.motion import rotation_from_quaternion
 
+_LOOK = 0.1  # s between two looks at arm and IMU, in a check
+_KEPT = 50  # messages of joint_states between two looks
 # Silent for longer, a source counts as gone.
 STALE = 0.5  # s
 
@@ -46,20 +49,29 @@ class ArmGravity(ManagedNode):
         self._arm: tuple[float, np.ndarray] | None = None  # monotonic s, (3,)
         self._imu: tuple[float, np.ndarray] | None = None
         self._agreed = time.monotonic()
+        self._polled_joints: Polled | None = None
+        self._polled_imu: Polled | None = None
         if self.parameters.source == "tf":
             self._inputs = self._tf_subscriptions()
-        else:
+        elif self.parameters.use == "publish":
             self._inputs = [self.create_subscription(JointState, "joint_states", self._on_joints, QoSProfile(depth=10))]
-            if not self.parameters.urdf:
-                self._inputs.append(self.create_subscription(String, "robot_description", self._on_description, LATCHED))
+        else:
+            # A check needs no more than the newest at each look.
+            self._inputs = []
+            self._polled_joints = Polled(self, JointState, "joint_states", QoSProfile(depth=_KEPT))
+        if self.parameters.source == "joint_states" and not self.parameters.urdf:
+            self._inputs.append(self.create_subscription(String, "robot_description", self._on_description, LATCHED))
         if self.parameters.use == "check":
-            self._inputs.append(self.create_subscription(Vector3Stamped, "gravity", self._on_imu, SENSOR))
-        self._watch = self.create_timer(0.1, self._judge)
+            self._polled_imu = Polled(self, Vector3Stamped, "gravity", SENSOR)
+        self._watch = self.create_timer(_LOOK, self._judge)
 
     def deactivate(self) -> None:
         self.destroy_timer(self._watch)
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
+        for polled in (self._polled_joints, self._polled_imu):
+            if polled is not None:
+                polled.destroy()
 
     def cleanup(self) -> None:
         if hasattr(self, "_gravity"):
@@ -78,8 +90,11 @@ class ArmGravity(ManagedNode):
 
     def _on_joints(self, message: JointState) -> None:
         self._positions.update(zip(message.name, message.position))
+        self._take_positions(message.header)
+
+    def _take_positions(self, header) -> None:
         if self._chain and all(name in self._positions for name in self._chain.moving):
-            self._give(self._chain.gravity(self._positions), message.header)
+            self._give(self._chain.gravity(self._positions), header)
 
     def _tf_subscriptions(self) -> list:
         try:
@@ -115,10 +130,20 @@ class ArmGravity(ManagedNode):
 
     # The check.
 
-    def _on_imu(self, message: Vector3Stamped) -> None:
-        self._imu = time.monotonic(), np.array([message.vector.x, message.vector.y, message.vector.z])
+    def _look(self) -> None:
+        """Take what has come to be asked for. The robot's own cables are in joint_states, too, and an arm may split its joints: take all."""
+        if self._polled_joints is not None:
+            received = self._polled_joints.take_all()
+            for one in received:
+                self._positions.update(zip(one.message.name, one.message.position))
+            if received:
+                self._take_positions(received[-1].message.header)
+        if self._polled_imu is not None and (newest := self._polled_imu.take()):
+            v = newest.message.vector
+            self._imu = time.monotonic(), np.array([v.x, v.y, v.z])
 
     def _judge(self) -> None:
+        self._look()
         now = time.monotonic()
         if self._arm is None or now - self._arm[0] > STALE:
             missing = "no URDF has come" if self.parameters.source == "joint_states" and self._chain is None else "no pose of the arm comes"

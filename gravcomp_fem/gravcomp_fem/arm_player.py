@@ -25,8 +25,9 @@ from gravcomp.virtual.motion import quaternion
 from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import OK
+from gravcomp_node.polled import Polled
 
-_RATE = 100.0  # Hz, of the joints
+_RATE = 50.0  # Hz, of the joints
 _PASSES = ("released", "compensated")
 _ASK_AGAIN = 1.0  # s, when the controller did not agree or did not answer
 
@@ -66,19 +67,19 @@ class ArmPlayer(ManagedNode):
         self._errors = {name: [[] for _ in FIVE_POSES] for name in _PASSES}
         self._followed: dict[str, list[bool]] = {name: [] for name in _PASSES}
         self._disagreement: list[float] = []
-        self._inputs = [
-            self.create_subscription(PoseStamped, "truth/tip", self._on_truth, SENSOR),
-            self.create_subscription(CableState, "cable/state", self._on_bridge, COMMAND),
-            self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QoSProfile(depth=50)),
-        ]
+        self._truth = Polled(self, PoseStamped, "truth/tip", SENSOR)
+        self._bridge_states = Polled(self, CableState, "cable/state", COMMAND)
+        self._reports = self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, QoSProfile(depth=50))
         self._ticks = self.create_timer(1.0 / _RATE, self._tick)
 
     def deactivate(self) -> None:
         self.destroy_timer(self._ticks)
-        for subscription in self._inputs:
-            self.destroy_subscription(subscription)
+        self.destroy_subscription(self._reports)
+        for polled in (self._truth, self._bridge_states):
+            polled.destroy()
 
     def _tick(self) -> None:
+        self._look()
         now = self.get_clock().now().nanoseconds * 1e-9
         time = 0.0 if self._begin is None else now - self._begin
         if time >= self._tour.duration:
@@ -141,12 +142,13 @@ class ArmPlayer(ManagedNode):
         q.x, q.y, q.z, q.w = map(float, quaternion(rotation))
         self._base.publish(base)
 
-    def _on_truth(self, message: PoseStamped) -> None:
-        p = message.pose.position
-        self._tip = np.array([p.x, p.y, p.z])
-
-    def _on_bridge(self, message: CableState) -> None:
-        self._bridge = message
+    def _look(self) -> None:
+        """The newest of tip and bridge."""
+        if truth := self._truth.take():
+            p = truth.message.pose.position
+            self._tip = np.array([p.x, p.y, p.z])
+        if state := self._bridge_states.take():
+            self._bridge = state.message
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

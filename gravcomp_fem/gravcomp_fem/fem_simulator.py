@@ -20,6 +20,7 @@ from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.polled import Polled
 
 # No robot is shaken harder than this; more is a broken message.
 _GRAVITY_LIMIT = 100.0  # m/s^2
@@ -50,29 +51,31 @@ class FemSimulator(ManagedNode):
         self._refused = 0
         self._last_stamp: float | None = None
         self._last_markers = -np.inf
-        self._subscriptions_made = [self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR)]
+        self._gravity_subscription = self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR)
+        # Asked for when gravity comes: that is when the cables are needed, and waking up twice a sample costs a tenth of a processor.
         if self.parameters.cables_from == "command":
-            cables = self.create_subscription(CableCommand, "cable/command", self._on_command, COMMAND)
+            self._cable_topic = Polled(self, CableCommand, "cable/command", COMMAND)
         else:
-            cables = self.create_subscription(CableState, "cable/state", self._on_state, SENSOR)
-        self._subscriptions_made.append(cables)
+            self._cable_topic = Polled(self, CableState, "cable/state", SENSOR)
         self.report(WARN, "waiting for gravity")
 
     def deactivate(self) -> None:
-        for subscription in self._subscriptions_made:
-            self.destroy_subscription(subscription)
+        self.destroy_subscription(self._gravity_subscription)
+        self._cable_topic.destroy()
 
     def cleanup(self) -> None:
         for publisher in (self._deformation, self._tip, self._markers):
             self.destroy_publisher(publisher)
         self._transforms.destroy()
 
-    def _on_command(self, message: CableCommand) -> None:
-        self._take_cables(message.displacement, "cable/command")
-
-    def _on_state(self, message: CableState) -> None:
-        if message.state != CableState.UNCONFIGURED:
-            self._take_cables(message.displacement, "cable/state")
+    def _look_at_cables(self) -> None:
+        """Take what was commanded or measured since the last sample; of several the newest that can be used."""
+        for received in self._cable_topic.take_all():
+            message = received.message
+            if isinstance(message, CableCommand):
+                self._take_cables(message.displacement, "cable/command")
+            elif message.state != CableState.UNCONFIGURED:
+                self._take_cables(message.displacement, "cable/state")
 
     def _take_cables(self, field, topic: str) -> None:
         displacement = np.array(field, dtype=float)
@@ -83,6 +86,7 @@ class FemSimulator(ManagedNode):
         self._cables = displacement
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
+        self._look_at_cables()
         gravity = np.array([message.vector.x, message.vector.y, message.vector.z])
         if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
@@ -118,7 +122,8 @@ class FemSimulator(ManagedNode):
         if rate == 0.0 or 0.0 <= stamp - self._last_markers < 1.0 / rate:
             return
         self._last_markers = stamp
-        self._markers.publish(markers_of(shape, self.robot_file.robot, header))
+        if self._markers.get_subscription_count():
+            self._markers.publish(markers_of(shape, self.robot_file.robot, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
 
     def _refuse(self, sentence: str) -> None:
