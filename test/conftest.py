@@ -45,7 +45,12 @@ def gravcomp_process():
 
     def start(*arguments: str) -> subprocess.Popen:
         process = subprocess.Popen(
-            [str(ROOT / "gravcomp"), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+            [str(ROOT / "gravcomp"), *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=_heed_ctrl_c,
         )
         started.append(process)
         return process
@@ -55,6 +60,11 @@ def gravcomp_process():
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
+
+
+def _heed_ctrl_c() -> None:
+    """A shell starts what runs in its background deaf to SIGINT, and the tests' children would inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.fixture
