@@ -198,6 +198,7 @@ def run(progress: Callable[[str], None], *, kills: int = 20, frames: int = 1_000
         "current_frames_watched": campaign.monitor.frames,
         "kills": len(recovery),
         "recovered": sum(t <= _RECOVERY for t in times),
+        "not_recovered": len(recovery) - sum(t <= _RECOVERY for t in times),
         "recovery_s": {
             "median": sorted(times)[len(times) // 2] if times else None,
             "worst": {name: max((t for n, t in recovery if n == name and t is not None), default=None) for name in NODES},

@@ -4,6 +4,7 @@ import argparse
 import importlib
 import json
 import sys
+from pathlib import Path
 
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, summary in BENCHMARKS.items():
         own = choices.add_parser(name, help=summary, description=summary)
         own.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
+        own.add_argument("--write", metavar="DOCUMENT", help="renew the table of figures in a Markdown document, between its marks")
         for option, (default, meaning) in OPTIONS.get(name, {}).items():
             own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
 
@@ -40,22 +42,33 @@ def run(args: argparse.Namespace) -> int:
     """Run the command; 0: measured."""
     from rich.console import Console
 
+    from gravcomp.bench.reach import figures as told_first
+    from gravcomp.experiments import figures_table
+
+    command = f"bench {args.benchmark}"
+    if args.write:
+        figures_table.check_place(Path(args.write), command)
     module = importlib.import_module(f"gravcomp.bench.{args.benchmark}")
     options = {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
     console = Console(stderr=True)
-    with console.status(f"bench {args.benchmark}") as status:
-        figures = module.run(lambda what: status.update(f"bench {args.benchmark}: {what}"), **options)
-    _print_figures(args.benchmark, figures)
+    with console.status(command) as status:
+        measured = module.run(lambda what: status.update(f"{command}: {what}"), **options)
+    figures = told_first(args.benchmark, measured)
+    _print_measured(command, measured)
+    console.print(figures_table.rich_table(command, figures))
+    if args.write:
+        figures_table.renew(Path(args.write), command, figures)
     if args.json:
-        print(json.dumps(figures), flush=True)
+        print(json.dumps(measured), flush=True)
     return 0
 
 
-def _print_figures(name: str, figures: dict) -> None:
+def _print_measured(title: str, measured: dict) -> None:
+    """Everything, by the keys of the JSON."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=f"bench {name}", title_justify="left", show_header=False)
-    for key, value in figures.items():
+    table = Table(title=title, title_justify="left", show_header=False)
+    for key, value in measured.items():
         table.add_row(key, json.dumps(value, indent=1) if isinstance(value, dict) else str(value))
     Console(file=sys.stderr).print(table)

@@ -22,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="of the virtual robot's noise (default: the robot file's)")
     parser.add_argument("--workers", type=int, help="processes for sweeps (default: one a core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
+    parser.add_argument("--write", metavar="DOCUMENT", help="renew each experiment's table of figures in a Markdown document, between its marks")
     parser.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
 
 
@@ -32,10 +33,17 @@ def run(args: argparse.Namespace) -> int:
 
     from gravcomp.commands.model.build import prepare_model
     from gravcomp.description import load_robot_file
+    from gravcomp.experiments import figures_table
     from gravcomp.experiments.report import write_index, write_report
     from gravcomp.experiments.setup import Context, Setup
     from gravcomp.experiments.sweep import Sweep
 
+    names = list(EXPERIMENTS) if args.name == "all" else [args.name]
+    if args.write:
+        if args.brief:
+            raise ConfigError("--write puts the figures of whole experiments into a document; --brief shortens them: give one of both")
+        for name in names:
+            figures_table.check_place(Path(args.write), f"reproduce {name}")
     folder = Path(args.out).expanduser()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -43,7 +51,6 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--out is {folder}: cannot be made: {error.strerror}") from error
     file = load_robot_file(args.robot)
     prepare_model(args.robot)
-    names = list(EXPERIMENTS) if args.name == "all" else [args.name]
     console = Console(stderr=True)
     results = []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -67,7 +74,10 @@ def run(args: argparse.Namespace) -> int:
                 result.notes.insert(0, "Run with --brief: fewer and shorter runs than the article's experiment.")
             page = write_report(result, folder)
             results.append(result)
-            _tell(console, result, page)
+            console.print(figures_table.rich_table(f"{result.title}  ({result.seconds:.0f} s)", result.figures))
+            console.print(f"[dim]{page}[/dim]\n")
+            if args.write:
+                figures_table.renew(Path(args.write), f"reproduce {name}", result.figures)
         if len(results) > 1:
             console.print(f"[bold]index[/bold]  {write_index(results, folder)}")
     if args.json:
@@ -75,16 +85,3 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(document))
         sys.stdout.flush()
     return 0 if all(result.reached for result in results) else 1
-
-
-def _tell(console, result, page: Path) -> None:
-    from rich.table import Table
-
-    table = Table(title=f"{result.title}  ({result.seconds:.0f} s)", title_justify="left", box=None, pad_edge=False, title_style="bold")
-    for column in ("figure", "here", "the article", "to be reached", ""):
-        table.add_column(column)
-    words = {True: "[green]reached[/green]", False: "[red]missed[/red]", None: ""}
-    for figure in result.figures:
-        table.add_row(figure.name, figure.text, figure.article, figure.target, words[figure.reached])
-    console.print(table)
-    console.print(f"[dim]{page}[/dim]\n")
