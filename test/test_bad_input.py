@@ -56,3 +56,4 @@ def test_unknown_commands_and_options_are_refused(gravcomp):
     refused(gravcomp("fly"), "fly", "demo")
     refused(gravcomp("demo", "--duration", "1"), "--duration", "10")
     refused(gravcomp("demo", "--robot", "nobody"), "nobody", "article")
+    refused(gravcomp("demo", "--headless", "--screenshots", "pictures"), "--screenshots", "--headless")

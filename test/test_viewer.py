@@ -2,7 +2,6 @@
 
 import io
 import os
-import shutil
 import socket
 import threading
 import time
@@ -10,16 +9,15 @@ import time
 import numpy as np
 import pytest
 
+from gravcomp.view.browser import Browser, find_chromium
+
 rclpy = pytest.importorskip("rclpy", reason="the viewer's test publishes gravity: it runs inside the environment, by ./gravcomp test")
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 # Drawing by the processor alone on a busy machine.
 PATIENCE = 240.0
-# The processor draws the scene, and nothing else of the page by way of OpenGL.
-ARGUMENTS = ["--no-sandbox", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization"]
 
 pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine: apt-get install chromium"),
+    pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine: apt-get install chromium"),
     pytest.mark.timeout(900),
 ]
 
@@ -93,33 +91,27 @@ def robot(address):
 
 
 @pytest.fixture(scope="module")
-def page(address, robot):
-    from playwright.sync_api import sync_playwright
+def browser(address, robot):
+    with Browser(address, width=1100, height=500, patience=PATIENCE) as browser:
+        yield browser
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        page = browser.new_page(viewport={"width": 1100, "height": 500})
-        page.set_default_timeout(1e3 * PATIENCE)
-        page.foreign = []
-        page.on("request", lambda r: page.foreign.append(r.url) if not r.url.startswith((address, "data:", "blob:")) else None)
-        page.goto(address, wait_until="commit")
-        page.wait_for_selector("[data-gravcomp=status]", state="attached")
-        yield page
-        browser.close()
+
+@pytest.fixture(scope="module")
+def page(browser):
+    return browser.page
 
 
 def test_it_says_what_the_controller_says(page):
     page.wait_for_function("document.querySelector('[data-gravcomp=status]').innerText.includes('target')", polling=500)
 
 
-def test_the_robot_is_drawn(page):
+def test_the_robot_is_drawn(browser):
     """Thousands of colours beside the panels: shaded surfaces on the background's gradient, not an empty canvas."""
     from PIL import Image
 
-    page.wait_for_function("[...document.querySelectorAll('canvas')].some(c => c.clientWidth > 200 && c.clientHeight > 200)", polling=500)
     end = time.monotonic() + PATIENCE
     while True:
-        picture = np.asarray(Image.open(io.BytesIO(page.screenshot(timeout=1e3 * PATIENCE))).convert("RGB"))
+        picture = np.asarray(Image.open(io.BytesIO(browser.picture())).convert("RGB"))
         middle = picture[:, 420:680].reshape(-1, 3)
         colours = len(np.unique(middle, axis=0))
         if colours > 800:
@@ -139,8 +131,8 @@ def test_a_control_bends_the_robot(page, robot):
     assert robot.tip[0] > 0.028 and abs(robot.tip[1]) < 0.005
 
 
-def test_it_works_offline(page):
-    assert not page.foreign
+def test_it_works_offline(browser):
+    assert not browser.foreign
 
 
 def test_it_listens_on_this_machine_only(address):

@@ -1,6 +1,7 @@
 """`gravcomp demo`: the main job on a virtual robot: it sags, is compensated, and is tilted; ends with the figures."""
 
 import argparse
+import contextlib
 import json
 import sys
 import tempfile
@@ -26,12 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder")
     parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
     add_page_arguments(parser)
+    parser.add_argument("--screenshots", metavar="DIR", help="pictures of the page, sagging and compensated; Chromium draws them, which slows the loop")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command; 0: played to the end, 2: it could not be."""
     from gravcomp.canbus.multicast import private_channel
+    from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
     from gravcomp.launcher import Graph
@@ -40,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
 
     if not _SHORTEST <= args.duration <= 86400.0:
         raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
+    if args.screenshots and args.headless:
+        raise ConfigError("--screenshots shows the page, which --headless leaves out: give one of them")
     prepare(args.robot, virtual=True)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
@@ -63,16 +68,19 @@ def run(args: argparse.Namespace) -> int:
             specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
-        with Graph(specs, logs, domain) as processes:
+        with Graph(specs, logs, domain) as processes, contextlib.ExitStack() as open_windows:
             processes.start()
+            pictures = None
             print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
             if not args.headless:
-                show_page(processes, args.no_open)
+                address = show_page(processes, args.no_open)
+            if args.screenshots:
+                pictures = open_windows.enter_context(PagePictures(address, Path(args.screenshots), relax_time, compensate_until))
             ready = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller"]
             processes.wait(lambda: _all_active(_read(result_file), ready), _START_TIMEOUT, "the nodes' start")
             # Last, because its motion begins with its activation.
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
-            state = _follow(processes, result_file, args)
+            state = _follow(processes, result_file, args, pictures)
             figures = {**state["figures"], "nodes": state["nodes"], "source": args.imu and Path(args.imu).name or "scenario: sag, compensate, tilt"}
     _print_summary(figures)
     if args.json:
@@ -109,8 +117,8 @@ def _all_active(state: dict, names: list[str]) -> bool:
     return all(states.get(name) == "active" for name in names)
 
 
-def _follow(processes, result_file: Path, args: argparse.Namespace) -> dict:
-    """Show the run until the judge is done; returns its last state. Raises NodeDied."""
+def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=None) -> dict:
+    """Show the run until the judge is done, and take the page's `pictures`; returns its last state. Raises NodeDied."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -135,6 +143,8 @@ def _follow(processes, result_file: Path, args: argparse.Namespace) -> dict:
             if state.get("phase") and state["phase"] != phase:
                 phase = state["phase"]
                 console.print(f"{state['elapsed']:5.1f} s  {phase}", highlight=False)
+            if pictures:
+                pictures.take(state.get("elapsed", 0.0))
             error = state.get("tip_error_mm")
             note = "" if error is None else f"tip error {error:5.1f} mm"
             progress.update(task, description=phase, completed=state.get("elapsed", 0.0), note=note)

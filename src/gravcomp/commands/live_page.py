@@ -18,8 +18,10 @@ def add_page_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-open", action="store_true", help="only print the page's address, even where a browser could be opened")
 
 
-def show_page(processes: Graph, no_open: bool) -> None:
-    """Wait for the viewer's page, print its address, and open it in a graphical session unless `no_open`. Raises NodeDied, TimeoutError."""
+def show_page(processes: Graph, no_open: bool) -> str:
+    """Wait for the viewer's page, print its address, and open it in a graphical session unless `no_open`; returns the address.
+
+    Raises NodeDied, TimeoutError."""
     log = next(process.log for process in processes.processes.values() if process.spec.executable == "viewer")
     found = None
 
@@ -32,3 +34,4 @@ def show_page(processes: Graph, no_open: bool) -> None:
     print(f"The live page: {found.group(1)}", file=sys.stderr, flush=True)
     if not no_open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         webbrowser.open(found.group(1))
+    return found.group(1)

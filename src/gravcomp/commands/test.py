@@ -32,12 +32,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _provide_browser() -> None:
     """Chromium, where it may be installed without asking; the tests that need it skip themselves otherwise."""
-    import shutil
-
     from gravcomp.environment import system_packages
     from gravcomp.environment.errors import SetupError
+    from gravcomp.view.browser import find_chromium
 
-    if shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome"):
+    if find_chromium():
         return
     names = ", ".join(f"{name} ({use})" for name, use in _BROWSER.items())
     if os.geteuid() != 0:

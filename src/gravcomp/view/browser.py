@@ -1,0 +1,68 @@
+"""A headless Chromium that looks at the live page: what it sees, as a picture.
+
+The processor draws the scene, so on a small machine the graph beside it is slowed down.
+"""
+
+import shutil
+from pathlib import Path
+
+CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome")
+# WebGL by the processor, and nothing else of the page by way of OpenGL.
+_ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization")
+_IS_DRAWN = """
+document.querySelector('[data-gravcomp=status]')?.innerText
+&& [...document.querySelectorAll('canvas')].some(canvas => canvas.clientWidth > 200 && canvas.clientHeight > 200)
+"""
+
+
+class BrowserError(RuntimeError):
+    """There is no browser, or the page does not come; the text is for people."""
+
+
+def find_chromium() -> str | None:
+    """The path of an installed Chromium or Chrome."""
+    return next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
+
+
+class Browser:
+    """A window of `width` x `height` px onto the page at `address`; a context manager.
+
+    `page` is Playwright's page. Raises BrowserError when no Chromium is installed or the page does not come within `patience` (s).
+    """
+
+    def __init__(self, address: str, width: int = 1600, height: int = 900, patience: float = 120.0):
+        from playwright.sync_api import Error, sync_playwright
+
+        executable = find_chromium()
+        if executable is None:
+            raise BrowserError("no Chromium on this machine: apt-get install chromium")
+        self._timeout = 1e3 * patience
+        self._playwright = sync_playwright().start()
+        try:
+            self._chromium = self._playwright.chromium.launch(executable_path=executable, args=list(_ARGUMENTS))
+            self.page = self._chromium.new_page(viewport={"width": width, "height": height})
+            self.page.set_default_timeout(self._timeout)
+            self.foreign: list[str] = []
+            """Addresses outside the page's own that were asked for."""
+            own = (address, "data:", "blob:")
+            self.page.on("request", lambda request: None if request.url.startswith(own) else self.foreign.append(request.url))
+            self.page.goto(address, wait_until="commit")
+            self.page.wait_for_function(_IS_DRAWN, polling=500)
+        except Error as error:
+            self._playwright.stop()
+            raise BrowserError(f"the page at {address} could not be shown: {error.message.splitlines()[0]}") from error
+
+    def __enter__(self) -> "Browser":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._chromium.close()
+        self._playwright.stop()
+
+    def picture(self) -> bytes:
+        """What is to be seen now, as PNG."""
+        return self.page.screenshot(timeout=self._timeout)
+
+    def save(self, path: Path) -> None:
+        """Write what is to be seen now."""
+        path.write_bytes(self.picture())
