@@ -67,7 +67,6 @@ class OrientationFilter:
         self.rejected = 0  # samples not used, since construction
         self._guard = SampleGuard(self.options.sensor)
         self._rest = RestDetector(self.options.rest)
-        self._stillness = RestDetector(self.options.rest)  # told without the bias, which is wrong where the inclination is
         self._kalman = KalmanFilter(dim_x=9, dim_z=3)
         self._transition = np.eye(9)
         self._process = np.zeros((9, 9))
@@ -138,14 +137,13 @@ class OrientationFilter:
                 resting = self._first_rest(dt, gyro, accel, deviation)
             else:
                 resting = self._rest.update(dt, gyro, accel, self._bias, deviation)
-            still = self._stillness.update(dt, gyro, accel, (0.0,) * 3, (math.inf,) * 3)
-            if still and self._contradicted_tilt() > CONTRADICTED_TILT:
+            # Not asked for a rest: where the inclination is wrong the bias is, too.
+            if self._rest.calm and self._contradicted_tilt() > CONTRADICTED_TILT:
                 self._set_bias_std(self.options.bias_initial)
-                self._start(gyro, tuple(self._stillness.mean_accel), dt)
+                self._start(gyro, tuple(self._rest.mean_accel), dt)
                 return self._estimate(stamp_ns, gyro, False, Problem.CONTRADICTED)
         else:
             self._rest.reset()
-            self._stillness.reset()
             resting = False
         self._predict(dt, gyro, accel, gyro_usable, accel_usable)
         if accel_usable:
@@ -160,7 +158,7 @@ class OrientationFilter:
         A sensor at rest tells gravity by itself. Samples that were lost in a fast turn, or stamps that were wrong, leave an error that the
         covariance does not know of: corrected with the gain of a filter that is sure of itself, it would stay for a minute.
         """
-        x, y, z = quat.rotate(self._orientation, self._stillness.mean_accel)
+        x, y, z = quat.rotate(self._orientation, self._rest.mean_accel)
         return math.atan2(math.hypot(x, y), z)
 
     def _first_rest(self, dt: float, gyro: tuple, accel: tuple, deviation: list[float]) -> bool:
@@ -191,7 +189,6 @@ class OrientationFilter:
         self._velocity = (0.0, 0.0, 0.0)
         self._contradicted = False
         self._rest.reset()
-        self._stillness.reset()
         self._last_gyro = gyro
         self._period = 0.0
         self._started = True
