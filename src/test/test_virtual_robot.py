@@ -135,6 +135,20 @@ def test_skipped_time_is_lost_samples_and_nothing_else():
     assert robot.unresolved == 0
 
 
+def test_a_steered_base_turns_on_at_its_pace_through_skipped_time():
+    robot = virtual_robot()
+    wanted = base_orientation(0.0)
+    for k in range(100):  # steered at 60 deg/s, every 10 ms
+        wanted = base_orientation(np.radians(0.6 * k))
+        robot.turn_base(wanted)
+        robot.step(0.01)
+    before = robot.truth.gravity
+    robot.skip(0.1)
+    after = robot.truth.gravity
+    angle = np.degrees(np.arccos(before @ after / np.linalg.norm(before) / np.linalg.norm(after)))
+    assert angle == pytest.approx(6.0, abs=0.3)
+
+
 def test_every_kind_of_fault_can_be_injected_and_cleared():
     robot = virtual_robot()
     for kind in KINDS:

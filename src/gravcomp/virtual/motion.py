@@ -128,6 +128,12 @@ class FollowedMotion(SyntheticMotion):
         """Set where to turn to, (3, 3)."""
         self._target = orientation
 
+    def coast(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """The pose at `time`, turned on at the pace it had: whoever steers went on while nobody looked."""
+        self._orientation = self._orientation @ turned(self._rate * (time - self._time))
+        self._time = time
+        return self._orientation, self._position
+
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         steps = max(1, math.ceil((time - self._time) / (0.1 * self._time_constant)))
         dt = (time - self._time) / steps

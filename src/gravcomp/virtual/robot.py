@@ -150,7 +150,7 @@ class VirtualRobot:
     def skip(self, duration: float) -> float:
         """Let time pass that nobody computes, in whole periods of the IMU; returns how much passed (s).
 
-        The base goes on as its motion says and takes the rod along as it is bent; the board's clock goes on, its samples are lost; the
+        The base goes on as its motion says, or at its pace where it is steered, and takes the rod along as it is bent; the board's clock goes on, its samples are lost; the
         motors stand. To whoever listens it is a bus on which frames were lost, with stamps and rates that still fit the motion.
         """
         samples = int(duration / SAMPLE_PERIOD)
@@ -158,7 +158,8 @@ class VirtualRobot:
             return 0.0
         self._tick += samples * _SAMPLE_TICKS
         last = len(self._poses) - 1
-        self._poses = [self.motion.pose(self.time - (last - k) * _ROD_TICKS * TICK) for k in range(last + 1)]
+        pose = self.motion.coast if isinstance(self.motion, FollowedMotion) else self.motion.pose
+        self._poses = [pose(self.time - (last - k) * _ROD_TICKS * TICK) for k in range(last + 1)]
         self._rod.carry(*self._poses[-1])
         self._board.skip(samples)
         return samples * SAMPLE_PERIOD
