@@ -92,10 +92,12 @@ class VirtualRobotNode(ManagedNode):
         """Called from the robot's thread."""
         stamp, frame = self.get_clock().now().to_msg(), self.parameters.base_frame
         tip = PoseStamped(pose=_pose(truth.tip_position, truth.tip_orientation))
-        backbone = PoseArray(poses=[_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)])
         gravity = Vector3Stamped()
         gravity.vector.x, gravity.vector.y, gravity.vector.z = truth.gravity.tolist()
-        messages = ((self._publisher_tip, tip), (self._publisher_backbone, backbone), (self._publisher_gravity, gravity))
+        messages = [(self._publisher_tip, tip), (self._publisher_gravity, gravity)]
+        if self._publisher_backbone.get_subscription_count():
+            poses = [_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)]
+            messages.append((self._publisher_backbone, PoseArray(poses=poses)))
         for publisher, message in messages:
             message.header.stamp, message.header.frame_id = stamp, frame
             publisher.publish(message)

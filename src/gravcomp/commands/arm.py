@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         urdf, result = Path(scratch) / "arm.urdf", Path(scratch) / "result.json"
         urdf.write_text(expanded(xacro), encoding="utf-8")
         # Lower rates of truth and feedback than the hardware's: judging and a bus in software shall not take the loop's time.
-        motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 250, **_start_of_tour(urdf)}
+        motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
         graph = RobotGraph(args.robot, "udp_multicast", private_channel(), args.namespace, {"virtual_robot": motion})
         specs = [spec for spec in graph.loop() if args.gravity != "arm" or spec.executable != "imu_estimator"]
         if args.gravity != "imu":

@@ -49,8 +49,8 @@ def run(args: argparse.Namespace) -> int:
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
-    # Half the rates of truth and feedback: judging and a bus in software shall not take the loop's time.
-    motion = {"truth_rate": 50.0, "feedback_rate": 250, "steerable": True}
+    # Lower rates of truth and feedback than the hardware's: judging and a bus in software shall not take the loop's time.
+    motion = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True}
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
