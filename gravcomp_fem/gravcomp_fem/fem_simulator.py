@@ -83,6 +83,10 @@ class FemSimulator(ManagedNode):
         if displacement.shape != expected or not np.isfinite(displacement).all():
             self._refuse(f"{topic} has {displacement.tolist()}; {expected[0]} finite displacements are needed")
             return
+        length = self.robot_file.robot.length
+        if (np.abs(displacement) > length).any():
+            self._refuse(f"{topic} has {displacement.tolist()} m; no cable of a robot of {length:g} m is wound so far")
+            return
         self._cables = displacement
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
@@ -92,6 +96,10 @@ class FemSimulator(ManagedNode):
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
             return
         shape = self._shape(gravity, Time.from_msg(message.header.stamp).nanoseconds * 1e-9)
+        if not np.isfinite(shape.tip_position).all():
+            self._simulator.reset()  # else the next step would begin at what is no shape
+            self._refuse(f"gravity {gravity.tolist()} m/s^2 and the cables have no shape; the simulator begins anew")
+            return
         message.header.frame_id = self.parameters.base_frame
         self._deformation.publish(deformation_message(shape, message.header))
         tip = pose_message(shape.tip_position, shape.tip_orientation)
