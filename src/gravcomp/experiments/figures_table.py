@@ -13,6 +13,7 @@ from pathlib import Path
 from gravcomp.config import ConfigError
 from gravcomp.experiments.result import Figure
 
+
 def rich_table(title: str, figures: Sequence[Figure]):
     """The figures for a terminal, as a rich.table.Table."""
     from rich.table import Table
