@@ -4,10 +4,10 @@ import signal
 import sys
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from gravcomp.config import ConfigError
+from gravcomp_node.executor import StreamExecutor
 from gravcomp_node.managed_node import ManagedNode
 
 USAGE = """{name}: a node of gravcomp. {purpose}
@@ -28,19 +28,20 @@ def run(node_class: type[ManagedNode], argv: list[str] | None = None) -> int:
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(True))
-    node = None
+    node = executor = None
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
         node.start()
+        executor = StreamExecutor(node)
         while not stop and not node.finished:
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_once(timeout=0.1)
     except (ConfigError, rclpy.exceptions.ROSInterruptException, rclpy._rclpy_pybind11.RCLError) as error:
         print(f"{node_class.name}: {error}", file=sys.stderr, flush=True)
         return 2
     finally:
+        if executor is not None:
+            executor.shutdown()
         if node is not None:
             node.shut_down()
             node.destroy_node()

@@ -5,7 +5,7 @@ import random
 
 import can
 import pytest
-from motor_bench import HARDWARE, Bench
+from motor_bench import HARDWARE, STEP, Bench
 
 from gravcomp.canbus import codec
 from gravcomp.motors.bridge import DRIVING, State
@@ -166,6 +166,30 @@ def test_turns_that_could_not_be_counted_are_uncertain_again_when_homing_was_bro
     bench.bridge.stop()
     bench.run(0.1)
     assert bench.bridge.state is State.FAULT and "could not be counted" in bench.bridge.message
+
+
+def test_frames_that_come_late_and_all_at_once_cost_neither_the_zero_nor_the_state():
+    """A receiver held up for 40 ms at full speed. While a count may have a turn too many, nothing is driven by it."""
+    bench, goal = Bench().start(), [0.01] * 6
+    bench.run(0.2, lambda t: goal)
+    late = []
+    for k in range(80):
+        bench.now += STEP
+        for motor in bench.motors:
+            motor.step()
+        if k % 4 == 0:
+            late += [motor.feedback() for motor in bench.motors]
+    for frame in late[:6]:
+        bench.bridge.on_frame(frame, bench.now)
+    bench.deliver(bench.bridge.tick(bench.now))
+    assert all(motor.current == 0.0 for motor in bench.motors) and bench.bridge.state is State.ACTIVE
+    for frame in late[6:]:
+        bench.bridge.on_frame(frame, bench.now)
+    bench.deliver(bench.bridge.tick(bench.now))
+    assert all(motor.current != 0.0 for motor in bench.motors)
+    bench.run(1.5, lambda t: goal)
+    assert bench.bridge.state is State.ACTIVE
+    assert [motor.displacement for motor in bench.motors] == pytest.approx(goal, abs=2e-5)
 
 
 def test_a_bridge_that_was_held_up_looks_before_it_drives():

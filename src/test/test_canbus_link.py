@@ -1,5 +1,6 @@
 """Buses that open, isolate runs from one another, and come back after errors."""
 
+import select
 import socket
 import time
 
@@ -70,6 +71,28 @@ def test_frames_that_are_not_wanted_do_not_hide_those_behind_them():
     a.send([codec.encode("MotorFeedback2", angle=0, speed=0, current=0), FRAME] * 20)
     assert len(b.receive(0.2)) == 20
     a.close(), b.close()
+
+
+def waiting(bus):
+    """How many datagrams lie in the bus's socket; they are gone afterwards."""
+    time.sleep(0.05)
+    count = 0
+    while select.select([bus.fileno()], [], [], 0.0)[0]:
+        bus._receiver.recv(4096)
+        count += 1
+    return count
+
+
+@pytest.mark.parametrize(("frame_ids", "kept"), [([0x200, 0x311], 4), ([0x10, 0x200], 3), (None, 5)])
+def test_frames_that_nobody_asked_for_do_not_wake_the_process(frame_ids, kept):
+    """Ids below 256 are packed in another way and are left to the second look."""
+    settings = CanInterface(channel=private_channel())
+    with open_bus(settings, frame_ids) as listener, open_bus(settings) as sender:
+        for i in (0x10, 0x11, 0x200, 0x201, 0x311):
+            sender.send(can.Message(arbitration_id=i, is_extended_id=False, data=b"12345678"))
+            listener.send(can.Message(arbitration_id=i, is_extended_id=False, data=b"12345678"))
+        assert waiting(listener) == kept
+        assert waiting(sender) == 5
 
 
 def test_a_receiver_that_is_held_up_for_0_1_s_loses_no_frame_and_knows_when_each_came():

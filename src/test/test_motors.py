@@ -10,7 +10,7 @@ import pytest
 from gravcomp.canbus import codec
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import COUNTS_PER_TURN, Drive, Watchdog, parse_hardware
-from gravcomp.motors.encoder import JUMPS, Encoder
+from gravcomp.motors.encoder import JUMPS, SETTLING_TIME, Encoder
 from gravcomp.motors.homing import find_knee
 from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.monitor import MotorMonitor
@@ -71,10 +71,24 @@ def test_late_frames_are_no_jumps_and_cost_no_turn_silently(rpm, pause):
         assert encoder.count == pytest.approx(count, abs=1 + abs(rpm) / RPM * 0.002 * JUMPS)
 
 
-@pytest.mark.parametrize(("rpm", "pause"), [(0, 0.5), (100, 0.06), (-300, 0.06), (700, 0.03), (2750, 0.008)])
-def test_late_frames_of_a_slow_rotor_leave_the_turns_certain(rpm, pause):
-    """700 rpm are 10 mm/s of cable, 2750 are 40 mm/s."""
-    assert starved(rpm, pause)[0].certain
+@pytest.mark.parametrize(("rpm", "pause"), [(0, 0.5), (100, 0.1), (-300, 0.1), (700, 0.1), (-1720, 0.1), (2750, 0.08), (5000, 0.06)])
+def test_turns_of_frames_that_come_late_and_all_at_once_are_counted(rpm, pause):
+    """700 rpm are 10 mm/s of cable, 1720 are 25 mm/s."""
+    encoder, count = starved(rpm, pause)
+    assert encoder.certain and encoder.count == pytest.approx(count, abs=1)
+
+
+def test_turns_in_doubt_are_told_within_0_1_s_or_not_at_all():
+    """Frames that were lost leave two counts for the same angle: neither is refuted by what comes afterwards."""
+    encoder, begin = Encoder(), 0.5
+    settling = []
+    for k in range(500):
+        now = 0.002 * k
+        if not begin <= now < begin + 0.03:
+            encoder.update(int(2750 / RPM * now) % COUNTS_PER_TURN, 2750, 0.0, now)
+            settling += [now] * encoder.settling
+    assert not encoder.certain and not encoder.settling
+    assert begin + 0.03 <= min(settling) and max(settling) < begin + 0.03 + SETTLING_TIME + 0.003
 
 
 @pytest.mark.parametrize("rpm", [100, -700, 1500, 2750])

@@ -15,6 +15,8 @@ import can
 import msgpack
 from can.interfaces.udp_multicast.utils import pack_message
 
+from gravcomp.canbus.socket_filter import attach
+
 DEFAULT_CHANNEL = "239.74.163.2:43113"
 _LOOPBACK = socket.inet_aton("127.0.0.1")
 _SO_TIMESTAMPNS = 35
@@ -84,6 +86,10 @@ class LoopbackMulticastBus(can.BusABC):
         except Exception:  # whatever a stranger sends to the port must not end the receiver
             self.undecodable += 1
             return None
+
+    def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
+        exact = filters is not None and all(f["can_mask"] == 0x7FF and f.get("extended") is False for f in filters)
+        attach(self._receiver, self._own_address[1], [f["can_id"] for f in filters] if exact else None)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         try:

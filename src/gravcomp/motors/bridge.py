@@ -354,7 +354,9 @@ class Bridge:
     def _watch_turns(self) -> None:
         """A count of turns that is not certain must not be driven by, until somebody has decided or homing has found the zero."""
         motors = zip(self._hardware.motors, self._encoders, self._zeros)
-        unsure = [self._name(motor) for motor, encoder, zero in motors if not encoder.certain and zero is not None]
+        unsure = [
+            self._name(motor) for motor, encoder, zero in motors if not encoder.certain and not encoder.settling and zero is not None
+        ]
         if not unsure or self._unsure_told or self.state is State.HOMING:
             return
         turn = 1e3 * COUNTS_PER_TURN * self._hardware.drive.travel_per_count
@@ -413,6 +415,9 @@ class Bridge:
 
     def _drive(self, now: float, dt: float) -> None:
         """The currents of this period (A, in the motor's own sense)."""
+        if any(encoder.settling for encoder in self._encoders):  # a turn too many is no distance to make good
+            self._currents = [0.0] * len(self._currents)
+            return
         displacement, velocity = self._displacements(), self._velocities()
         targets, limit = self._target, None
         if self._homing:

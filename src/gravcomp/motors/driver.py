@@ -29,7 +29,7 @@ RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
 HEATER_TIMEOUT = 0.5
 """s without a heater command after which the duty is zero."""
 
-_BEAT_PERIOD = 0.01  # s; at 40 mm/s a rotor makes half a turn in it, and the guard shall know the turns when the bridge dies
+_BEAT_PERIOD = 0.01  # s; at 25 mm/s a rotor makes a third of a turn in it, and the guard shall know the turns when the bridge dies
 _HEATER_PERIOD = 0.1  # s
 _LONGEST_QUEUE = 256
 _SWITCH_INTERVAL = 5e-4  # s; Python's default of 5 ms would let another thread delay the control by that

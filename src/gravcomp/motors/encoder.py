@@ -13,9 +13,13 @@ far it gets beside a steady motion when it speeds up and slows down again in bet
 - one is: it is the count;
 - several are: the one nearest to (v + v_last) / 2 x dt is taken, and the count is `certain` no more. It may be off by whole turns.
 
+What comes next may tell: when a receiver was held up, its frames come all at once, and a count that has one turn too many then has more
+turns than there was time for since the doubt began. Until this is known, or SETTLING_TIME is over, the encoder is `settling`.
+
 A rotor that stood before and stands now at the same angle has not moved, however long the silence.
 """
 
+import dataclasses
 import math
 
 from gravcomp.description.hardware import COUNTS_PER_TURN
@@ -23,6 +27,9 @@ from gravcomp.description.hardware import COUNTS_PER_TURN
 JUMPS = 4
 """So many implausible feedbacks are an encoder fault, two plausible ones making up for one implausible: four in a row, or
 every other one, as from two controllers with the same id."""
+
+SETTLING_TIME = 0.1
+"""s of feedback after which turns in doubt stay so."""
 
 _COUNTS_PER_S = COUNTS_PER_TURN / 60.0  # a rpm
 _TOLERANCE = 400.0  # counts, at standstill
@@ -33,16 +40,37 @@ _SPEED_LIMIT = 20_000  # rpm of the rotor: beyond what the motor can do
 _SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current: beyond what it can do between two feedbacks
 
 
+@dataclasses.dataclass
+class _Doubt:
+    """Since when (s), by which whole turns the count may be off, and how far the rotor has turned and can have turned since (counts)."""
+
+    since: float
+    turns: list[int]
+    turned: float
+    low: float
+    high: float
+
+
 class Encoder:
-    """The rotor's count (not wrapped) since its first feedback. Attributes: count (counts), certain (its whole turns are), speed
-    (rpm), current (A), time (s), jumps (implausible feedbacks less half the plausible ones since), rejected (since start)."""
+    """The rotor's count (not wrapped) since its first feedback. Attributes: count (counts), speed (rpm), current (A), time (s), jumps
+    (implausible feedbacks less half the plausible ones since), rejected (since start)."""
 
     def __init__(self) -> None:
         self.count: int | None = None
-        self.certain = True
         self.speed, self.current, self.time = 0.0, 0.0, -math.inf
         self.jumps, self.rejected = 0.0, 0
-        self._take_any = False
+        self._take_any = self._unsure = False
+        self._doubt: _Doubt | None = None
+
+    @property
+    def certain(self) -> bool:
+        """Whether the whole turns of the count are."""
+        return not self._unsure and self._doubt is None
+
+    @property
+    def settling(self) -> bool:
+        """Whether the next feedbacks will tell the whole turns, or that they cannot be told."""
+        return not self._unsure and self._doubt is not None
 
     def update(self, angle: int, speed: float, current: float, now: float) -> bool:
         """Take a feedback: angle in counts, rotor speed in rpm, current in A, arrival in s. False when it is implausible."""
@@ -52,7 +80,7 @@ class Encoder:
             self.count = angle
         elif self._take_any:
             self.count += round(_wrap(angle - self.count))
-        elif not self._follow(angle, speed, max(0.0, now - self.time)):
+        elif not self._follow(angle, speed, now):
             return self._reject()
         self.speed, self.current, self.time, self._take_any = speed, current, now, False
         self.jumps = max(0.0, self.jumps - 0.5)
@@ -60,42 +88,66 @@ class Encoder:
 
     def resynchronise(self) -> None:
         """Take the next feedback whatever its angle, at the nearest turn."""
-        self.jumps, self._take_any, self.certain = 0.0, True, False
+        self.jumps, self._take_any = 0.0, True
+        self._give_up()
 
     def trust(self) -> None:
         """The count is right: somebody says so, or the zero was found anew."""
-        self.certain = True
+        self._unsure, self._doubt = False, None
 
     def forget(self) -> None:
         """The turns are lost: count anew from the next feedback."""
-        self.count, self.jumps, self._take_any, self.certain = None, 0.0, False, True
+        self.count, self.jumps, self._take_any = None, 0.0, False
+        self.trust()
 
     def restore(self, count: int, speed: float, time: float, certain: bool) -> None:
         """Go on from what someone else kept: the count and the speed (rpm) at `time` (s)."""
-        self.count, self.speed, self.time, self.certain = count, speed, time, certain
+        self.count, self.speed, self.time = count, speed, time
         self.jumps, self._take_any = 0.0, False
+        self._unsure, self._doubt = not certain, None
 
-    def _follow(self, angle: int, speed: float, elapsed: float) -> bool:
+    def _follow(self, angle: int, speed: float, now: float) -> bool:
         """Move the count to `angle`; False when the rotor cannot have got there."""
+        elapsed = max(0.0, now - self.time)
         if abs(speed - self.speed) > _SPEED_JUMP + _SPEED_RATE * elapsed:
             return False
-        nearest = _wrap(angle - self.count)
-        if abs(speed) < _REST_SPEED and abs(self.speed) < _REST_SPEED and abs(nearest) < _REST_ANGLE:
-            self.count += round(nearest)
-            return True
-        predicted = 0.5 * (speed + self.speed) * _COUNTS_PER_S * elapsed
-        reach = (elapsed + _TIME_UNCERTAINTY) * _COUNTS_PER_S
-        room = _TOLERANCE + 0.25 * _ACCELERATION * elapsed * elapsed
-        low, high = min(0.0, speed, self.speed) * reach - room, max(0.0, speed, self.speed) * reach + room
-        first = low + (angle - self.count - low) % COUNTS_PER_TURN
-        if first > high:
-            return False
-        turned = predicted + _wrap(angle - self.count - predicted)
-        if not low <= turned <= high:
-            turned = first
-        self.certain = self.certain and first + COUNTS_PER_TURN > high
+        slowest, fastest = min(0.0, speed, self.speed) * _COUNTS_PER_S, max(0.0, speed, self.speed) * _COUNTS_PER_S
+        beside = 0.25 * _ACCELERATION * elapsed * elapsed
+        low = slowest * (elapsed + _TIME_UNCERTAINTY) - beside - _TOLERANCE
+        high = fastest * (elapsed + _TIME_UNCERTAINTY) + beside + _TOLERANCE
+        turned = _wrap(angle - self.count)
+        if abs(speed) < _REST_SPEED and abs(self.speed) < _REST_SPEED and abs(turned) < _REST_ANGLE:
+            turns = [0]
+        else:
+            predicted = 0.5 * (speed + self.speed) * _COUNTS_PER_S * elapsed
+            first = low + (angle - self.count - low) % COUNTS_PER_TURN
+            if first > high:
+                return False
+            turned = predicted + _wrap(angle - self.count - predicted)
+            if not low <= turned <= high:
+                turned = first
+            before = round((turned - first) / COUNTS_PER_TURN)
+            turns = [k - before for k in range(1 + int((high - first) // COUNTS_PER_TURN))]
         self.count += round(turned)
+        if self._doubt is not None:
+            self._settle(turns, turned, slowest * elapsed - beside, fastest * elapsed + beside, now)
+        elif len(turns) > 1:
+            self._doubt = _Doubt(now, turns, turned, low, high)
         return True
+
+    def _settle(self, turns: list[int], turned: float, low: float, high: float, now: float) -> None:
+        """Leave out the counts that the rotor had no time for."""
+        doubt = self._doubt
+        doubt.turned, doubt.low, doubt.high = doubt.turned + turned, doubt.low + low, doubt.high + high
+        doubt.turns = [k for k in doubt.turns if doubt.low <= doubt.turned + k * COUNTS_PER_TURN <= doubt.high]
+        if len(turns) > 1 or not doubt.turns or now - doubt.since > SETTLING_TIME:
+            self._give_up()
+        elif len(doubt.turns) == 1:
+            self.count += doubt.turns[0] * COUNTS_PER_TURN
+            self._doubt = None
+
+    def _give_up(self) -> None:
+        self._unsure, self._doubt = True, None
 
     def _reject(self) -> bool:
         self.jumps += 1

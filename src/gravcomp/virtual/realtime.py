@@ -19,12 +19,12 @@ from gravcomp.canbus.link import CanLink
 from gravcomp.description.hardware import CanInterface
 from gravcomp.virtual.robot import Truth, VirtualRobot
 
-_PERIOD = 0.002  # s
+_SHORTEST_PERIOD, _LONGEST_PERIOD = 0.002, 0.004  # s, between two looks at the bus; as long as the motors' feedback in between
 _FRAME_TIME = 0.11e-3  # s on a wire of 1 Mbit/s
 _BURST = 0.02  # s of frames at once after a pause; receivers' socket buffers hold about 30 ms
 _LONGEST_LAG = 0.1  # s
 _NICENESS = -10
-_STEER_PERIOD = 5  # periods
+_STEER_PERIOD = 0.01  # s
 
 RECEIVED_FRAMES = ("MotorCommand1to4", "MotorCommand5to8", "HeaterCommand")
 
@@ -49,7 +49,9 @@ class RealtimeRobot:
         self.lost_time = 0.0
         self.error: BaseException | None = None
         self._steer = steer
-        self._on_truth, self._truth_period = on_truth, max(1, round(1.0 / truth_rate / _PERIOD))
+        self._period = min(max(robot.feedback_period, _SHORTEST_PERIOD), _LONGEST_PERIOD)
+        self._on_truth, self._truth_every = on_truth, max(1, round(1.0 / truth_rate / self._period))
+        self._steer_every = max(1, round(_STEER_PERIOD / self._period))
         # A copy takes the first step, so that compiling is over before the bus is open.
         copy.deepcopy(robot).step(0.02)
         self._stop = threading.Event()
@@ -83,24 +85,23 @@ class RealtimeRobot:
         count = 0
         while not self._stop.is_set():
             now = time.monotonic()
-            deadline += _PERIOD
+            deadline += self._period
             if now - deadline > _LONGEST_LAG:
                 with self.lock:
                     skipped = self.robot.skip(now - deadline)
                 self.lost_time += skipped
                 deadline += skipped
-            frames, until = [], max(deadline, wire_free)
-            while (remaining := until - time.monotonic()) > 0.0:
-                frames += self.link.receive(remaining)
-            if not frames:
-                frames = self.link.receive(0.0)
-            wanted = self._steer() if count % _STEER_PERIOD == 0 else None
+            # What comes meanwhile waits in the socket: it takes effect with this step anyway.
+            if (remaining := max(deadline, wire_free) - time.monotonic()) > 0.0:
+                time.sleep(remaining)
+            frames = self.link.receive(0.0)
+            wanted = self._steer() if count % self._steer_every == 0 else None
             with self.lock:
                 if wanted is not None:
                     self.robot.turn_base(wanted)
-                sent = self.robot.step(_PERIOD, frames)
+                sent = self.robot.step(self._period, frames)
                 count += 1
-                truth = self.robot.truth if count % self._truth_period == 0 else None
+                truth = self.robot.truth if count % self._truth_every == 0 else None
             if sent:
                 self.link.send(sent)
                 wire_free = max(wire_free, time.monotonic() - _BURST) + len(sent) * _FRAME_TIME

@@ -99,6 +99,11 @@ class VirtualRobot:
         return self._tick * TICK
 
     @property
+    def feedback_period(self) -> float:
+        """s between two feedbacks of a motor."""
+        return self._feedback_ticks * TICK
+
+    @property
     def faults(self) -> tuple[Fault, ...]:
         """Those that act now."""
         return tuple(fault for fault, _ in self._faults)
