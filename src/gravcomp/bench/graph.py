@@ -15,10 +15,12 @@ from gravcomp.canbus.link import CanLink
 from gravcomp.judging.bus_delay import delays_of
 
 _WARM_UP, _LISTEN, _COST = 5.0, 10.0, 15.0  # s
+_LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's: two robots of 500 Hz are two buses that no USB adapter carries
 
 
 def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST) -> dict:
-    """`delay_ms` {median, p99, samples}, `bridge_cpu` (share of a core), `cpu` and `memory_mb` by process."""
+    """`delay_ms` {median, p99, samples}, `bridge_cpu` (share of a core), `cpu` and `memory_mb` by process; `two_robots_hz`: commands
+    followed a second by each of two robots beside one another."""
     with RunningGraph() as graph:
         progress("starting the graph")
         graph.wait_for_commands()
@@ -31,6 +33,8 @@ def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float
         memory = {name: graph.process(name).memory_info().rss / 2**20 for name in NODES}
     if len(delays) == 0:
         raise TimeoutError("no command was traced on the bus while listening")
+    progress("two robots")
+    rates = _two_robots(listen)
     return {
         "robot": "virtual robot",
         "delay_ms": {
@@ -41,6 +45,7 @@ def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float
         "bridge_cpu": shares["can_bridge"],
         "cpu": shares,
         "memory_mb": {name: round(value, 1) for name, value in memory.items()},
+        "two_robots_hz": {"slower": min(rates), "faster": max(rates)},
     }
 
 
@@ -60,3 +65,23 @@ def _delays(graph: RunningGraph, duration: float) -> list[float]:
         frames += link.receive(0.05)
     link.close()
     return delays_of(frames)
+
+
+def _two_robots(duration: float) -> list[float]:
+    """Commands followed a second (Hz) by each of two robots in one graph, in namespaces and on buses of their own."""
+    with RunningGraph(_LIGHT) as left, RunningGraph(_LIGHT) as right:
+        graphs = (left, right)
+        for graph in graphs:
+            graph.wait_for_commands()
+        time.sleep(_WARM_UP)
+        links = [CanLink(graph.can, [codec.layout("CommandTrace").frame_id]) for graph in graphs]
+        for link in links:
+            link.open()
+        counts, begin = [0, 0], time.monotonic()
+        while (elapsed := time.monotonic() - begin) < duration:
+            time.sleep(0.5)
+            counts = [count + len(link.receive(0.0)) for count, link in zip(counts, links)]
+        for graph, link in zip(graphs, links):
+            graph.check()
+            link.close()
+    return [round(count / elapsed, 2) for count in counts]

@@ -59,6 +59,7 @@ ROWS = {
         Row("delay_ms.median", "IMU frame to the current frame that it caused, median", "ms", 8.0),
         Row("delay_ms.p99", "the same, 99th percentile", "ms", 25.0),
         Row("bridge_cpu", "bridge with six motors at 500 Hz feedback, share of a core", "", 0.5),
+        Row("two_robots_hz.slower", "two robots at 100 Hz on this machine: commands followed a second, the slower one", "Hz", 99.0, True),
     ),
     "faults": (
         Row("frames", "hostile frames and messages", "", 1_000_000, True),

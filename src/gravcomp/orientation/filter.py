@@ -68,6 +68,7 @@ class OrientationFilter:
         self._guard = SampleGuard(self.options.sensor)
         self._rest = RestDetector(self.options.rest)
         self._kalman = KalmanFilter(dim_x=9, dim_z=3)
+        self._kalman.inv = _inverse
         self._transition = np.eye(9)
         self._process = np.zeros((9, 9))
         self._process_diagonal = self._process.ravel()[::10]
@@ -76,6 +77,8 @@ class OrientationFilter:
         self._noise_velocity = np.zeros((3, 3))
         self._noise_at_rest = np.zeros((6, 6))
         self._zero = np.zeros((9, 1))
+        self._vertical = np.zeros((9, 2))
+        self._vertical[2, 1] = 1.0
         self.reset()
 
     def reset(self) -> None:
@@ -271,17 +274,14 @@ class OrientationFilter:
         believed far too much, and the bias would wander off by degrees a second.
         """
         w, x, y, z = self._orientation
-        up = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))  # earth's z in the sensor's frame
+        apart = self._vertical  # (9, 2) orthonormal: the bias about earth's z, and yaw
+        apart[3:6, 0] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+        # The two stay related to one another and to nothing else, (1 - E E^T) P (1 - E E^T) + E E^T P E E^T: two blocks, so still a
+        # covariance.
         covariance = self._kalman.P
-        along = up @ covariance[3:6]
-        alone, with_yaw, yaw = along[3:6] @ up, along[2], covariance[2, 2]
-        # Yaw and the bias about it stay related to one another and to nothing else: two blocks, so still a covariance.
-        covariance[3:6] -= up[:, None] * along
-        covariance[:, 3:6] -= (covariance[:, 3:6] @ up)[:, None] * up
-        covariance[2], covariance[:, 2] = 0.0, 0.0
-        covariance[3:6, 3:6] += alone * up[:, None] * up
-        covariance[3:6, 2] = covariance[2, 3:6] = with_yaw * up
-        covariance[2, 2] = yaw
+        related = apart.T @ covariance
+        removed = apart @ (related - (related @ apart) @ apart.T)
+        self._kalman.P = covariance - removed - removed.T
 
     def _learn_gravity(self, dt: float) -> None:
         """An accelerometer whose |a| at rest is not g would seem to accelerate upward for ever."""
@@ -313,3 +313,16 @@ class OrientationFilter:
             accel_norm_at_rest=self._accel_norm_at_rest,
             problem=problem,
         )
+
+
+def _inverse(covariance: np.ndarray) -> np.ndarray:
+    """As np.linalg.inv, whose checks cost more than the inversion of so small a matrix."""
+    from scipy.linalg.lapack import dgesv  # at the first sample, as filterpy
+
+    *_, inverse, failed = dgesv(covariance, _UNITY[len(covariance)])
+    if failed:
+        raise np.linalg.LinAlgError("the innovation's covariance is singular")
+    return inverse
+
+
+_UNITY = {size: np.eye(size) for size in (3, 6)}
