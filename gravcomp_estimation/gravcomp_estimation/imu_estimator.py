@@ -131,7 +131,8 @@ class ImuEstimator(ManagedNode):
         self._stamp_ns, self._estimate = stamp, estimate
         parameters = self.parameters
         self._gravity.publish(messages.vector(stamp, parameters.base_frame, estimate.gravity))
-        self._imu.publish(messages.imu_data(estimate, parameters.imu_frame, self._period, parameters.filter))
+        if self._imu.get_subscription_count():
+            self._imu.publish(messages.imu_data(estimate, parameters.imu_frame, self._period, parameters.filter))
         if not 0 <= stamp - self._bias_stamp_ns < BIAS_PERIOD_NS:
             self._bias_stamp_ns = stamp
             self._bias.publish(messages.vector(stamp, parameters.imu_frame, estimate.bias))

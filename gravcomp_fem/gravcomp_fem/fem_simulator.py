@@ -102,8 +102,9 @@ class FemSimulator(ManagedNode):
             return
         message.header.frame_id = self.parameters.base_frame
         self._deformation.publish(deformation_message(shape, message.header))
-        tip = pose_message(shape.tip_position, shape.tip_orientation)
-        self._tip.publish(PoseStamped(header=message.header, pose=tip))
+        if self._tip.get_subscription_count():
+            tip = pose_message(shape.tip_position, shape.tip_orientation)
+            self._tip.publish(PoseStamped(header=message.header, pose=tip))
         self._show(shape, message.header)
         level = {ShapeStatus.OK: OK, ShapeStatus.FALLBACK: WARN}.get(shape.status, ERROR)
         self.report(

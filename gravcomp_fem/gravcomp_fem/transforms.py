@@ -25,8 +25,8 @@ class TransformPublisher:
             self._node.destroy_publisher(self._publisher)
 
     def publish(self, shape: Shape, header: Header, tip_frame: str) -> None:
-        """Frames `tip_frame` and `<base>_backbone_<i>`; without tf2_msgs nothing."""
-        if not self._publisher:
+        """Frames `tip_frame` and `<base>_backbone_<i>`, where somebody listens; without tf2_msgs nothing."""
+        if not self._publisher or not self._publisher.get_subscription_count():
             return
         frames = [(tip_frame, shape.tip_position, shape.tip_orientation)]
         for i, (position, orientation) in enumerate(zip(shape.backbone_position, shape.backbone_orientation)):

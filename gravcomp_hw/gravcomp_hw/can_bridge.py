@@ -148,6 +148,8 @@ class CanBridge(ManagedNode):
         for name in ("command", "displacement", "velocity", "current", "tension"):
             setattr(message, name, array.array("d", getattr(snapshot, name)))
         self._state.publish(message)
+        if not self._joints.get_subscription_count():
+            return
         joints = JointState(name=list(self._hardware.cables))
         joints.header.stamp = self.get_clock().now().to_msg()
         joints.position, joints.velocity, joints.effort = message.displacement, message.velocity, message.tension

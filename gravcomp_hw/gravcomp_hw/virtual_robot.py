@@ -91,10 +91,13 @@ class VirtualRobotNode(ManagedNode):
     def _publish(self, truth: Truth) -> None:
         """Called from the robot's thread."""
         stamp, frame = self.get_clock().now().to_msg(), self.parameters.base_frame
-        tip = PoseStamped(pose=_pose(truth.tip_position, truth.tip_orientation))
-        gravity = Vector3Stamped()
-        gravity.vector.x, gravity.vector.y, gravity.vector.z = truth.gravity.tolist()
-        messages = [(self._publisher_tip, tip), (self._publisher_gravity, gravity)]
+        messages = []
+        if self._publisher_tip.get_subscription_count():
+            messages.append((self._publisher_tip, PoseStamped(pose=_pose(truth.tip_position, truth.tip_orientation))))
+        if self._publisher_gravity.get_subscription_count():
+            gravity = Vector3Stamped()
+            gravity.vector.x, gravity.vector.y, gravity.vector.z = truth.gravity.tolist()
+            messages.append((self._publisher_gravity, gravity))
         if self._publisher_backbone.get_subscription_count():
             poses = [_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)]
             messages.append((self._publisher_backbone, PoseArray(poses=poses)))

@@ -54,10 +54,12 @@ class Layout:
         self._scaling = [(float(s.scale), float(s.offset), s.scale == 1 and s.offset == 0) for s in self.signals]
         self._plain = all(plain for _, _, plain in self._scaling)
         self.checked = self.signals[-1].name == "check"
-        self._bounds = []
-        for signal in self.signals:
+        self._given = []  # of each signal but the check: name, scale, offset, least and greatest count
+        for signal, (scale, offset, _) in zip(self.signals, self._scaling):
             low = -(1 << signal.length - 1) if signal.is_signed else 0
-            self._bounds.append((low, low + (1 << signal.length) - 1))
+            if signal.name != "check":
+                self._given.append((signal.name, scale, offset, low, low + (1 << signal.length) - 1))
+        self._names = {name for name, *_ in self._given}
 
     def decode(self, data: bytes) -> Any:
         """The named tuple of physical values. Raises FrameError for a wrong length or check."""
@@ -75,22 +77,21 @@ class Layout:
 
         Raises FrameError for a missing or unknown signal, NaN, or a value that does not fit.
         """
-        names = [s.name for s in self.signals if s.name != "check"]
-        if set(values) != set(names):
-            raise FrameError(f"{self.name} has the signals {', '.join(names)}; got {', '.join(values)}")
+        if values.keys() != self._names:
+            raise FrameError(f"{self.name} has the signals {', '.join(name for name, *_ in self._given)}; got {', '.join(values)}")
         raw = []
-        for signal, (scale, offset, _), (low, high) in zip(self.signals, self._scaling, self._bounds):
-            value = values.get(signal.name, 0)
+        for name, scale, offset, low, high in self._given:
+            value = values[name]
             if not math.isfinite(value):
-                raise FrameError(f"{self.name}.{signal.name} is {value}; a finite number is needed")
+                raise FrameError(f"{self.name}.{name} is {value}; a finite number is needed")
             count = round((value - offset) / scale)
             if not low <= count <= high:
-                raise FrameError(
-                    f"{self.name}.{signal.name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}"
-                )
+                raise FrameError(f"{self.name}.{name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}")
             raw.append(count)
-        data = self._struct.pack(*raw)
-        return data[:-1] + bytes([check_byte(self.frame_id, data[:-1])]) if self.checked else data
+        if not self.checked:
+            return self._struct.pack(*raw)
+        data = self._struct.pack(*raw, 0)[:-1]
+        return data + bytes([check_byte(self.frame_id, data)])
 
 
 @functools.cache

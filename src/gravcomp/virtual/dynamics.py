@@ -76,13 +76,9 @@ class MovingRod:
         self._path = np.zeros((m, n))
         self._wound = np.zeros(m)
         self.tension = np.zeros(m)  # N, at the capstan
+        self.shortened = np.zeros(m)  # m, by how much the tendons' paths are shorter than in the straight rod
         self.tendon_stiffness = model.tendon_stiffness.copy()  # N/m; 0: the tendon is broken
         self._measure()
-
-    @property
-    def shortened(self) -> np.ndarray:
-        """(m,) m: by how much the tendons' paths are shorter than in the straight rod."""
-        return self.model.tendon_length - self._path.sum(axis=1)
 
     def along(self, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, 3) and orientations (k, 4), x y z w, in the base's frame at the stations (k,), along the helices of
@@ -129,8 +125,7 @@ class MovingRod:
         rest.
         """
         model, material, friction = self.model, self.material, self.friction
-        before = [array.copy() for array in (self.orientation, self.position, self._branch_strain, self._slip_strain)]
-        iterations = _step(
+        possible, iterations = _step(
             dt,
             base_orientation,
             base_position,
@@ -148,6 +143,7 @@ class MovingRod:
             self._sliding,
             self._path,
             self.tension,
+            self.shortened,
             model.length,
             model.stiffness,
             model.mass,
@@ -167,8 +163,8 @@ class MovingRod:
             friction.presliding,
         )
         self._wound[:] = wound
-        if not self._is_possible():
-            self._carry(before, base_orientation, base_position)
+        if not possible:
+            self._rest_as_it_was(base_orientation, base_position)
             return False
         return iterations < _MOST_ITERATIONS
 
@@ -186,20 +182,9 @@ class MovingRod:
         tendon_lengths(
             self.strain, model.length, model.tendon_offset, model.tendon_start, model.tendon_end, direction, self._path
         )
+        self.shortened[:] = model.tendon_length - self._path.sum(axis=1)
 
-    def _is_possible(self) -> bool:
-        reach = 2.0 * float(self.model.length.sum())
-        turn = np.abs(self.strain[:, 3:]) * self.model.length[:, None]
-        # Written so that NaN is not possible.
-        return bool(
-            (np.abs(self.orientation) < 1.0 + 1e-6).all()
-            and (np.abs(self.position - self.position[0]) < reach).all()
-            and (turn < _LARGEST_TURN).all()
-            and (np.abs(self.velocity) < _LARGEST_VELOCITY).all()
-        )
-
-    def _carry(self, before: list[np.ndarray], base_orientation: np.ndarray, base_position: np.ndarray) -> None:
-        self.orientation, self.position, self._branch_strain, self._slip_strain = before
+    def _rest_as_it_was(self, base_orientation: np.ndarray, base_position: np.ndarray) -> None:
         self.carry(base_orientation, base_position)
         for rates in (self.velocity, self._acceleration, self._velocity_rate):
             rates[:] = 0.0
@@ -227,6 +212,7 @@ def _step(
     sliding,
     path,
     tension,
+    shortened,
     length,
     stiffness,
     mass,
@@ -245,6 +231,7 @@ def _step(
     guide_angle,
     presliding,
 ):
+    """Whether the state at the end is possible, and how many iterations it took; pose and material are those of before if it is not."""
     n, m, branches = length.shape[0], tendon_end.shape[0], branch_time.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
     gamma = _GAMMA / (dt * _BETA)
@@ -274,6 +261,7 @@ def _step(
             acceleration[k, i] = a
             velocity_rate[k, i] = 0.0
     start_orientation, start_position = orientation.copy(), position.copy()
+    start_branch_strain, start_slip_strain = branch_strain.copy(), slip_strain.copy()
     orientation[0] = base_orientation
     position[0] = base_position
 
@@ -357,8 +345,31 @@ def _step(
             beyond += path_before[c, e] - path[c, e]
             sliding[c, e + 1] = _slide(sliding[c, e + 1], beyond, presliding)
         sliding[c, 0] = _slide(sliding[c, 0], wound[c] - wound_before[c], presliding)
+        shortened[c] = tendon_rest[c] - np.sum(path[c])
     strain[:] = new_strain
-    return iterations
+    possible = _is_possible(orientation, position, strain, velocity, length)
+    if not possible:
+        orientation[:], position[:] = start_orientation, start_position
+        branch_strain[:], slip_strain[:] = start_branch_strain, start_slip_strain
+    return possible, iterations
+
+
+@njit(cache=True, error_model="numpy")
+def _is_possible(orientation, position, strain, velocity, length):
+    """Written so that NaN is not possible."""
+    reach = 2.0 * np.sum(length)
+    possible = True
+    for k in range(orientation.shape[0]):
+        for i in range(3):
+            possible = possible and abs(position[k, i] - position[0, i]) < reach
+            for j in range(3):
+                possible = possible and abs(orientation[k, i, j]) < 1.0 + 1e-6
+        for i in range(6):
+            possible = possible and abs(velocity[k, i]) < _LARGEST_VELOCITY
+    for e in range(length.shape[0]):
+        for i in range(3, 6):
+            possible = possible and abs(strain[e, i]) * length[e] < _LARGEST_TURN
+    return possible
 
 
 @njit(cache=True, error_model="numpy")

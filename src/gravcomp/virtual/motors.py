@@ -48,16 +48,17 @@ class MotorBank:
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
         """Advance by `ticks` of TICK, the robot's cable paths being `shortened` (m,) m, each cable a spring (m,) N/m."""
         p = self._parameters
-        command = np.clip(self.commanded, -_MAXIMUM_CURRENT, _MAXIMUM_CURRENT) * self._direction
         _step(
             ticks,
             self._rotor,
             self._speed,
             self._capstan,
             self._current,
-            command,
+            self.commanded,
+            self._direction,
             self.stalled,
-            shortened + self._slack,
+            shortened,
+            self._slack,
             spring,
             p.torque_constant / self._ratio,
             p.rotor_inertia,
@@ -78,12 +79,21 @@ class MotorBank:
 
     def feedback(self) -> list[dict[str, float]]:
         """Angle (counts), speed (rpm) and current (A) as the C610 of each motor sends them."""
-        turns = self._direction * self._rotor / (2 * math.pi)
-        angle = (np.floor(turns * COUNTS_PER_TURN).astype(np.int64) + self._start_count) % COUNTS_PER_TURN
-        speed = np.clip(np.rint(self._direction * self._speed * (60 / (2 * math.pi))), -32768, 32767)
-        noise = self._parameters.current_noise * self._random.standard_normal(len(angle))
-        current = np.clip(self._direction * self._current + noise, -32.0, 32.0)
-        return [{"angle": a, "speed": s, "current": i} for a, s, i in zip(angle.tolist(), speed.tolist(), current.tolist())]
+        noise = self._parameters.current_noise * self._random.standard_normal(len(self._rotor))
+        values = _feedback(self._rotor, self._speed, self._current, self._direction, self._start_count, noise)
+        return [{"angle": int(angle), "speed": speed, "current": current} for angle, speed, current in values.tolist()]
+
+
+@njit(cache=True, error_model="numpy")
+def _feedback(rotor, speed, current, direction, start_count, noise):
+    """(m, 3): angle in counts, speed in rpm, current in A."""
+    values = np.empty((rotor.shape[0], 3))
+    for c in range(rotor.shape[0]):
+        count = math.floor(direction[c] * rotor[c] / (2 * math.pi) * COUNTS_PER_TURN) + start_count[c]
+        values[c, 0] = count % COUNTS_PER_TURN
+        values[c, 1] = min(32767.0, max(-32768.0, np.rint(direction[c] * speed[c] * (60 / (2 * math.pi)))))
+        values[c, 2] = min(32.0, max(-32.0, direction[c] * current[c] + noise[c]))
+    return values
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,9 +103,11 @@ def _step(
     speed,
     capstan,
     current,
-    command,
+    commanded,
+    direction,
     stalled,
-    offset,
+    shortened,
+    slack,
     spring,
     torque_constant,
     inertia,
@@ -111,12 +123,14 @@ def _step(
 ):
     half = 0.5 * backlash
     for c in range(rotor.shape[0]):
+        command = direction[c] * min(_MAXIMUM_CURRENT, max(-_MAXIMUM_CURRENT, commanded[c]))
+        offset = shortened[c] + slack[c]
         for _ in range(ticks):
-            current[c] += current_gain * (command[c] - current[c])
+            current[c] += current_gain * (command - current[c])
             # The back-EMF leaves less current the faster the rotor turns in the current's direction.
             room = 10.0 * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
-            force = spring[c] * max(0.0, radius * capstan[c] - offset[c])
+            force = spring[c] * max(0.0, radius * capstan[c] - offset)
             at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9
             load = force * radius / ratio if at_flank else 0.0
             if stalled[c]:
@@ -130,6 +144,6 @@ def _step(
                 rotor[c] += TICK * speed[c]
             output = rotor[c] / ratio
             # Inside the backlash the cable draws the capstan out until its drag holds it.
-            held = offset[c] / radius + (drag / (spring[c] * radius * radius) if spring[c] > 0.0 else 1e9)
+            held = offset / radius + (drag / (spring[c] * radius * radius) if spring[c] > 0.0 else 1e9)
             drawn = min(capstan[c], max(held, output - half))
             capstan[c] = min(output + half, max(output - half, drawn))

@@ -184,7 +184,7 @@ class VirtualRobot:
             gravity=base.T @ _GRAVITY,
             base_orientation=quaternion(base),
             displacement=self._motors.wound,
-            shortened=self._rod.shortened,
+            shortened=self._rod.shortened.copy(),
             tension=self._rod.tension.copy(),
             current=self._motors.commanded.copy(),
             temperature=self._board.temperature,
@@ -242,6 +242,8 @@ class VirtualRobot:
         return np.array([fault.cable in ("", cable) for cable in self._hardware.cables])
 
     def _frame_faults(self) -> list[tuple[Fault, int | None]]:
+        if not self._faults:
+            return []
         ids = {motor.cable: 0x200 + motor.can_id for motor in self._hardware.motors}
         return [(fault, ids.get(fault.cable)) for fault, _ in self._faults]
 
