@@ -70,7 +70,7 @@ class LoopbackMulticastBus(can.BusABC):
             if address != self._own_address:
                 message = self._decode(datagram, ancillary)
                 # Filtered here: BusABC.recv would take a frame that is not wanted for the end of what is waiting.
-                if message is not None and self._matches_filters(message):
+                if message is not None and self._is_wanted(message):
                     return message, True
 
     def _decode(self, datagram: bytes, ancillary: list) -> can.Message | None:
@@ -89,7 +89,13 @@ class LoopbackMulticastBus(can.BusABC):
 
     def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
         exact = filters is not None and all(f["can_mask"] == 0x7FF and f.get("extended") is False for f in filters)
-        attach(self._receiver, self._own_address[1], [f["can_id"] for f in filters] if exact else None)
+        self._ids = frozenset(f["can_id"] for f in filters) if exact else None
+        attach(self._receiver, self._own_address[1], self._ids and sorted(self._ids))
+
+    def _is_wanted(self, message: can.Message) -> bool:
+        if self._ids is None:
+            return self._matches_filters(message)
+        return message.arbitration_id in self._ids and not message.is_extended_id
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         try:

@@ -57,14 +57,13 @@ class ProgrammeSolver:
         """The programme's solution. Raises SolverFailed; after that the next solve starts cold."""
         started = time.perf_counter()
         m, bounds = self._cables, programme.bounds
-        # A number that is not finite leaves its trace in one of these sums.
-        if not math.isfinite(programme.hessian.sum() + programme.gradient.sum() + programme.offset.sum() + programme.compliance.sum()):
-            raise SolverFailed("the model's linear answer holds numbers that are not finite")
         parts = self._hessian, self._gradient, self._rows, self._lower, self._upper, self._box_lower, self._box_upper
-        tension_scale = _scaled(
+        tension_scale, trace = _scaled(
             programme.hessian, programme.gradient, programme.compliance, programme.offset,
             bounds.displacement_lower, bounds.displacement_upper, bounds.tension_lower, bounds.tension_upper, *parts,
         )  # fmt: skip
+        if not math.isfinite(trace):
+            raise SolverFailed("the model's linear answer holds numbers that are not finite")
         self._exact, found = _solved(self._exact, _MOST_ITERATIONS, *parts)
         if found:
             self._elastic = None
@@ -76,10 +75,7 @@ class ProgrammeSolver:
                 self.reset()
                 raise SolverFailed(f"the solver ended with {status}")
         results = (self._exact or self._elastic).results
-        tension = np.round(results.x[:m] * tension_scale / _QUANTUM) * _QUANTUM
-        tension = np.minimum(np.maximum(tension, bounds.tension_lower), bounds.tension_upper)
-        # The Hessian's diagonal is one, so a multiplier is also the step that would undo it.
-        unwanted = np.round(np.maximum(0.0, -results.z[m : 2 * m]) * tension_scale / _QUANTUM) * _QUANTUM
+        tension, unwanted = _unscaled(m, results.x, results.z, tension_scale, bounds.tension_lower, bounds.tension_upper)
         return Solution(tension, unwanted, time.perf_counter() - started, int(results.info.iter))
 
 
@@ -115,7 +111,8 @@ def _scaled(
     hessian, gradient, compliance, offset, displacement_lower, displacement_upper, tension_lower, tension_upper,
     to_hessian, to_gradient, to_constraint, lower, upper, box_lower, box_upper,
 ):  # fmt: skip
-    """Write the scaled programme's parts that are the tensions'; returns the tensions' scale (m,)."""
+    """Write the scaled programme's parts that are the tensions'; returns the tensions' scale (m,), and a sum in which a number that
+    is not finite leaves its trace."""
     m = len(gradient)
     # Millimetres make the cost of order one.
     scale = 1e-3 / np.sqrt(0.5 * np.diag(hessian))
@@ -132,4 +129,15 @@ def _scaled(
             to_constraint[i, k] *= row
         lower[i] = max((displacement_lower[i] - offset[i]) * row, -_NO_BOUND)
         upper[i] = min((displacement_upper[i] - offset[i]) * row, _NO_BOUND)
-    return scale
+    return scale, hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
+
+
+@njit(cache=True)
+def _unscaled(m, x, z, scale, lower, upper):
+    """Tensions within their bounds and how far below the lower one each is wanted, both (m,) N and free of the solver's last bits."""
+    tension, unwanted = np.empty(m), np.empty(m)
+    for i in range(m):
+        tension[i] = min(max(np.rint(x[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
+        # The Hessian's diagonal is one, so a multiplier is also the step that would undo it.
+        unwanted[i] = np.rint(max(0.0, -z[m + i]) * scale[i] / _QUANTUM) * _QUANTUM
+    return tension, unwanted

@@ -29,6 +29,7 @@ RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
 HEATER_TIMEOUT = 0.5
 """s without a heater command after which the duty is zero."""
 
+_NEAR = 0.15  # of a control period
 _BEAT_PERIOD = 0.01  # s; at 25 mm/s a rotor makes a third of a turn in it, and the guard shall know the turns when the bridge dies
 _HEATER_PERIOD = 0.1  # s
 _LONGEST_QUEUE = 256
@@ -154,18 +155,22 @@ class BridgeDriver:
                 time.sleep(_PAUSE_AFTER_ERROR)
 
     def _cycle(self) -> None:
-        """Receive until the next control period, or until frames come; then do what is due."""
+        """Receive until the next control period, or until frames come; then do what is due.
+
+        Frames that come near the end of a period end it: currents follow fresh feedback, and the thread wakes once for both.
+        """
         period, state_period = 1.0 / self._options.rate, 1.0 / self._options.state_rate
-        frames = self.link.receive(max(0.0, self._next_tick - time.monotonic()))
+        near = _NEAR * period
+        frames = self.link.receive(max(0.0, self._next_tick + near - time.monotonic()))
         with self._lock:
             now = time.monotonic()
             self._take(frames, now)
             if not self.link.is_open:
                 self.bridge.bus_lost(self.link.status)
-            if now >= self._next_tick:
+            if now >= self._next_tick + (-near if frames else near):
                 self.link.send(self.bridge.tick(now))
                 self.overruns += now > self._next_tick + 2 * period
-                self._next_tick = max(self._next_tick + period, now)
+                self._next_tick = now + period if frames else max(self._next_tick + period, now)
             record = self.bridge.zero_record() if now >= self._next_beat else None
             changed = self.bridge.state is not self._told
             snapshot = self.bridge.snapshot() if changed or now >= self._next_state else None
