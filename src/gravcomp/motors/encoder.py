@@ -28,8 +28,8 @@ JUMPS = 4
 """So many implausible feedbacks are an encoder fault, two plausible ones making up for one implausible: four in a row, or
 every other one, as from two controllers with the same id."""
 
-SETTLING_TIME = 0.1
-"""s of feedback after which turns in doubt stay so."""
+SETTLING_TIME = 0.2
+"""s of feedback after which turns in doubt stay so: a receiver that was held up may be so again before it has caught up."""
 
 _COUNTS_PER_S = COUNTS_PER_TURN / 60.0  # a rpm
 _TOLERANCE = 400.0  # counts, at standstill
@@ -136,11 +136,12 @@ class Encoder:
         return True
 
     def _settle(self, turns: list[int], turned: float, low: float, high: float, now: float) -> None:
-        """Leave out the counts that the rotor had no time for."""
+        """Leave out the counts that the rotor had no time for; `turns` is the doubt of the last feedback alone."""
         doubt = self._doubt
         doubt.turned, doubt.low, doubt.high = doubt.turned + turned, doubt.low + low, doubt.high + high
-        doubt.turns = [k for k in doubt.turns if doubt.low <= doubt.turned + k * COUNTS_PER_TURN <= doubt.high]
-        if len(turns) > 1 or not doubt.turns or now - doubt.since > SETTLING_TIME:
+        possible = sorted({before + k for before in doubt.turns for k in turns})
+        doubt.turns = [k for k in possible if doubt.low <= doubt.turned + k * COUNTS_PER_TURN <= doubt.high]
+        if not doubt.turns or now - doubt.since > SETTLING_TIME:
             self._give_up()
         elif len(doubt.turns) == 1:
             self.count += doubt.turns[0] * COUNTS_PER_TURN
