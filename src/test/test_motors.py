@@ -91,21 +91,24 @@ def test_turns_in_doubt_are_told_within_0_2_s_or_not_at_all():
     assert begin + 0.03 <= min(settling) and max(settling) < begin + 0.03 + SETTLING_TIME + 0.003
 
 
-def test_turns_are_counted_when_the_receiver_is_held_up_again_before_it_has_caught_up():
-    """Held up for 60, 50 and 40 ms while the rotor slows down from 1700 rpm; in between half of what waits comes at once."""
-    encoder, count, waiting = Encoder(), 0.0, []
-    for k in range(400):
-        now = 0.002 * k
-        rpm = 1700 - 4 * k
-        count += rpm / RPM * 0.002
-        waiting.append((int(count // 1) % COUNTS_PER_TURN, rpm))
-        if 0.1 <= now < 0.16 or 0.164 <= now < 0.214 or 0.218 <= now < 0.258:
-            continue
-        held_up = 0.16 <= now < 0.26
-        for angle, speed in waiting[: len(waiting) // 2 + 1] if held_up else waiting:
-            encoder.update(angle, speed, 0.0, now)
-        waiting = waiting[len(waiting) // 2 + 1 :] if held_up else []
-    assert encoder.certain and encoder.count == pytest.approx(count, abs=2) and encoder.rejected == 0
+@pytest.mark.parametrize("stalls", [[(0.02, 0.06)], [(0.03, 0.09)], [(0.02, 0.05), (0.054, 0.09)], [(0.06, 0.11), (0.112, 0.15)]])
+@pytest.mark.parametrize("start", [0, 2000, 5000])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_turns_are_counted_when_frames_held_up_tell_of_speeding_up_and_slowing_down(stalls, start, sense):
+    """125 feedbacks a second; from rest to 1900 rpm in 0.08 s, and back to rest."""
+    encoder, waiting = Encoder(), []
+    for k in range(60):
+        now = 0.008 * k
+        t = min(now, 0.16)
+        rpm = sense * 1900 * (t if t < 0.08 else 0.16 - t) / 0.08
+        turned = 1900 / RPM * (t * t / 0.16 if t < 0.08 else 0.08 - (0.16 - t) ** 2 / 0.16)
+        waiting.append((int((start + sense * turned) // 1) % COUNTS_PER_TURN, rpm))
+        if not any(begin <= now < end for begin, end in stalls):
+            for angle, speed in waiting:
+                encoder.update(angle, speed, 0.0, now)
+            waiting = []
+    assert encoder.certain and encoder.rejected == 0
+    assert encoder.count == pytest.approx(start + sense * turned, abs=2)
 
 
 @pytest.mark.parametrize("rpm", [100, -700, 1500, 2750])

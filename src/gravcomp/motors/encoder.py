@@ -13,8 +13,9 @@ far it gets beside a steady motion when it speeds up and slows down again in bet
 - one is: it is the count;
 - several are: the one nearest to (v + v_last) / 2 x dt is taken, and the count is `certain` no more. It may be off by whole turns.
 
-What comes next may tell: when a receiver was held up, its frames come all at once, and a count that has one turn too many then has more
-turns than there was time for since the doubt began. Until this is known, or SETTLING_TIME is over, the encoder is `settling`.
+What comes next may tell: when a receiver was held up, its frames come all at once, and for a count that has a turn too many there was
+no time since the doubt began. A distance d needs at least the t of |d| - tolerance = v t + a t^2 / 4, with the greater speed v of its two
+ends; all of them have to fit between the arrivals. Until this is known, or SETTLING_TIME is over, the encoder is `settling`.
 
 A rotor that stood before and stands now at the same angle has not moved, however long the silence.
 """
@@ -33,6 +34,7 @@ SETTLING_TIME = 0.2
 
 _COUNTS_PER_S = COUNTS_PER_TURN / 60.0  # a rpm
 _TOLERANCE = 400.0  # counts, at standstill
+_STEP_TOLERANCE = 20.0  # counts, between two feedbacks whose turns are certain
 _TIME_UNCERTAINTY = 0.008  # s, of the frames' arrival
 _ACCELERATION = 2e6  # counts/s^2 of a; 0.2 m/s^2 of the cable
 _REST_SPEED, _REST_ANGLE = 30.0, 200.0  # rpm, counts (0.02 mm of cable): it stands, and where it stood
@@ -42,13 +44,12 @@ _SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current: beyond wha
 
 @dataclasses.dataclass
 class _Doubt:
-    """Since when (s), by which whole turns the count may be off, and how far the rotor has turned and can have turned since (counts)."""
+    """The arrival of the last feedback before the doubt and of the first in it (s); by which whole turns the count may be off, and the
+    least time (s) that the rotor needs for what it has then turned since."""
 
+    begin: float
     since: float
-    turns: list[int]
-    turned: float
-    low: float
-    high: float
+    needed: dict[int, float]
 
 
 class Encoder:
@@ -129,22 +130,27 @@ class Encoder:
             before = round((turned - first) / COUNTS_PER_TURN)
             turns = [k - before for k in range(1 + int((high - first) // COUNTS_PER_TURN))]
         self.count += round(turned)
+        if self._doubt is None and len(turns) > 1:
+            self._doubt = _Doubt(self.time, now, {0: 0.0})
         if self._doubt is not None:
-            self._settle(turns, turned, slowest * elapsed - beside, fastest * elapsed + beside, now)
-        elif len(turns) > 1:
-            self._doubt = _Doubt(now, turns, turned, low, high)
+            tolerance = _TOLERANCE if len(turns) > 1 else _STEP_TOLERANCE
+            needed = {k: _least_time(turned + k * COUNTS_PER_TURN, slowest, fastest, tolerance) for k in turns}
+            self._settle(needed, now)
         return True
 
-    def _settle(self, turns: list[int], turned: float, low: float, high: float, now: float) -> None:
-        """Leave out the counts that the rotor had no time for; `turns` is the doubt of the last feedback alone."""
-        doubt = self._doubt
-        doubt.turned, doubt.low, doubt.high = doubt.turned + turned, doubt.low + low, doubt.high + high
-        possible = sorted({before + k for before in doubt.turns for k in turns})
-        doubt.turns = [k for k in possible if doubt.low <= doubt.turned + k * COUNTS_PER_TURN <= doubt.high]
-        if not doubt.turns or now - doubt.since > SETTLING_TIME:
+    def _settle(self, needed: dict[int, float], now: float) -> None:
+        """Leave out the counts that the rotor had no time for; `needed`: what the last feedback may be off by, and the least time for it."""
+        doubt, room = self._doubt, now - self._doubt.begin + _TIME_UNCERTAINTY
+        together: dict[int, float] = {}
+        for before, spent in doubt.needed.items():
+            for turns, time in needed.items():
+                if spent + time <= room:
+                    together[before + turns] = min(spent + time, together.get(before + turns, math.inf))
+        doubt.needed = together
+        if not together or now - doubt.since > SETTLING_TIME:
             self._give_up()
-        elif len(doubt.turns) == 1:
-            self.count += doubt.turns[0] * COUNTS_PER_TURN
+        elif len(together) == 1:
+            self.count += next(iter(together)) * COUNTS_PER_TURN
             self._doubt = None
 
     def _give_up(self) -> None:
@@ -154,6 +160,13 @@ class Encoder:
         self.jumps += 1
         self.rejected += 1
         return False
+
+
+def _least_time(distance: float, slowest: float, fastest: float, tolerance: float) -> float:
+    """s that the rotor needs for the distance (counts) between two feedbacks with these speeds (counts/s; at most, at least 0)."""
+    speed = fastest if distance > 0.0 else -slowest
+    distance = max(0.0, abs(distance) - tolerance)
+    return (math.sqrt(speed * speed + _ACCELERATION * distance) - speed) * 2.0 / _ACCELERATION
 
 
 def _wrap(counts: float) -> float:
