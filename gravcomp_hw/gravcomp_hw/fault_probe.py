@@ -96,10 +96,15 @@ class FaultProbe(ManagedNode):
         )
 
     def _set_enabled(self, on: bool) -> None:
-        ready = self._enable.wait_for_service(5.0)
-        if ready:
-            self._enable.call_async(SetBool.Request(data=on))
-        _tell(event="enabled", on=on, success=ready)
+        """Asked until it is answered: a controller that was started anew does not hear at once, though the dead one's service still is
+        on the list."""
+        end, done = time.monotonic() + _MATCH_TIMEOUT, False
+        while not done and time.monotonic() < end:
+            if self._enable.wait_for_service(1.0):
+                answered = threading.Event()
+                self._enable.call_async(SetBool.Request(data=on)).add_done_callback(lambda _, answered=answered: answered.set())
+                done = answered.wait(1.0)
+        _tell(event="enabled", on=on, success=done)
 
     def _command(self, displacement: list[float], count: int = 1) -> None:
         for _ in range(count):

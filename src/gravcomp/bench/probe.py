@@ -57,7 +57,8 @@ class Probe:
     def enable(self, on: bool) -> None:
         """Let the controller send commands, or not."""
         self._order(do="enable", on=on)
-        self._expect("enabled", 10.0)
+        if not self._expect("enabled", 15.0)["success"]:
+            raise TimeoutError("the controller did not answer ~/enable")
 
     def command(self, displacement: list[float], count: int = 1) -> None:
         self._order(do="command", displacement=displacement, count=count)
