@@ -15,7 +15,7 @@ from gravcomp.canbus.link import CanLink
 from gravcomp.judging.bus_delay import delays_of
 
 _WARM_UP, _LISTEN, _COST = 5.0, 10.0, 15.0  # s
-_LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's: two robots of 500 Hz are two buses that no USB adapter carries
+_LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's
 
 
 def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST) -> dict:

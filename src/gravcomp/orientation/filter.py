@@ -37,6 +37,7 @@ CONTRADICTED_TILT = math.radians(2.0)  # at rest between specific force and grav
 MISSED_PERIODS = 2.5  # a longer step than so many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: how far |a| at rest may be off and still be made good
+_UNITY = {size: np.eye(size) for size in (3, 6)}  # of the measurements: velocity, and the bias with it
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,6 +324,3 @@ def _inverse(covariance: np.ndarray) -> np.ndarray:
     if failed:
         raise np.linalg.LinAlgError("the innovation's covariance is singular")
     return inverse
-
-
-_UNITY = {size: np.eye(size) for size in (3, 6)}
