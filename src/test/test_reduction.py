@@ -9,7 +9,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Elements
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError
-from gravcomp.reduction import BuildOptions, TrainingOptions, build, load, path_of, why_not
+from gravcomp.reduction import BuildOptions, ReducedServing, TrainingOptions, build, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.simulation import DynamicsOptions, DynamicSimulator, RobotModel, ShapeStatus, Simulator
@@ -75,7 +75,7 @@ def test_with_all_strains_forces_and_stiffness_are_those_of_the_elements(modes):
         force = basis.T @ model.free(model.elements.assemble(u, matrix))
         own_force, own_stiffness, _ = polynomials.evaluate(q)
         assert own_force == pytest.approx(force, rel=1e-6, abs=1e-9)
-        assert own_stiffness == pytest.approx(basis.T @ matrix.multiply(basis), rel=1e-6, abs=1e-7)
+        assert np.tril(own_stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-6, abs=1e-7)
 
 
 def test_stiffness_is_the_derivative_of_the_force(modes):
@@ -83,7 +83,7 @@ def test_stiffness_is_the_derivative_of_the_force(modes):
     polynomials = strain_polynomials(model.elements, basis, shapes, extra=2)
     q, h = np.array([0.05, -0.08, 0.02]), 1e-6
     difference = [(polynomials.evaluate(q + d)[0] - polynomials.evaluate(q - d)[0]) / (2 * h) for d in h * np.eye(3)]
-    assert polynomials.evaluate(q)[1] == pytest.approx(np.array(difference), rel=1e-6, abs=1e-8)
+    assert np.tril(polynomials.evaluate(q)[1]) == pytest.approx(np.tril(difference), rel=1e-6, abs=1e-8)
 
 
 def test_reduced_model_follows_the_full_one_in_the_closed_loop(built):
@@ -156,8 +156,7 @@ def test_measured_error_takes_the_reduced_model_out_of_service(built):
     serving = simulator._serving
     # As if the basis were worn out: the elasticity of a body that is 30 % stiffer.
     wrong = dataclasses.replace(serving.reduced.elasticity, linear=1.14 * serving.reduced.elasticity.linear)
-    serving._tracker.model = serving.reduced = dataclasses.replace(serving.reduced, elasticity=wrong)
-    serving.reset()
+    serving = simulator._serving = ReducedServing(model, dataclasses.replace(serving.reduced, elasticity=wrong), simulator.solver)
     models = [simulator.step(np.array([-9.81, 0.0, 0.0])).model for _ in range(40)]
     assert models[-1] == "full"
     assert "off by" in serving.reason

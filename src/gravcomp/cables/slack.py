@@ -23,12 +23,12 @@ def taut_tensions(
     """
     held = ~np.isnan(wound)
     guess = held & taut if taut is not None else np.zeros(len(free), dtype=np.bool_)
-    return _pivoted(np.ascontiguousarray(compliance), np.where(held, wound - free, 0.0), held, guess)
+    return pivoted(np.ascontiguousarray(compliance), np.where(held, wound - free, 0.0), held, guess)
 
 
 @njit(cache=True)
-def _pivoted(compliance, lack, held, taut):
-    """Tensions (m,) for the displacements lacking (m,); only what is `held` (m,) can be taut; `taut` (m,) is changed."""
+def pivoted(compliance: np.ndarray, lack: np.ndarray, held: np.ndarray, taut: np.ndarray) -> np.ndarray:
+    """Tensions (m,) for the displacements lacking (m,); only what is `held` (m,) can be taut; the guess `taut` (m,) is changed."""
     m = len(lack)
     tension = np.zeros(m)
     for _ in range(50 + 2**m):

@@ -11,9 +11,9 @@ here, and the correction that this factor still gives after the step decides whe
 import dataclasses
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
 
-from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons
+from gravcomp.reduction.cholesky import factorise, solve_rows
+from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness, lacking, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.simulation.generalized_alpha import DynamicsOptions, GeneralizedAlpha
 from gravcomp.simulation.statics import CableInput
@@ -62,13 +62,13 @@ class ReducedDynamicSolver:
         self._damping_time, self._creep_ratio = (damping_time, creep[0]) if options.damping == "kelvin_voigt" else (0.0, 0.0)
         self._creep_time = creep[1]
         self._tolerance = tolerance * length
-        self._cables = ReducedCables(model)
-        self._tip = model.section_change[-1, 0]
-        self.place(np.zeros(model.size), np.zeros(len(model.rest_length)), np.zeros(3))
+        self._released = np.full(len(model.cables.rest_length), np.nan)
+        self._tip = np.ascontiguousarray(model.section_change[-1, 0])
+        self.place(np.zeros(model.size), np.zeros(len(self._released)), np.zeros(3))
 
     def place(self, q: np.ndarray, tension: np.ndarray, gravity: np.ndarray) -> None:
         """Start at rest at q (r,) under the tensions (m,) and gravity (3,), with the acceleration that follows."""
-        tendons = self._cables.state(q)
+        tendons = tendons_at(self.model.cables, q)
         inner, _, strain = self.model.elasticity.evaluate(q)
         force = inner - self.model.weight @ gravity - tension @ tendons.jacobian
         acceleration = np.linalg.solve(self._mass, -force)
@@ -83,7 +83,7 @@ class ReducedDynamicSolver:
         if drag is not None:
             force -= drag @ velocity
         strain = self.model.elasticity.evaluate(q)[2]
-        self.state = ReducedMotion(q, velocity, acceleration, tension, self._cables.state(q), force, strain, strain, np.zeros_like(strain))
+        self.state = ReducedMotion(q, velocity, acceleration, tension, tendons_at(self.model.cables, q), force, strain, strain, np.zeros_like(strain))
 
     def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> ReducedMotion:
         """One step of h seconds; `converged` is False when Newton's method did not settle, the state is then the old one."""
@@ -111,8 +111,8 @@ class ReducedDynamicSolver:
             if drag is not None:
                 out += drag @ (now * velocity + before * last.velocity)
             if factor is not None:
-                lacking = self._cables.lacking(tendons, tension, compliance, cables)
-                left = self._tip @ (dpotrs(factor, out, lower=1)[0] - answer @ lacking)
+                pull = lacking(model.cables, tendons, tension, compliance, self._released if cables.wound is None else cables.wound)
+                left = of_tip @ out - self._tip @ (pull @ answer)
                 if left @ left < self._tolerance**2:
                     residual = float(np.sqrt(out @ model.force_norm @ out))
                     held = decay * last.held + gain * (strain - last.strain)
@@ -123,28 +123,27 @@ class ReducedDynamicSolver:
             factor = self._factor(now * stiffness + inertia, tendons, now * tension)
             if factor is None:
                 break
-            right = np.empty((q.size, 1 + tension.size), order="F")
-            right[:, 0], right[:, 1:] = -out, now * tendons.jacobian.T
-            solved, _ = dpotrs(factor, right, lower=1, overwrite_b=1)
-            y, answer = solved[:, 0], solved[:, 1:]
-            compliance = tendons.jacobian @ answer
+            rows = np.concatenate([-out[None], now * tendons.jacobian, self._tip])
+            solve_rows(factor, rows)
+            y, answer, of_tip = rows[0], rows[1:-3], rows[-3:]
+            compliance = tendons.jacobian @ answer.T
             free = tendons.displacement + tendons.jacobian @ y - compliance @ tension
-            compliance.ravel()[:: len(compliance) + 1] += model.axial_compliance
+            compliance.ravel()[:: len(compliance) + 1] += model.cables.axial_compliance
             wanted = cables.tensions(compliance, free, tension > 0.0)
-            q = q + (y + answer @ (wanted - tension))
+            q = q + (y + (wanted - tension) @ answer)
             if not np.isfinite(q.sum()):
                 break
-            tension, tendons = wanted, self._cables.state(q)
+            tension, tendons = wanted, tendons_at(self.model.cables, q)
         self.state = dataclasses.replace(last, converged=False)
         return self.state
 
     def _factor(self, matrix: np.ndarray, tendons: ReducedTendons, tension: np.ndarray) -> np.ndarray | None:
-        """The Cholesky factor of the symmetric matrix (r, r) with the stiffness of the cables' tensions (m,), without it where
+        """The Cholesky factor of the matrix (r, r), of which the lower triangle is read, with the stiffness of the cables' tensions (m,), without it where
         that is not positive definite, None where neither is."""
         for pull in (tension, np.zeros_like(tension)):
-            column_major = self._cables.stiffness_added(matrix.copy().T, tendons, pull)
-            factor, info = dpotrf(column_major, lower=1, clean=0, overwrite_a=1)
-            if not info:
+            factor = matrix.copy()
+            add_stiffness(self.model.cables, tendons, pull, factor)
+            if factorise(factor):
                 return factor
         return None
 
@@ -153,7 +152,9 @@ class ReducedDynamicSolver:
         options = self.options
         if options.damping != "rayleigh":
             return None
-        return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * self.model.elasticity.evaluate(q)[1]
+        stiffness = np.tril(self.model.elasticity.evaluate(q)[1])
+        stiffness += np.tril(stiffness, -1).T
+        return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 
 
 def _backward_difference(last: ReducedMotion, h: float) -> tuple[float, np.ndarray]:

@@ -4,12 +4,19 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.linalg.blas import dsyrk
-
-from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.simulation.statics import CableInput
 
 _REORDERED = {"reassoc", "contract", "nsz", "arcp"}
+
+
+class ReducedCables(NamedTuple):
+    """rest (s, 3), change (3 s, r) and cable (s,) of the straight pieces; rest_length (m,) of the paths and the cables' own
+    axial_compliance (m,)."""
+
+    rest: np.ndarray
+    change: np.ndarray
+    cable: np.ndarray
+    rest_length: np.ndarray
+    axial_compliance: np.ndarray
 
 
 class ReducedTendons(NamedTuple):
@@ -22,75 +29,71 @@ class ReducedTendons(NamedTuple):
     jacobian: np.ndarray
 
 
-class ReducedCables:
-    """The cables of a reduced model."""
-
-    def __init__(self, model: ReducedModel):
-        self._model = model
-        self._flat_change = model.piece_change.reshape(-1, model.size)
-
-    def state(self, q: np.ndarray) -> ReducedTendons:
-        """The cables at q (r,)."""
-        model = self._model
-        pieces = model.piece_rest + (self._flat_change @ q).reshape(-1, 3)
-        tangent, length, path, jacobian = _paths(pieces, model.piece_cable, model.piece_change, len(model.rest_length))
-        return ReducedTendons(tangent, length, model.rest_length - path, jacobian)
-
-    def stiffness_added(
-        self, matrix: np.ndarray, tendons: ReducedTendons, tension: np.ndarray, factor: float = 1.0
-    ) -> np.ndarray:
-        """The symmetric matrix (r, r), column-major and overwritten, with `factor` times the stiffness that the tensions
-        (m,) give the body in its lower triangle."""
-        if not tension.any():
-            return matrix
-        rows = _taut_rows(tendons.tangent, tendons.length, self._model.piece_cable, self._model.piece_change, factor * tension)
-        return dsyrk(1.0, rows.T, beta=1.0, c=matrix, lower=1, overwrite_c=1)
-
-    def lacking(self, tendons: ReducedTendons, tension: np.ndarray, compliance: np.ndarray, cables: CableInput) -> np.ndarray:
-        """Change of tension (m,) that would about bring the cables to the displacements they are wound to; none where they
-        are slack. compliance (m, m)."""
-        if cables.wound is None:
-            return np.zeros_like(tension)
-        gap = cables.wound - tendons.displacement - self._model.axial_compliance * tension
-        pulled = (tension > 0.0) | (gap > 0.0)  # a released cable's gap is NaN: neither
-        return np.where(pulled, gap, 0.0) / compliance.diagonal()
-
-
 @njit(cache=True, fastmath=_REORDERED)
-def _paths(pieces, cable, change, count):
-    """Tangent (s, 3) and length (s,) of the pieces, path (m,) and Jacobian (m, r) of the cables' displacement."""
-    r = change.shape[2]
-    tangent, length = np.empty(pieces.shape), np.empty(len(pieces))
-    path, jacobian = np.zeros(count), np.zeros((count, r))
-    for k in range(len(pieces)):
-        x, y, z = pieces[k, 0], pieces[k, 1], pieces[k, 2]
+def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
+    """The cables at q (r,)."""
+    count, r = len(cables.cable), len(q)
+    tangent, length = np.empty((count, 3)), np.empty(count)
+    displacement, jacobian = cables.rest_length.copy(), np.zeros((len(cables.rest_length), r))
+    for k in range(count):
+        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
+        x, y, z = cables.rest[k, 0], cables.rest[k, 1], cables.rest[k, 2]
+        for a in range(r):
+            x += of_x[a] * q[a]
+            y += of_y[a] * q[a]
+            z += of_z[a] * q[a]
         length[k] = np.sqrt(x * x + y * y + z * z)
-        path[cable[k]] += length[k]
+        displacement[cables.cable[k]] -= length[k]
         x, y, z = x / length[k], y / length[k], z / length[k]
         tangent[k, 0], tangent[k, 1], tangent[k, 2] = x, y, z
-        row, along_x, along_y, along_z = jacobian[cable[k]], change[k, 0], change[k, 1], change[k, 2]
+        row = jacobian[cables.cable[k]]
         for a in range(r):
-            row[a] -= x * along_x[a] + y * along_y[a] + z * along_z[a]
-    return tangent, length, path, jacobian
+            row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
+    return ReducedTendons(tangent, length, displacement, jacobian)
 
 
 @njit(cache=True, fastmath=_REORDERED)
-def _taut_rows(tangent, length, cable, change, tension):
-    """sqrt(tension / length) (I - t t^T) D of every taut piece, (3 k, r): the stiffness is the product of the rows with themselves."""
-    r = change.shape[2]
-    rows = np.empty((3 * len(length), r))
-    used = 0
-    for k in range(len(length)):
-        root = np.sqrt(tension[cable[k]] / length[k])
+def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, matrix: np.ndarray) -> None:
+    """Add to the lower triangle of matrix (r, r) the stiffness that the tensions (m,) give the body.
+
+    That of a piece is tension / length D^T (I - t t^T) D, and I - t t^T = a a^T + b b^T with two vectors across t: the
+    sum is the product of the rows sqrt(tension / length) a^T D and b^T D with themselves.
+    """
+    r = len(matrix)
+    rows, used = np.empty((2 * len(cables.cable) + 3, r)), 0
+    for k in range(len(cables.cable)):
+        root = np.sqrt(tension[cables.cable[k]] / tendons.length[k])
         if root == 0.0:
             continue
-        x, y, z = tangent[k, 0], tangent[k, 1], tangent[k, 2]
-        of_x, of_y, of_z = change[k, 0], change[k, 1], change[k, 2]
-        to_x, to_y, to_z = rows[used], rows[used + 1], rows[used + 2]
-        for a in range(r):
-            along = x * of_x[a] + y * of_y[a] + z * of_z[a]
-            to_x[a] = root * (of_x[a] - x * along)
-            to_y[a] = root * (of_y[a] - y * along)
-            to_z[a] = root * (of_z[a] - z * along)
-        used += 3
-    return rows[:used]
+        x, y, z = tendons.tangent[k]
+        # Duff et al., Building an orthonormal basis, revisited (JCGT 2017).
+        sign = 1.0 if z >= 0.0 else -1.0
+        p = -1.0 / (sign + z)
+        s = x * y * p
+        a_x, a_y, a_z = root * (1.0 + sign * x * x * p), root * sign * s, -root * sign * x
+        b_x, b_y, b_z = root * s, root * (sign + y * y * p), -root * y
+        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
+        to_a, to_b = rows[used], rows[used + 1]
+        for i in range(r):
+            to_a[i] = a_x * of_x[i] + a_y * of_y[i] + a_z * of_z[i]
+            to_b[i] = b_x * of_x[i] + b_y * of_y[i] + b_z * of_z[i]
+        used += 2
+    rows[used : used + 3] = 0.0
+    for k in range(0, used, 4):
+        r_0, r_1, r_2, r_3 = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
+        for i in range(r):
+            to, f_0, f_1, f_2, f_3 = matrix[i], r_0[i], r_1[i], r_2[i], r_3[i]
+            for j in range(i + 1):
+                to[j] += f_0 * r_0[j] + f_1 * r_1[j] + f_2 * r_2[j] + f_3 * r_3[j]
+
+
+@njit(cache=True)
+def lacking(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, compliance: np.ndarray, wound: np.ndarray) -> np.ndarray:
+    """Change of tension (m,) that would about bring the cables to the displacements they are wound to (m,), NaN for released
+    ones; none where they are slack. compliance (m, m)."""
+    change = np.zeros_like(tension)
+    for i in range(len(tension)):
+        gap = wound[i] - tendons.displacement[i] - cables.axial_compliance[i] * tension[i]
+        if gap > 0.0 or (tension[i] > 0.0 and gap <= 0.0):  # NaN is neither
+            change[i] = gap / compliance[i, i]
+    return change

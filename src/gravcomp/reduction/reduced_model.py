@@ -7,31 +7,29 @@ cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import pieces_of
+from gravcomp.reduction.reduced_cables import ReducedCables
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 from gravcomp.simulation.model import RobotModel
+from gravcomp.simulation.observation import observe
 
 
 @dataclass(frozen=True)
 class ReducedModel:
     """basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g of the nodal
-    forces f that the basis sees as g; elasticity; weight (r, 3): force of unit gravity;
-    piece_rest (s, 3), piece_change (s, 3, r) and piece_cable (s,): the straight pieces of the cables; rest_length (m,);
-    axial_compliance (m,); section_rest (n + 1, 3, 3), section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last;
-    reach: the largest |q| that it may serve; error (m): the worst tip error found when it was built."""
+    forces f that the basis sees as g; elasticity; weight (r, 3): force of unit gravity; cables; section_rest (n + 1, 3, 3),
+    section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| that it may serve;
+    error (m): the worst tip error found when it was built."""
 
     basis: np.ndarray
     coordinates_of: np.ndarray
     force_norm: np.ndarray
     elasticity: StrainPolynomials
     weight: np.ndarray
-    piece_rest: np.ndarray
-    piece_change: np.ndarray
-    piece_cable: np.ndarray
-    rest_length: np.ndarray
-    axial_compliance: np.ndarray
+    cables: ReducedCables
     section_rest: np.ndarray
     section_change: np.ndarray
     reach: float
@@ -41,14 +39,10 @@ class ReducedModel:
     def size(self) -> int:
         return self.basis.shape[1]
 
-    def sections(self, q: np.ndarray) -> np.ndarray:
-        """(n + 1, 3, 3) sections at q (r,), as in `Effectors.sections`."""
-        return self.section_rest + self.section_change @ q
-
-    def section_changes(self, answer: np.ndarray) -> np.ndarray:
-        """(n + 1, 3, 3, k) changes of the sections for changes (r, k) of q."""
-        count, k = len(self.section_rest), answer.shape[1]
-        return (self.section_change.reshape(9 * count, -1) @ answer).reshape(count, 3, 3, k)
+    def observe(self, q: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`; of them what `observation.observe` makes, with the changes
+        for changes (k, r) of q."""
+        return _observed(self.section_rest, self.section_change, q, answer)
 
     def tip(self, q: np.ndarray) -> np.ndarray:
         """(3,) position of the tip at q (r,)."""
@@ -58,6 +52,30 @@ class ReducedModel:
         """How far q (r,) lies outside of what was trained: above 1 it does. |q| is the root of twice the linear elastic
         energy."""
         return float(np.sqrt(q @ q)) / self.reach
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+def _observed(section_rest, section_change, q, answer):
+    count, columns = len(section_rest) - 1, len(answer)
+    sections, moved = section_rest.copy(), np.zeros((count + 1, 3, 3, columns))
+    for s in range(count + 1):
+        for v in range(3):
+            seen = v == 0 or s == count  # of the backbone only how the positions change is observed
+            for i in range(3):
+                line = section_change[s, v, i]
+                value = 0.0
+                for a in range(len(q)):
+                    value += line[a] * q[a]
+                sections[s, v, i] += value
+                if not seen:
+                    continue
+                for k in range(columns):
+                    row, value = answer[k], 0.0
+                    for a in range(len(q)):
+                        value += line[a] * row[a]
+                    moved[s, v, i, k] = value
+    values, change, orientation = observe(sections, moved)
+    return sections, values, change, orientation
 
 
 def project(
@@ -71,7 +89,7 @@ def project(
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     weighted = matrix.multiply(basis)
     pieces = [(cable, *piece) for cable, route in enumerate(route_cables(model.robot, model.mesh)) for piece in pieces_of(route)]
-    section_rest = model.effectors.sections(model.mesh.nodes)
+    change = np.array([np.einsum("n,ani->ia", w, fields[:, nodes]) for _, nodes, w in pieces]).reshape(-1, r)
     coordinates_of = np.linalg.solve(basis.T @ weighted, weighted.T)
     return ReducedModel(
         basis=basis,
@@ -79,12 +97,14 @@ def project(
         force_norm=coordinates_of @ coordinates_of.T,
         elasticity=elasticity,
         weight=np.einsum("anj,n->aj", fields, model.nodal_weight),
-        piece_rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
-        piece_change=np.array([np.einsum("n,ani->ia", w, fields[:, nodes]) for _, nodes, w in pieces]).reshape(-1, 3, r),
-        piece_cable=np.array([cable for cable, _, _ in pieces], dtype=np.int64),
-        rest_length=model.tendons.rest_length,
-        axial_compliance=model.tendons.axial_compliance,
-        section_rest=section_rest,
+        cables=ReducedCables(
+            rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
+            change=np.ascontiguousarray(change),
+            cable=np.array([cable for cable, _, _ in pieces], dtype=np.int64),
+            rest_length=model.tendons.rest_length,
+            axial_compliance=model.tendons.axial_compliance,
+        ),
+        section_rest=model.effectors.sections(model.mesh.nodes),
         section_change=np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in fields], axis=-1)),
         reach=reach,
         error=error,

@@ -15,7 +15,6 @@ import numpy as np
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 from gravcomp.simulation.model import RobotModel
-from gravcomp.simulation.observation import observe
 from gravcomp.simulation.shape import Response, Shape, ShapeStatus
 from gravcomp.simulation.statics import CableInput, Equilibrium, StaticSolver
 
@@ -41,7 +40,7 @@ class ReducedServing:
 
     def reset(self) -> None:
         """Back to the straight robot, trusted."""
-        self._tracker.place(np.zeros(self.reduced.size), np.zeros(len(self.reduced.rest_length)))
+        self._tracker.place(np.zeros(self.reduced.size), np.zeros(self._model.tendons.count))
         self._error = self.reduced.error
         self._since_check = _CHECK_EVERY - _CHECK_AT_LEAST
         self._checked_at = self._tracker.state.q
@@ -122,9 +121,7 @@ class ReducedServing:
         return self._model.effectors.sections(self._model.mesh.nodes + u)[-1, 0]
 
     def _shape(self, state: ReducedState, gravity: np.ndarray, started: float) -> Shape:
-        reduced = self.reduced
-        sections = reduced.sections(state.q)
-        effector, compliance_ea, orientation = observe(sections, reduced.section_changes(state.answer))
+        sections, effector, compliance_ea, orientation = self.reduced.observe(state.q, state.answer)
         return Shape(
             tip_position=sections[-1, 0],
             tip_orientation=orientation[-1],

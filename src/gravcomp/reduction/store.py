@@ -16,7 +16,7 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 from gravcomp.simulation.model import RobotModel
 
 # Part of the key; to be raised when what is stored, or how it is trained, changes.
-_FORMAT = 5
+_FORMAT = 6
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Reduction:
     def reduced_model(self, model: RobotModel) -> ReducedModel:
         """The reduction applied to the model, whose modulus may differ from the trained one."""
         # With moduli s times as large a basis of energy 1 is sqrt(s) times smaller, and so are the products of its gradients.
-        root = np.sqrt(first_modulus(model) / self.modulus)
+        root = float(np.sqrt(first_modulus(model) / self.modulus))
         elasticity = StrainPolynomials(self.elasticity.linear, self.elasticity.quadratic / root)
         return project(model, self.basis / root, elasticity, self.reach * root, self.error_worst)
 

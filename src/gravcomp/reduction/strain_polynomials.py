@@ -26,13 +26,15 @@ from gravcomp.reduction.basis import principal_combinations
 # Voigt's order 11 22 33 12 23 13 with doubled shear, as in the elements.
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 _POINTS_AT_ONCE = 400
+_REORDERED = {"reassoc", "contract", "nsz", "arcp"}
 
 
 @dataclass(frozen=True)
 class StrainPolynomials:
     """linear a^T (r, m) and quadratic B^T (r (r + 1) / 2, m), in sqrt(J): of each symmetric B_m the lower half, row by row.
 
-    The strains run along the last axis, because so a step reads memory in order.
+    The strains run along the last axis, because so a step reads memory in order; B is in single precision, because reading it is what
+    a step waits for. Force and stiffness remain exact derivatives of one energy.
     """
 
     linear: np.ndarray
@@ -41,20 +43,18 @@ class StrainPolynomials:
     def evaluate(
         self, q: np.ndarray, scale: float = 1.0, offset: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At q (r,): internal force (r,), tangent stiffness (r, r), and the strain eps (m,).
+        """At q (r,): internal force (r,), tangent stiffness (r, r) in its lower triangle, and the strain eps (m,).
 
         The stress is `scale` eps + `offset` (m,), which is how damping comes in; elastic by itself.
         """
-        jacobian, strain = _strain(self.linear, self.quadratic, q)
+        jacobian, strain = strain_at(self.linear, self.quadratic, q)
         stress = scale * strain if offset is None else scale * strain + offset
-        stiffness = jacobian @ jacobian.T
-        _add_packed(stiffness, scale, self.quadratic @ stress)
-        return jacobian @ stress, stiffness, strain
+        return jacobian @ stress, tangent(jacobian, self.quadratic, stress, scale), strain
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def _strain(linear, quadratic, q):
-    """J^T (r, m) and eps (m,)."""
+@njit(cache=True, fastmath=_REORDERED)
+def strain_at(linear, quadratic, q):
+    """J^T (r, m) and eps (m,) at q (r,)."""
     r, modes = linear.shape
     jacobian, strain = linear.copy(), np.zeros(modes)
     pair = 0
@@ -76,15 +76,36 @@ def _strain(linear, quadratic, q):
     return jacobian, strain
 
 
-@njit(cache=True)
-def _add_packed(matrix, factor, packed):
-    """Multiply the symmetric matrix (r, r) by the factor and add the one whose lower half is packed row by row."""
-    start = 0
-    for i in range(len(matrix)):
-        for j in range(i + 1):
-            matrix[i, j] = factor * matrix[i, j] + packed[start + j]
-            matrix[j, i] = matrix[i, j]
-        start += i + 1
+@njit(cache=True, fastmath=_REORDERED)
+def tangent(jacobian, quadratic, stress, scale):
+    """scale J^T J + sum stress_m B_m (r, r), its lower triangle, from J^T (r, m) and the stress (m,)."""
+    r, modes = jacobian.shape
+    stiffness = np.empty((r, r))
+    row, pair = np.empty(modes), 0
+    for i in range(r):
+        for m in range(modes):
+            row[m] = scale * jacobian[i, m]
+        # Four entries at a time: what they share is read once.
+        j = 0
+        while j + 4 <= i + 1:
+            j_0, j_1, j_2, j_3 = jacobian[j], jacobian[j + 1], jacobian[j + 2], jacobian[j + 3]
+            b_0, b_1, b_2, b_3 = quadratic[pair], quadratic[pair + 1], quadratic[pair + 2], quadratic[pair + 3]
+            k_0 = k_1 = k_2 = k_3 = 0.0
+            for m in range(modes):
+                x, s = row[m], stress[m]
+                k_0 += x * j_0[m] + s * b_0[m]
+                k_1 += x * j_1[m] + s * b_1[m]
+                k_2 += x * j_2[m] + s * b_2[m]
+                k_3 += x * j_3[m] + s * b_3[m]
+            stiffness[i, j], stiffness[i, j + 1], stiffness[i, j + 2], stiffness[i, j + 3] = k_0, k_1, k_2, k_3
+            j, pair = j + 4, pair + 4
+        while j <= i:
+            j_0, b_0, k_0 = jacobian[j], quadratic[pair], 0.0
+            for m in range(modes):
+                k_0 += row[m] * j_0[m] + stress[m] * b_0[m]
+            stiffness[i, j] = k_0
+            j, pair = j + 1, pair + 1
+    return stiffness
 
 
 def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray, extra: int) -> StrainPolynomials:
@@ -108,7 +129,7 @@ def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np
         stress = points.stress(strains)
         linear += stress.T @ points.linear
         pairs += stress.T @ points.products(first, second)
-    return StrainPolynomials(np.ascontiguousarray(linear.T), np.ascontiguousarray(pairs.T))
+    return StrainPolynomials(np.ascontiguousarray(linear.T), np.ascontiguousarray(pairs.T, dtype=np.float32))
 
 
 @dataclass(frozen=True)

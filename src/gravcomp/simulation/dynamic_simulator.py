@@ -84,10 +84,10 @@ class DynamicSimulator:
         motion = self._move(gravity, cables, duration / count, count)
         model = self.model
         if self._in_reduced:
-            sections = self._reduced.model.sections(motion.q)
+            sections, _, _, orientation = self._reduced.model.observe(motion.q, np.zeros((0, motion.q.size)))
         else:
             sections = model.effectors.sections(model.mesh.nodes + motion.u)
-        _, _, orientation = observe(sections, np.zeros((*sections.shape, 0)))
+            _, _, orientation = observe(sections, np.zeros((*sections.shape, 0)))
         ok = motion.converged
         return dataclasses.replace(
             equilibrium,
