@@ -217,9 +217,9 @@ def test_weights_are_the_squares_of_the_rows():
     response = robot.step(gravity, None, iterations=20)
     target = straight_target(LENGTH, tip_direction_weight=1e-3, backbone_station=[0.3], backbone_weight=[0.7])
     options = InverseOptions(energy_weight=1e-6, proximal_weight=0.0, axial_weight=0.25)
-    bounds = StepBounds(*(np.zeros(6),) * 4)
+    zeros = np.zeros(6)
     programme = build_programme(
-        response, target, bounds, tension=np.zeros(6), backbone_station=STATIONS, damping=1.0, options=options
+        response, target, Limits(), tension=zeros, displacement=zeros, backbone_station=STATIONS, interval=0.01, damping=1.0, options=options
     )
 
     def cost(tension):

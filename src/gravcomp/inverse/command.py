@@ -9,8 +9,8 @@ cable could push, at the cable's own compliance, so nothing jumps when a cable g
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from gravcomp.inverse.solver import Solution
 from gravcomp.inverse.status import ControllerCode
 
 
@@ -30,6 +30,8 @@ class Command:
     tilt: float = np.nan
 
 
-def cable_displacement(path: np.ndarray, compliance_diagonal: np.ndarray, solution: Solution, slack: float) -> np.ndarray:
-    """Displacement (m,) of the winches for the predicted path displacement (m,) of the solution."""
-    return path - np.minimum(slack, compliance_diagonal * solution.unwanted)
+@njit(cache=True)
+def cable_displacement(path: np.ndarray, compliance: np.ndarray, unwanted: np.ndarray, slack: float) -> np.ndarray:
+    """Displacement (m,) of the winches for the predicted path displacement (m,), the cables' compliance (m, m) and how much tension
+    (m,) the programme would take away if they could push."""
+    return path - np.minimum(slack, np.diag(compliance) * unwanted)

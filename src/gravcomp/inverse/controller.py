@@ -10,11 +10,12 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 
 from gravcomp.description.robot import Robot
 from gravcomp.inverse.command import Command, cable_displacement
 from gravcomp.inverse.damping import StepDamping
-from gravcomp.inverse.limits import step_bounds, within_limits
+from gravcomp.inverse.limits import held_within, limits_met, within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
@@ -38,6 +39,7 @@ class InverseController:
     def __init__(self, robot: Robot, options: InverseOptions = InverseOptions()):
         self.robot = robot
         self.options = options
+        self._names = robot.cable_names
         self._solver = ProgrammeSolver(len(robot.cables))
         self.reset()
 
@@ -67,19 +69,19 @@ class InverseController:
         started = time.perf_counter()
         limits, options = self.robot.limits, self.options
         tension = self._tension if tension is None else np.asarray(tension, dtype=float)
-        present_path = response.compliance_aa @ tension + response.displacement_free
-        previous = present_path if self._displacement is None else self._displacement
+        previous = self._displacement
+        if previous is None:
+            previous = response.compliance_aa @ tension + response.displacement_free
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
-        bounds = step_bounds(
-            limits, displacement=previous, tension=tension, path=present_path, pretension=options.pretension, interval=interval
-        )
         try:
             programme = build_programme(
                 response,
                 target,
-                bounds,
+                limits,
                 tension=tension,
+                displacement=previous,
                 backbone_station=backbone_station,
+                interval=interval,
                 damping=self._damping.factor,
                 options=options,
             )
@@ -92,24 +94,24 @@ class InverseController:
                 message=f"{error}; the last command is kept",
                 solve_time=time.perf_counter() - started,
             )
-        path = response.compliance_aa @ solution.tension + response.displacement_free
-        self._damping.observe(path - present_path)
-        wanted = cable_displacement(path, response.compliance_aa.diagonal(), solution, options.slack)
-        displacement = within_limits(wanted, previous, limits, interval)
-        effector = response.compliance_ea @ solution.tension + response.effector_free
-        errors = tip_errors(effector, target)
-        missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
-        code, message = judge(
-            target=target,
-            points_missed=missed,
-            tilt=errors.tilt,
-            tension=solution.tension,
-            displacement=displacement,
-            rate_bound=np.abs(displacement - previous) > limits.displacement_rate * interval - 1e-6,
-            limits=limits,
-            names=self.robot.cable_names,
-            options=options,
+        change, displacement, effector, met, errors = _outcome(
+            np.ascontiguousarray(response.compliance_aa),
+            response.displacement_free,
+            np.ascontiguousarray(response.compliance_ea),
+            response.effector_free,
+            tension,
+            solution.tension,
+            solution.unwanted,
+            options.slack,
+            previous,
+            (limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max),
+            limits.tension_max,
+            target.tip_position,
+            target.direction_or_zeros,
         )
+        self._damping.observe(change)
+        missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
+        code, message = judge(target=target, points_missed=missed, tilt=errors.tilt, met=met, names=self._names, options=options)
         self._displacement, self._tension = displacement, solution.tension
         return Command(
             displacement=displacement,
@@ -139,3 +141,19 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
+
+
+@njit(cache=True)
+def _outcome(
+    compliance_aa, displacement_free, compliance_ea, effector_free, before, tension, unwanted, slack, previous, travel, highest, tip,
+    direction,
+):  # fmt: skip
+    """What the tensions (m,) of the solution come to, from those `before`: change of path displacement (m,), displacement (m,) of
+    the winches, effector (e,), the limits met (3, m), errors of the tip. travel: longest way of a step, least and largest
+    displacement."""
+    path = compliance_aa @ tension + displacement_free
+    change = compliance_aa @ (tension - before)
+    displacement = held_within(cable_displacement(path, compliance_aa, unwanted, slack), previous, *travel)
+    effector = compliance_ea @ tension + effector_free
+    met = limits_met(displacement, previous, *travel, tension, highest)
+    return change, displacement, effector, met, tip_errors(effector, tip, direction)

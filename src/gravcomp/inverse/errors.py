@@ -19,13 +19,11 @@ class TipErrors(NamedTuple):
     tilt: float
 
 
-def tip_errors(effector: np.ndarray, target: Target) -> TipErrors:
-    """Errors of the tip in the effector (e,); rows 0-2 its position, 3-5 its direction."""
-    return TipErrors(*_tip_errors(effector, target.tip_position, tip_axis(target, effector)))
-
-
 @njit(cache=True)
-def _tip_errors(effector, tip, axis):
+def tip_errors(effector: np.ndarray, tip: np.ndarray, direction: np.ndarray) -> TipErrors:
+    """Errors of the tip in the effector (e,), whose rows 0-2 are its position and 3-5 its direction, against the position `tip`
+    (3,) and the direction (3,) that is asked for, zeros for none."""
+    axis = tip_axis(effector, direction)
     distance, axial, across, chord = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         distance += (effector[i] - tip[i]) ** 2
@@ -35,7 +33,7 @@ def _tip_errors(effector, tip, axis):
         across += (effector[i] - tip[i] - axial * axis[i]) ** 2
         chord += (effector[3 + i] / length - axis[i]) ** 2
     # Half the angle by the chord is exact where the angle is small and arccos is not.
-    return np.sqrt(distance), np.sqrt(across), axial, 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(chord)))
+    return TipErrors(np.sqrt(distance), np.sqrt(across), axial, 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(chord))))
 
 
 def backbone_missed(effector: np.ndarray, target: Target, backbone_station: np.ndarray) -> float:

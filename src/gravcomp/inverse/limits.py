@@ -7,7 +7,7 @@ winch can follow merely stays slack, so that side is never tighter than the path
 are always allowed by the rates.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,8 +15,7 @@ from numba import njit
 from gravcomp.description.robot import Limits
 
 
-@dataclass(frozen=True)
-class StepBounds:
+class StepBounds(NamedTuple):
     """The bounds of one step, all (m,): of the path's displacement (m) and of the tension (N)."""
 
     displacement_lower: np.ndarray
@@ -25,24 +24,15 @@ class StepBounds:
     tension_upper: np.ndarray
 
 
-def step_bounds(
-    limits: Limits, *, displacement: np.ndarray, tension: np.ndarray, path: np.ndarray, pretension: float, interval: float
-) -> StepBounds:
-    """What is left of the limits for the next `interval` (s).
-
-    displacement (m,): commanded last; tension (m,) and path (m,): tension and path displacement of the present state;
-    pretension (N): least tension asked for, where it is above the limits' own.
-    """
-    lowest = min(max(pretension, limits.tension_min), limits.tension_max)
-    reach, change = limits.displacement_rate * interval, limits.tension_rate * interval
-    travel = limits.displacement_min, limits.displacement_max
-    return StepBounds(*_step_bounds(displacement, tension, path, *travel, reach, lowest, limits.tension_max, change))
-
-
 @njit(cache=True)
-def _step_bounds(displacement, tension, path, farthest_out, farthest_in, reach, lowest, highest, change):
+def step_bounds(displacement, tension, path, reach, farthest_out, farthest_in, lowest, highest, change) -> StepBounds:
+    """What is left of the limits for the next step.
+
+    displacement (m,): commanded last; tension (m,) and path (m,): tension and path displacement of the present state; reach (m)
+    and change (N): the longest ways of a step; farthest_out, farthest_in (m), lowest, highest (N): the limits themselves.
+    """
     held = np.minimum(np.maximum(tension, lowest), highest)
-    return (
+    return StepBounds(
         np.maximum(farthest_out, displacement - reach),
         np.minimum(farthest_in, np.maximum(displacement + reach, path)),
         np.maximum(lowest, held - change),
@@ -52,12 +42,24 @@ def _step_bounds(displacement, tension, path, farthest_out, farthest_in, reach, 
 
 def within_limits(displacement: np.ndarray, previous: np.ndarray, limits: Limits, interval: float) -> np.ndarray:
     """The displacement (m,) held to its bounds and to what the winches reach from the previous one in the interval (s)."""
-    return _within_limits(
-        displacement, previous, limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max
-    )
+    return held_within(displacement, previous, limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max)
 
 
 @njit(cache=True)
-def _within_limits(displacement, previous, reach, farthest_out, farthest_in):
+def held_within(displacement, previous, reach, farthest_out, farthest_in):
+    """As `within_limits`; reach (m): the longest way of a step."""
     reachable = np.minimum(np.maximum(displacement, previous - reach), previous + reach)
     return np.minimum(np.maximum(reachable, farthest_out), farthest_in)
+
+
+@njit(cache=True)
+def limits_met(displacement, previous, reach, farthest_out, farthest_in, tension, highest):
+    """(3, m): which cables move as fast as they may, have the highest tension, are at an end of their travel.
+
+    A micrometre and a millinewton are below what any winch resolves.
+    """
+    met = np.empty((3, len(tension)), dtype=np.bool_)
+    met[0] = np.abs(displacement - previous) > reach - 1e-6
+    met[1] = tension > highest - 1e-3
+    met[2] = (displacement > farthest_in - 1e-6) | (displacement < farthest_out + 1e-6)
+    return met

@@ -16,24 +16,21 @@ cannot make up for the length that they take.
 """
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from gravcomp.inverse.limits import StepBounds
+from gravcomp.description.robot import Limits
+from gravcomp.inverse.limits import StepBounds, step_bounds
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
     from gravcomp.simulation.shape import Response
 
-_NO_DIRECTION = np.zeros(3)
 
-
-@dataclass(frozen=True)
-class Programme:
+class Programme(NamedTuple):
     """min 1/2 x^T hessian x + gradient^T x over the tensions x (m,), subject to the bounds, with displacement =
     compliance x + offset."""
 
@@ -47,67 +44,83 @@ class Programme:
 def build_programme(
     response: "Response",
     target: Target,
-    bounds: StepBounds,
+    limits: Limits,
     *,
     tension: np.ndarray,
+    displacement: np.ndarray,
     backbone_station: np.ndarray,
+    interval: float,
     damping: float,
     options: InverseOptions,
 ) -> Programme:
-    """The programme around the present state.
+    """The programme around the present state, for the next `interval` (s).
 
-    tension (m,): the present tensions, reference of the proximal term; backbone_station (n,): of the effector's backbone rows;
-    damping: factor of the proximal term.
+    tension (m,): the present tensions, reference of the proximal term; displacement (m,): commanded last; backbone_station (n,): of
+    the effector's backbone rows; damping: factor of the proximal term.
     """
-    jacobian, offset = weighted_errors(target, response, tension, backbone_station, options)
-    hessian, gradient, compliance = _quadratic(
-        jacobian, offset, response.compliance_aa, tension, options.energy_weight, damping * options.proximal_weight
-    )
-    return Programme(hessian=hessian, gradient=gradient, compliance=compliance, offset=response.displacement_free, bounds=bounds)
-
-
-def tip_axis(target: Target, effector: np.ndarray) -> np.ndarray:
-    """Unit vector (3,) that splits the tip's error into axial and lateral: the target's direction, else that of the
-    effector (e,)."""
-    if target.tip_direction is not None:
-        return target.tip_direction
-    return effector[3:6] / math.sqrt(effector[3:6] @ effector[3:6])
-
-
-def weighted_errors(
-    target: Target, response: "Response", tension: np.ndarray, backbone_station: np.ndarray, options: InverseOptions
-) -> tuple[np.ndarray, np.ndarray]:
-    """M W_ea (k, m) and M (e_free - e_target) (k,) for the rows of the parts of the target that have a weight; along the
-    robot is where it lies under the present tensions (m,)."""
-    direction = target.tip_direction
-    return _weighted_errors(
+    return _built(
         np.ascontiguousarray(response.compliance_ea),
         response.effector_free,
+        np.ascontiguousarray(response.compliance_aa),
+        response.displacement_free,
         tension,
+        displacement,
+        (
+            limits.displacement_rate * interval,
+            limits.displacement_min,
+            limits.displacement_max,
+            min(max(options.pretension, limits.tension_min), limits.tension_max),
+            limits.tension_max,
+            limits.tension_rate * interval,
+        ),
         target.tip_position,
         float(target.tip_position_weight),
-        _NO_DIRECTION if direction is None else direction,
+        target.direction_or_zeros,
         float(target.tip_direction_weight),
         target.backbone_station,
         target.backbone_position,
         target.backbone_weight,
         np.asarray(backbone_station, dtype=float),
         1.0 - math.sqrt(options.axial_weight),
+        options.energy_weight,
+        damping * options.proximal_weight,
     )
+
+
+@njit(cache=True)
+def tip_axis(effector: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Unit vector (3,) that splits the tip's error into axial and lateral: the target's direction (3,), where that is zeros the
+    effector's (e,)."""
+    return direction if (direction * direction).sum() > 0.0 else _unit(effector[3:6])
+
+
+@njit(cache=True)
+def _built(
+    change, free, compliance_aa, displacement_free, tension, displacement, limits, tip, tip_weight, direction, direction_weight,
+    stations, points, weights, backbone_station, less, energy, proximal,
+):  # fmt: skip
+    """As `build_programme`; limits: the last six arguments of `step_bounds`; `less` as for `_weighted_errors`."""
+    jacobian, offset = _weighted_errors(
+        change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
+    )
+    hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
+    bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
+    return Programme(hessian, gradient, compliance, displacement_free, bounds)
 
 
 @njit(cache=True)
 def _weighted_errors(
     change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
 ):
-    """As `weighted_errors`; `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T."""
+    """M W_ea (k, m) and M (e_free - e_target) (k,) for the rows of the parts of the target that have a weight; along the robot is
+    where it lies under the present tensions (m,). `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T."""
     m = len(tension)
     effector = change @ tension + free
     count = int(tip_weight > 0.0) + int(direction_weight > 0.0) + int((weights > 0.0).sum())
     jacobian, offset = np.empty((3 * count, m)), np.empty(3 * count)
     row = 0
     if tip_weight > 0.0:
-        axis = direction if (direction * direction).sum() > 0.0 else _unit(effector[3:6])
+        axis = tip_axis(effector, direction)
         jacobian[:3], offset[:3] = change[:3], free[:3] - tip
         _weigh(jacobian[:3], offset[:3], axis, less, tip_weight)
         row = 3

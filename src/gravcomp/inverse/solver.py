@@ -44,6 +44,9 @@ class ProgrammeSolver:
     """Solves a sequence of programmes of one size, each started from the last solution. The same sequence gives the same bits."""
 
     def __init__(self, cables: int):
+        from proxsuite import proxqp  # not with the module: its start is slow, and a description of a programme needs none
+
+        self._proxqp = proxqp
         m = self._cables = cables
         self._hessian, self._gradient, self._rows = np.zeros((m, m)), np.zeros(m), np.zeros((m, m))
         self._lower, self._upper, self._box_lower, self._box_upper = (np.zeros(m) for _ in range(4))
@@ -58,41 +61,37 @@ class ProgrammeSolver:
         started = time.perf_counter()
         m, bounds = self._cables, programme.bounds
         parts = self._hessian, self._gradient, self._rows, self._lower, self._upper, self._box_lower, self._box_upper
-        tension_scale, trace = _scaled(
-            programme.hessian, programme.gradient, programme.compliance, programme.offset,
-            bounds.displacement_lower, bounds.displacement_upper, bounds.tension_lower, bounds.tension_upper, *parts,
-        )  # fmt: skip
+        tension_scale, trace = _scaled(programme, *parts)
         if not math.isfinite(trace):
             raise SolverFailed("the model's linear answer holds numbers that are not finite")
-        self._exact, found = _solved(self._exact, _MOST_ITERATIONS, *parts)
+        self._exact, found = self._solved(self._exact, _MOST_ITERATIONS, *parts)
+        results = self._exact.results
         if found:
             self._elastic = None
         else:
             self._exact = None
-            self._elastic, found = _solved(self._elastic, _MOST_ELASTIC_ITERATIONS, *_with_elastic_bounds(*parts))
+            self._elastic, found = self._solved(self._elastic, _MOST_ELASTIC_ITERATIONS, *_with_elastic_bounds(*parts))
+            results = self._elastic.results
             if not found:
-                status = self._elastic.results.info.status.name
                 self.reset()
-                raise SolverFailed(f"the solver ended with {status}")
-        results = (self._exact or self._elastic).results
+                raise SolverFailed(f"the solver ended with {results.info.status.name}")
         tension, unwanted = _unscaled(m, results.x, results.z, tension_scale, bounds.tension_lower, bounds.tension_upper)
         return Solution(tension, unwanted, time.perf_counter() - started, int(results.info.iter))
 
-
-def _solved(qp, most_iterations: int, hessian, gradient, rows, lower, upper, box_lower, box_upper):
-    """The QP, made where it is None and else started from its last solution, and whether it has a solution."""
-    from proxsuite import proxqp
-
-    if qp is None:
-        qp = proxqp.dense.QP(len(gradient), 0, len(rows), True)
-        qp.settings.eps_abs = _ACCURACY
-        qp.settings.max_iter = most_iterations
-        qp.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-        qp.init(hessian, gradient, None, None, rows, lower, upper, box_lower, box_upper)
-    else:
-        qp.update(H=hessian, g=gradient, C=rows, l=lower, u=upper, l_box=box_lower, u_box=box_upper)
-    qp.solve()
-    return qp, qp.results.info.status == proxqp.PROXQP_SOLVED and math.isfinite(qp.results.x.sum())
+    def _solved(self, qp, most_iterations: int, hessian, gradient, rows, lower, upper, box_lower, box_upper):
+        """The QP, made where it is None and else started from its last solution, and whether it has a solution."""
+        if qp is None:
+            qp = self._proxqp.dense.QP(len(gradient), 0, len(rows), True)
+            qp.settings.eps_abs = _ACCURACY
+            qp.settings.max_iter = most_iterations
+            qp.settings.initial_guess = self._proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            qp.init(hessian, gradient, None, None, rows, lower, upper, box_lower, box_upper)
+        else:
+            qp.update(H=hessian, g=gradient, C=rows, l=lower, u=upper, l_box=box_lower, u_box=box_upper)
+        qp.solve()
+        results = qp.results
+        x = results.x
+        return qp, results.info.status == self._proxqp.PROXQP_SOLVED and math.isfinite(x @ x)
 
 
 def _with_elastic_bounds(hessian, gradient, rows, lower, upper, box_lower, box_upper):
@@ -107,18 +106,16 @@ def _with_elastic_bounds(hessian, gradient, rows, lower, upper, box_lower, box_u
 
 
 @njit(cache=True)
-def _scaled(
-    hessian, gradient, compliance, offset, displacement_lower, displacement_upper, tension_lower, tension_upper,
-    to_hessian, to_gradient, to_constraint, lower, upper, box_lower, box_upper,
-):  # fmt: skip
+def _scaled(programme, to_hessian, to_gradient, to_constraint, lower, upper, box_lower, box_upper):
     """Write the scaled programme's parts that are the tensions'; returns the tensions' scale (m,), and a sum in which a number that
     is not finite leaves its trace."""
+    hessian, gradient, compliance, offset, bounds = programme
     m = len(gradient)
     # Millimetres make the cost of order one.
     scale = 1e-3 / np.sqrt(0.5 * np.diag(hessian))
     for i in range(m):
         to_gradient[i] = 0.5e6 * gradient[i] * scale[i]
-        box_lower[i], box_upper[i] = tension_lower[i] / scale[i], min(tension_upper[i] / scale[i], _NO_BOUND)
+        box_lower[i], box_upper[i] = bounds.tension_lower[i] / scale[i], min(bounds.tension_upper[i] / scale[i], _NO_BOUND)
         length = 0.0
         for k in range(m):
             to_hessian[i, k] = 0.5e6 * hessian[i, k] * scale[i] * scale[k]
@@ -127,8 +124,8 @@ def _scaled(
         row = 1.0 / np.sqrt(length)
         for k in range(m):
             to_constraint[i, k] *= row
-        lower[i] = max((displacement_lower[i] - offset[i]) * row, -_NO_BOUND)
-        upper[i] = min((displacement_upper[i] - offset[i]) * row, _NO_BOUND)
+        lower[i] = max((bounds.displacement_lower[i] - offset[i]) * row, -_NO_BOUND)
+        upper[i] = min((bounds.displacement_upper[i] - offset[i]) * row, _NO_BOUND)
     return scale, hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
 
 

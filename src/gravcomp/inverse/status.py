@@ -4,7 +4,6 @@ from enum import IntEnum
 
 import numpy as np
 
-from gravcomp.description.robot import Limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import Target
 
@@ -25,21 +24,15 @@ def judge(
     target: Target,
     points_missed: float,
     tilt: float,
-    tension: np.ndarray,
-    displacement: np.ndarray,
-    rate_bound: np.ndarray,
-    limits: Limits,
+    met: np.ndarray,
     names: tuple[str, ...],
     options: InverseOptions,
 ) -> tuple[ControllerCode, str]:
     """Code and sentence for a step.
 
-    points_missed (m): largest predicted distance of a weighted point; rate_bound (m,): whether a cable moves as fast as it may.
+    points_missed (m): largest predicted distance of a weighted point; met (3, m): of `limits.limits_met`; names (m,) of the cables.
     """
-    # A micrometre and a millinewton are below what any winch resolves.
-    moving = _listed(names, rate_bound)
-    at_tension = _listed(names, tension > limits.tension_max - 1e-3)
-    at_travel = _listed(names, (displacement > limits.displacement_max - 1e-6) | (displacement < limits.displacement_min + 1e-6))
+    moving, at_tension, at_travel = (_listed(names, which) for which in met) if met.any() else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
     if moving and not held:
         return ControllerCode.AT_LIMIT, f"moving as fast as allowed: displacement rate of {moving}"

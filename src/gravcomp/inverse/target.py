@@ -13,6 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 
+_NO_DIRECTION = np.zeros(3)
+
+
 class TargetError(ValueError):
     """A target that cannot be used; the text is for people."""
 
@@ -58,6 +61,11 @@ class Target:
             raise TargetError("tip_direction_weight is given without a tip_direction")
         if weights.max() == 0.0:
             raise TargetError("every weight is 0; at least one part of the shape has to be asked for")
+
+    @property
+    def direction_or_zeros(self) -> np.ndarray:
+        """tip_direction (3,); zeros where nothing is asked of it."""
+        return _NO_DIRECTION if self.tip_direction is None else self.tip_direction
 
 
 def bend_target(

@@ -1,47 +1,45 @@
-"""Cholesky's factor of a small dense matrix and its solves, for use inside compiled functions.
-
-At some fifty unknowns a call of LAPACK costs as much as its arithmetic, and it could not be made from compiled code that is kept
-on disk.
-"""
+"""Cholesky's factor of a small dense matrix and its solves, for use inside compiled functions."""
 
 import numpy as np
 from numba import njit
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def factorise(matrix: np.ndarray) -> bool:
-    """Replace the lower triangle of a symmetric matrix (r, r) by its factor L; False where it is not positive definite."""
-    r = len(matrix)
-    column = np.empty(r)
-    for k in range(r):
-        pivot = matrix[k, k]
-        if not pivot > 0.0:
-            return False
-        root = np.sqrt(pivot)
-        matrix[k, k] = root
-        for i in range(k + 1, r):
-            matrix[i, k] /= root
-            column[i] = matrix[i, k]
-        for i in range(k + 1, r):
-            row, factor = matrix[i], column[i]
-            for j in range(k + 1, i + 1):
-                row[j] -= factor * column[j]
-    return True
+@njit(cache=True)
+def factorise(matrix: np.ndarray) -> tuple[bool, np.ndarray]:
+    """Whether a symmetric matrix (r, r), given by its lower triangle, is positive definite, and its factor L then."""
+    try:
+        return True, np.linalg.cholesky(matrix)
+    except Exception:  # LinAlgError; compiled code knows no other class
+        return False, matrix
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def solve_rows(factor: np.ndarray, rows: np.ndarray) -> None:
-    """Replace every row b of `rows` (k, r) by A^-1 b, where A = L L^T with L the lower triangle of `factor` (r, r)."""
-    r = len(factor)
-    for row in rows:
-        for i in range(r):
-            total, line = row[i], factor[i]
-            for j in range(i):
-                total -= line[j] * row[j]
-            row[i] = total / line[i]
-        for i in range(r - 1, -1, -1):
-            line = factor[i]
-            row[i] /= line[i]
-            value = row[i]
-            for j in range(i):
-                row[j] -= line[j] * value
+def solve(factor: np.ndarray, columns: np.ndarray) -> None:
+    """Replace `columns` B (r, k) by A^-1 B, where A = L L^T with L = `factor` (r, r).
+
+    All columns of a row at a time: with few of them LAPACK spends most of its time on other things.
+    """
+    r, k = columns.shape
+    for i in range(r):
+        line, to, j = factor[i], columns[i], 0
+        while j + 4 <= i:
+            l_0, l_1, l_2, l_3 = line[j], line[j + 1], line[j + 2], line[j + 3]
+            x_0, x_1, x_2, x_3 = columns[j], columns[j + 1], columns[j + 2], columns[j + 3]
+            for n in range(k):
+                to[n] -= l_0 * x_0[n] + l_1 * x_1[n] + l_2 * x_2[n] + l_3 * x_3[n]
+            j += 4
+        while j < i:
+            l_0, x_0 = line[j], columns[j]
+            for n in range(k):
+                to[n] -= l_0 * x_0[n]
+            j += 1
+        for n in range(k):
+            to[n] /= line[i]
+    for i in range(r - 1, -1, -1):
+        line, of = factor[i], columns[i]
+        for n in range(k):
+            of[n] /= line[i]
+        for j in range(i):
+            l_0, to = line[j], columns[j]
+            for n in range(k):
+                to[n] -= l_0 * of[n]

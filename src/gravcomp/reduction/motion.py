@@ -12,7 +12,7 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.reduction.cholesky import factorise, solve_rows
+from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness, lacking, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.simulation.generalized_alpha import DynamicsOptions, GeneralizedAlpha
@@ -123,9 +123,9 @@ class ReducedDynamicSolver:
             factor = self._factor(now * stiffness + inertia, tendons, now * tension)
             if factor is None:
                 break
-            rows = np.concatenate([-out[None], now * tendons.jacobian, self._tip])
-            solve_rows(factor, rows)
-            y, answer, of_tip = rows[0], rows[1:-3], rows[-3:]
+            columns = np.column_stack([-out, now * tendons.jacobian.T, self._tip.T])
+            solve(factor, columns)
+            y, answer, of_tip = columns[:, 0], columns[:, 1:-3].T, columns[:, -3:].T
             compliance = tendons.jacobian @ answer.T
             free = tendons.displacement + tendons.jacobian @ y - compliance @ tension
             compliance.ravel()[:: len(compliance) + 1] += model.cables.axial_compliance
@@ -141,9 +141,10 @@ class ReducedDynamicSolver:
         """The Cholesky factor of the matrix (r, r), of which the lower triangle is read, with the stiffness of the cables' tensions (m,), without it where
         that is not positive definite, None where neither is."""
         for pull in (tension, np.zeros_like(tension)):
-            factor = matrix.copy()
-            add_stiffness(self.model.cables, tendons, pull, factor)
-            if factorise(factor):
+            stiffness = matrix.copy()
+            add_stiffness(self.model.cables, tendons, pull, stiffness)
+            definite, factor = factorise(stiffness)
+            if definite:
                 return factor
         return None
 

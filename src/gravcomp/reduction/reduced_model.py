@@ -4,6 +4,7 @@ u = Phi q. The elastic forces are polynomials in q (`strain_polynomials`); the w
 cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(0) + D_k q, sections(q) = sections(0) + S q.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ class ReducedModel:
     def outside(self, q: np.ndarray) -> float:
         """How far q (r,) lies outside of what was trained: above 1 it does. |q| is the root of twice the linear elastic
         energy."""
-        return float(np.sqrt(q @ q)) / self.reach
+        return math.sqrt(q @ q) / self.reach
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})

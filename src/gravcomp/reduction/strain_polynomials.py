@@ -52,23 +52,32 @@ class StrainPolynomials:
         return jacobian @ stress, tangent(jacobian, self.quadratic, stress, scale), strain
 
 
+@njit(cache=True)
+def _packed(i, j):
+    """Where the entry (i, j) is in the lower half of a symmetric matrix, row by row."""
+    return i * (i + 1) // 2 + j if j <= i else j * (j + 1) // 2 + i
+
+
 @njit(cache=True, fastmath=_REORDERED)
 def strain_at(linear, quadratic, q):
     """J^T (r, m) and eps (m,) at q (r,)."""
     r, modes = linear.shape
     jacobian, strain = linear.copy(), np.zeros(modes)
-    pair = 0
     for i in range(r):
-        to_i, q_i = jacobian[i], q[i]
-        for j in range(i):
-            entry, to_j, q_j = quadratic[pair + j], jacobian[j], q[j]
+        # Entry (i, j) of the packed symmetric matrices; four at a time, so that the row that is added to is read and written less.
+        to, j = jacobian[i], 0
+        while j + 4 <= r:
+            p_0, p_1, p_2, p_3 = _packed(i, j), _packed(i, j + 1), _packed(i, j + 2), _packed(i, j + 3)
+            b_0, b_1, b_2, b_3 = quadratic[p_0], quadratic[p_1], quadratic[p_2], quadratic[p_3]
+            q_0, q_1, q_2, q_3 = q[j], q[j + 1], q[j + 2], q[j + 3]
             for m in range(modes):
-                to_i[m] += entry[m] * q_j
-                to_j[m] += entry[m] * q_i
-        entry = quadratic[pair + i]
-        for m in range(modes):
-            to_i[m] += entry[m] * q_i
-        pair += i + 1
+                to[m] += b_0[m] * q_0 + b_1[m] * q_1 + b_2[m] * q_2 + b_3[m] * q_3
+            j += 4
+        while j < r:
+            b_0, q_0 = quadratic[_packed(i, j)], q[j]
+            for m in range(modes):
+                to[m] += b_0[m] * q_0
+            j += 1
     for i in range(r):
         half, constant, whole = 0.5 * q[i], linear[i], jacobian[i]
         for m in range(modes):

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
-from gravcomp.reduction.cholesky import factorise, solve_rows
+from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, add_stiffness, lacking, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import strain_at, tangent
@@ -106,14 +106,16 @@ def _followed(body, cables, point, q, tension, weight, wound, given, iterations,
     for _ in range(iterations):
         matrix = tangent(point.jacobian, body.quadratic, point.strain, 1.0)
         add_stiffness(cables, point.tendons, tension, matrix)
-        if not factorise(matrix):
+        definite, factor = factorise(matrix)
+        if not definite:
             break
-        rows = np.empty((m + 4, r))
-        rows[0] = weight - point.jacobian @ point.strain
-        rows[1 : m + 1] = point.tendons.jacobian
-        rows[m + 1 :] = body.tip
-        solve_rows(matrix, rows)
-        y, answer, of_tip = rows[0], rows[1 : m + 1], rows[m + 1 :]
+        columns = np.empty((r, m + 4))
+        columns[:, 0] = weight - point.jacobian @ point.strain
+        columns[:, 1 : m + 1] = point.tendons.jacobian.T
+        columns[:, m + 1 :] = body.tip.T
+        solve(factor, columns)
+        solved = np.ascontiguousarray(columns.T)
+        y, answer, of_tip = solved[0], solved[1 : m + 1], solved[m + 1 :]
         compliance = point.tendons.jacobian @ answer.T
         for i in range(m):
             compliance[i, i] += cables.axial_compliance[i]
