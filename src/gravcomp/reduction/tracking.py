@@ -9,16 +9,16 @@ of many small calls a control step would spend more on calling than on computing
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
+from gravcomp.reduction.body import body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, add_stiffness, lacking, tendons_at
+from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.strain_polynomials import strain_at, tangent
+from gravcomp.reduction.strain_polynomials import tangent
 from gravcomp.simulation.statics import CableInput
 
 
@@ -36,23 +36,6 @@ class ReducedState:
     converged: bool = False
 
 
-class _Body(NamedTuple):
-    """What the compiled step reads of the model; tip (3, r) is how the tip moves with q."""
-
-    linear: np.ndarray
-    quadratic: np.ndarray
-    force_norm: np.ndarray
-    tip: np.ndarray
-
-
-class _Point(NamedTuple):
-    """At coordinates q: J^T (r, k) and strain (k,) of the elasticity, and the cables."""
-
-    jacobian: np.ndarray
-    strain: np.ndarray
-    tendons: ReducedTendons
-
-
 class ReducedTracker:
     """Owns the current reduced state."""
 
@@ -61,46 +44,36 @@ class ReducedTracker:
         displacement of the tip as a fraction of it."""
         self.model = model
         self._limits = longest_step * length, near * length, tolerance * length
-        elasticity = model.elasticity
-        self._body = _Body(elasticity.linear, elasticity.quadratic, model.force_norm, np.ascontiguousarray(model.section_change[-1, 0]))
-        count = len(model.cables.rest_length)
-        self._released, self._not_given = np.full(count, np.nan), np.zeros(0)
-        self.place(np.zeros(model.size), np.zeros(count))
+        self._body = body_of(model)
+        self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
     def place(self, q: np.ndarray, tension: np.ndarray) -> None:
         """Start from the coordinates q (r,) under the tensions (m,)."""
         m = len(tension)
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
-        self._point = _point_at(self._body, self.model.cables, q)
+        self._point = point_at(self._body, q)
 
     def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4) -> ReducedState:
         """The state under gravity (3,) and the cables' input, from the present one; `converged` tells whether it was reached."""
-        state, given = self.state, cables.tension
-        wound = cables.wound if cables.wound is not None and given is None else self._released
-        converged, point, *found = _followed(
-            self._body, self.model.cables, self._point, state.q, state.tension, self.model.weight @ gravity,
-            wound, self._not_given if given is None else given, iterations, *self._limits,
-        )  # fmt: skip
+        state = self.state
+        wound, given = cable_arrays(cables, state.tension.size)
+        weight = self.model.weight @ gravity
+        converged, self._point, *found = _followed(
+            self._body, self._point, state.q, state.tension, weight, wound, given, iterations, *self._limits
+        )
         if not converged:
             return replace(state, residual=np.inf, converged=False)
-        self._point = point
         self.state = ReducedState(*found, converged=True)
         return self.state
 
 
-@njit(cache=True)
-def _point_at(body, cables, q):
-    jacobian, strain = strain_at(body.linear, body.quadratic, q)
-    return _Point(jacobian, strain, tendons_at(cables, q))
-
-
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def _followed(body, cables, point, q, tension, weight, wound, given, iterations, longest_step, near, tolerance):
-    """Whether an equilibrium was reached, the point there, and the fields of its ReducedState up to the residual.
+def _followed(body, point, q, tension, weight, wound, given, iterations, longest_step, near, tolerance):
+    """Whether an equilibrium was reached, the point there (else the one at the start), the fields of its ReducedState up to the residual.
 
     wound (m,): displacements of the cables, NaN for released ones; given (m,): tensions that go first, or (0,).
     """
-    m, r = len(tension), len(q)
+    m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual = False, np.inf
     for _ in range(iterations):
@@ -130,12 +103,14 @@ def _followed(body, cables, point, q, tension, weight, wound, given, iterations,
             break
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
         q, tension = q + share * step, tension + share * (wanted - tension)
-        point = _point_at(body, cables, q)
+        point = point_at(body, q)
         out = weight - point.jacobian @ point.strain + tension @ point.tendons.jacobian
         pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
         left = of_tip @ out + body.tip @ (answer.T @ pull)
         if size < near and (left**2).sum() < tolerance**2:
             converged, residual = True, np.sqrt(out @ (body.force_norm @ out))
             break
+    if not converged:
+        point = start
     displacement = point.tendons.displacement + cables.axial_compliance * tension
     return converged, point, q, tension, displacement, compliance, answer, residual

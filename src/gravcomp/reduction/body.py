@@ -1,0 +1,50 @@
+"""What the compiled steps of a reduced model read, and the model at one point of its coordinates."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
+from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.strain_polynomials import strain_at
+from gravcomp.simulation.statics import CableInput
+
+
+class Body(NamedTuple):
+    """linear and quadratic: of the elasticity; force_norm (r, r); tip (3, r): how the tip moves with q; cables."""
+
+    linear: np.ndarray
+    quadratic: np.ndarray
+    force_norm: np.ndarray
+    tip: np.ndarray
+    cables: ReducedCables
+
+
+class Point(NamedTuple):
+    """At coordinates q: J^T (r, k) and strain (k,) of the elasticity, and the cables."""
+
+    jacobian: np.ndarray
+    strain: np.ndarray
+    tendons: ReducedTendons
+
+
+def body_of(model: ReducedModel) -> Body:
+    """The model for compiled functions."""
+    elasticity, tip = model.elasticity, np.ascontiguousarray(model.section_change[-1, 0])
+    return Body(elasticity.linear, elasticity.quadratic, model.force_norm, tip, model.cables)
+
+
+@njit(cache=True)
+def point_at(body: Body, q: np.ndarray) -> Point:
+    """The model at q (r,)."""
+    jacobian, strain = strain_at(body.linear, body.quadratic, q)
+    return Point(jacobian, strain, tendons_at(body.cables, q))
+
+
+def cable_arrays(cables: CableInput, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The input for compiled functions: displacements that the cables are wound to (m,), NaN for released ones; tensions that go
+    first (m,), or (0,) where none are given."""
+    if cables.tension is not None:
+        return np.full(count, np.nan), cables.tension
+    return np.full(count, np.nan) if cables.wound is None else cables.wound, np.zeros(0)
