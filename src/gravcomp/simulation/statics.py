@@ -9,7 +9,8 @@ Sought are displacements u and tensions lambda with
 Newton's step solves A y = r and A X = H^T with A = K(u, lambda), so that the step is y + X dlambda and the cables answer by
 W = H X; the tensions come from the small complementarity problem (Coevoet et al. 2017, section IV). From the second step
 on, A contains the stress that the step before foresaw (see `SolidElements.assemble`): a beam then bends as far as it must in
-a handful of steps. A step is cut where it is longer than a fraction of the robot or would crush an element; where Newton
+a handful of steps. While a robot is followed, the factor of a step before serves as long as the corrections that it gives shrink
+fast. A step is cut where it is longer than a fraction of the robot or would crush an element; where Newton
 gives up all the same, the load is applied in parts. Not every load has an equilibrium: St. Venant-Kirchhoff's material
 resists less and less from a stretch of 1 / sqrt(3) down (E = -1/3), so that a robot of it folds under a large tension.
 """
@@ -27,6 +28,9 @@ from gravcomp.simulation.model import RobotModel
 _CRUSHED = 0.1
 # Steps below this part of the tolerance are what arithmetic leaves, and do not shrink any more.
 _ROUNDING = 1e-3
+# A factor serves again up to this displacement from where it was made, as a fraction of the length, and while each correction is at
+# most this part of the one before.
+_FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,6 +92,7 @@ class StaticSolver:
 
     def reset(self) -> None:
         """Back to the straight robot without tension."""
+        self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) that it is of
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
         tendons = self.model.tendons.state(self.model.mesh.nodes)
@@ -99,9 +104,11 @@ class StaticSolver:
     def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, exact: bool = False) -> Equilibrium:
         """Follow the equilibrium from the current state; `converged` tells whether it was reached.
 
-        `exact` asks for a thousandth of the tolerance, for shapes to compare with.
+        `exact` asks for a thousandth of the tolerance and for factors of this shape's own, for shapes and answers to compare with.
         """
         previous = self.state
+        if exact:
+            self._kept = None
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, carried=1.0)
         self._update_pulling(state, cables)
         weight = self.model.weight(gravity)
@@ -161,10 +168,17 @@ class StaticSolver:
         """
         model = self.model
         state.iterations += 1
-        try:
-            factor, force, exact = self._factor(state, origin)
-        except NotPositiveDefinite:
-            return None
+        factor = self._kept_factor(state)
+        if factor is not None:
+            again, force, exact = True, model.elements.internal_force(state.u), True
+        else:
+            try:
+                factor, force, exact = self._factor(state, origin)
+            except NotPositiveDefinite:
+                return None
+            again = False
+            if exact and origin is None:
+                self._kept = factor, state.u.copy()
         jacobian = state.tendons.jacobian
         pull = state.tendons.force_jacobian
         out = weight - model.free(force)
@@ -199,6 +213,8 @@ class StaticSolver:
             if max(length, size) < _ROUNDING * tolerance:  # it was at rest there already
                 state.converged = True
                 break
+            if again and length > _FACTOR_CONTRACTION * size:
+                self._kept = None
             if not length < 0.3 * size:
                 break
             start = state.u.copy()
@@ -211,6 +227,13 @@ class StaticSolver:
                 break
             size, corrected = length, True
         return start
+
+    def _kept_factor(self, state: Equilibrium) -> BlockCholesky | None:
+        """The factor of a step before, where it may serve in the first iteration of another."""
+        if self._kept is None or state.iterations > 1:
+            return None
+        factor, u = self._kept
+        return factor if np.abs(state.u - u).max() < _FACTOR_REACH * self.model.length else None
 
     def _correction(
         self, state: Equilibrium, factor: BlockCholesky, weight: np.ndarray, cables: CableInput, jacobian: np.ndarray
@@ -231,6 +254,7 @@ class StaticSolver:
         Where it is not positive definite, a multiple of the identity is added: the step goes downhill still, but its
         length no longer tells how far the equilibrium is.
         """
+        self._kept = None  # its place is taken
         for shift in (0.0, *(self._stiffness * 10.0**power for power in range(-6, 1))):
             self._matrix.values[:] = 0.0
             force = self.model.elements.assemble(state.u, self._matrix, origin=origin)
