@@ -5,7 +5,7 @@
     {"do": "enable", "on": false}                                   inverse_controller/enable
     {"do": "command", "displacement": [...], "count": 20}           cable/command at 100 Hz
     {"do": "flood", "messages": 10000}                              hostile messages to every input of the graph
-    {"do": "match"}                                                 wait until faults and commands have a taker
+    {"do": "match"}                                                 wait until faults and commands have a taker and the bridge is heard
     {"do": "count"}                                                 commands seen since the start
     {"do": "displacement"}                                          of the cables, as cable/state has it
 
@@ -56,6 +56,7 @@ class FaultProbe(ManagedNode):
     def configure(self) -> None:
         self._random = random.Random(self.parameters.seed)
         self._commands, self._last_state, self._bridge_values, self._displacement = 0, None, {}, []
+        self._heard = 0.0
         self._outputs = {topic: self.create_publisher(kind, topic, qos) for kind, topic, qos in _FLOODED}
         self._trigger_clients = {}
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
@@ -142,11 +143,14 @@ class FaultProbe(ManagedNode):
         return value
 
     def _match(self) -> None:
-        """A message before the middleware has matched publisher and subscriber goes nowhere."""
-        end = time.monotonic() + _MATCH_TIMEOUT
+        """A message before the middleware has matched publisher and subscriber goes nowhere, and neither does a state before this node
+        has found a bridge that was started anew."""
+        begin = time.monotonic()
         needed = [self._outputs[topic] for topic in ("virtual/fault", "cable/command")]
-        while not (matched := all(output.get_subscription_count() for output in needed)) and time.monotonic() < end:
+        matched = False
+        while not matched and time.monotonic() < begin + _MATCH_TIMEOUT:
             time.sleep(0.01)
+            matched = self._heard > begin and all(output.get_subscription_count() for output in needed)
         _tell(event="matched", success=matched)
 
     def _count(self) -> None:
@@ -156,7 +160,7 @@ class FaultProbe(ManagedNode):
         _tell(event="displacement", displacement=self._displacement)
 
     def _on_state(self, message: CableState) -> None:
-        self._displacement = list(message.displacement)
+        self._displacement, self._heard = list(message.displacement), time.monotonic()
         state = (message.state, message.message)
         if state != self._last_state:
             self._last_state = state

@@ -258,6 +258,7 @@ def _kills(campaign: Campaign, kills: int, progress: Callable[[str], None]) -> t
     recovery, worst, late = [], {}, []
     for number, executable in enumerate(order, 1):
         progress(f"kill {number} of {len(order)}: {executable}")
+        campaign.probe.match()  # else the answer to this kill would be heard as late as the bridge is found after the last
         case = Case(executable, _signal(executable, signal.SIGKILL), zero=executable in ("can_bridge", "virtual_robot"))
         elapsed = campaign.time_to_safe(case)
         if elapsed is not None:

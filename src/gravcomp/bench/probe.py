@@ -64,7 +64,7 @@ class Probe:
         self._order(do="command", displacement=displacement, count=count)
 
     def match(self) -> bool:
-        """Wait until faults and commands reach the robot and the bridge, also those that were started anew."""
+        """Wait until faults and commands reach the robot and the bridge, and the bridge's state this probe, also after a new start."""
         self._order(do="match")
         return self._expect("matched", 15.0)["success"]
 

@@ -24,8 +24,8 @@ class BuildOptions:
     """modes r; strains: principal strains beside those of the modes; decomposed: most snapshots to decompose; training;
     test: motions to test with."""
 
-    modes: int = 48
-    strains: int = 40
+    modes: int = 44
+    strains: int = 36
     decomposed: int = 1100
     training: TrainingOptions = TrainingOptions()
     test: TrainingOptions = TrainingOptions(paths=6, steps=20, seed=1000)
