@@ -1,7 +1,7 @@
 """fem_simulator: the robot's shape under the virtual gravity, one equilibrium a sample of gravity.
 
-The model stands still in `soft_base` while its gravity turns; its cables are where they were commanded to be, or where the
-motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from one stamp to
+The model stands still in `soft_base` while its gravity turns; its cables are where they were commanded to be, as fast as winches can
+follow, or where the motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from one stamp to
 the next, beginning at rest in the first equilibrium.
 """
 
@@ -13,6 +13,7 @@ from rclpy.time import Time
 from visualization_msgs.msg import MarkerArray
 
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
+from gravcomp.inverse.limits import within_limits
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp_fem.conversion import deformation_message, pose_message
 from gravcomp_fem.markers import markers_of
@@ -26,6 +27,8 @@ from gravcomp_node.polled import Polled
 _GRAVITY_LIMIT = 100.0  # m/s^2
 # Motion over a longer gap between two stamps is not computed: it would hold up the samples that come after.
 _LONGEST_GAP = 0.1  # s
+# Commands keep the cables' speed limit; what is this much faster between two samples is no command that motors would follow.
+_SPEED_MARGIN = 2.0
 
 
 class FemSimulator(ManagedNode):
@@ -37,10 +40,12 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         self._dynamic = self.parameters.mode == "dynamic"
         self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
-        self._cables: np.ndarray | None = None
+        self._cables: np.ndarray | None = None  # of the model
+        self._wanted: np.ndarray | None = None  # commanded, or measured
         # The first step compiles what is not cached yet; better now than at the first sample.
         for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
             self._simulator.step(np.zeros(3), cables)
+        within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
         self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
         self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
@@ -87,7 +92,14 @@ class FemSimulator(ManagedNode):
         if (np.abs(displacement) > length).any():
             self._refuse(f"{topic} has {displacement.tolist()} m; no cable of a robot of {length:g} m is wound so far")
             return
-        self._cables = displacement
+        self._wanted = displacement
+
+    def _move_cables(self, interval: float) -> None:
+        """The model's cables toward where they are wanted, in `interval` s."""
+        if self._cables is None or self.parameters.cables_from != "command":
+            self._cables = self._wanted
+        else:
+            self._cables = within_limits(self._wanted, self._cables, self.robot_file.robot.limits, _SPEED_MARGIN * interval)
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
         self._look_at_cables()
@@ -95,7 +107,11 @@ class FemSimulator(ManagedNode):
         if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
             return
-        shape = self._shape(gravity, Time.from_msg(message.header.stamp).nanoseconds * 1e-9)
+        stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        last, self._last_stamp = self._last_stamp, stamp
+        interval = None if last is None or not 0.0 < stamp - last <= _LONGEST_GAP else stamp - last
+        self._move_cables(interval or _LONGEST_GAP)
+        shape = self._shape(gravity, interval)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # else the next step would begin at what is no shape
             self._refuse(f"gravity {gravity.tolist()} m/s^2 and the cables have no shape; the simulator begins anew")
@@ -116,13 +132,13 @@ class FemSimulator(ManagedNode):
             refused_messages=self._refused,
         )
 
-    def _shape(self, gravity: np.ndarray, stamp: float) -> Shape:
+    def _shape(self, gravity: np.ndarray, interval: float | None) -> Shape:
+        """interval (s) since the last sample; None where that tells nothing."""
         if not self._dynamic:
             return self._simulator.step(gravity, self._cables)
-        last, self._last_stamp = self._last_stamp, stamp
-        if last is None or not 0.0 < stamp - last <= _LONGEST_GAP:
+        if interval is None:
             return self._simulator.settle(gravity, self._cables)
-        return self._simulator.step(gravity, self._cables, duration=stamp - last)
+        return self._simulator.step(gravity, self._cables, duration=interval)
 
     def _show(self, shape, header) -> None:
         rate = self.parameters.marker_rate

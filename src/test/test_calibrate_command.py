@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gravcomp.calibration.measured import Measured, StillWindows, write_csv
+from gravcomp.calibration.files import write_csv
+from gravcomp.calibration.measured import Measured, StillWindows
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware

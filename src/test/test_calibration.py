@@ -7,7 +7,8 @@ import pytest
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
 from gravcomp.calibration.fit import fit_statics
-from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, read_measured, still_windows, write_csv
+from gravcomp.calibration.files import read_measured, write_csv
+from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.motion import predict_course
 from gravcomp.calibration.statics import StaticParameters, StaticPredictor
 from gravcomp.description import load_robot_file

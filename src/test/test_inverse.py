@@ -20,7 +20,8 @@ from gravcomp.inverse import (
     straight_target,
 )
 from gravcomp.inverse.limits import StepBounds
-from gravcomp.inverse.programme import Programme, build_programme
+from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.scaling import Programme, scaled
 from gravcomp.inverse.solver import ProgrammeSolver
 
 GRAVITY = 9.81
@@ -180,14 +181,14 @@ def test_relaxing_pays_the_cables_out_at_the_allowed_rate():
 
 def test_solution_satisfies_the_optimality_conditions():
     rng = np.random.default_rng(3)
-    solver = ProgrammeSolver(6)
+    solver = ProgrammeSolver()
     for _ in range(30):
         root = rng.normal(size=(6, 6))
         compliance = 1e-3 * (root @ root.T + np.eye(6))
         jacobian, missed = 0.03 * rng.normal(size=(8, 6)), 0.01 * rng.normal(size=8)
         bounds = StepBounds(np.full(6, -4e-3), np.full(6, 4e-3), np.zeros(6), np.full(6, 0.5))
         programme = Programme(2 * jacobian.T @ jacobian, 2 * jacobian.T @ missed, compliance, np.zeros(6), bounds)
-        tension = solver.solve(programme).tension
+        tension = solver.solve(scaled(programme)).tension
         slope = programme.hessian @ tension + programme.gradient
         # The elastic bounds give by about a micrometre at most.
         assert np.abs(compliance @ tension).max() < 4e-3 + 2e-6
@@ -198,16 +199,16 @@ def test_solution_satisfies_the_optimality_conditions():
 
 def test_bounds_that_cannot_be_kept_together_are_missed_by_the_least():
     """After a jump of gravity a path may be longer than its winch allows, whatever the tension."""
-    solver = ProgrammeSolver(2)
+    solver = ProgrammeSolver()
     compliance = 1e-3 * np.array([[2.0, 0.5], [0.5, 2.0]])
     hessian, gradient = 2e-6 * np.eye(2), np.array([-1e-7, -1e-7])
     bounds = StepBounds(np.array([3e-3, -9e-3]), np.full(2, 9e-3), np.zeros(2), np.full(2, 1.0))
-    kept = solver.solve(Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))))
+    kept = solver.solve(scaled(Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2)))))
     assert kept.tension == pytest.approx([0.05, 0.05], abs=1e-5)
     for _ in range(2):
-        missed = solver.solve(Programme(hessian, gradient, compliance, np.zeros(2), bounds))
+        missed = solver.solve(scaled(Programme(hessian, gradient, compliance, np.zeros(2), bounds)))
         assert missed.tension == pytest.approx([1.0, 1.0], abs=1e-3)  # 2.5 mm of the 3 mm asked for
-    again = solver.solve(Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))))
+    again = solver.solve(scaled(Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2)))))
     assert again.tension == pytest.approx(kept.tension, abs=1e-5)
 
 
@@ -232,7 +233,8 @@ def test_weights_are_the_squares_of_the_rows():
         return tip[:2] @ tip[:2] + 0.25 * tip[2] ** 2 + 1e-3 * np.sum((e[3:6] - [0, 0, 1]) ** 2) + middle
 
     tension = np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.1])
-    quadratic = 0.5 * tension @ programme.hessian @ tension + programme.gradient @ tension
+    x = tension / programme.scale
+    quadratic = 2e-6 * (0.5 * x @ programme.hessian @ x + programme.gradient @ x)  # its cost is in mm^2, halved
     assert quadratic == pytest.approx(cost(tension) - cost(np.zeros(6)), rel=1e-3)
 
 

@@ -11,6 +11,7 @@ from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError
 from gravcomp.reduction import BuildOptions, ReducedServing, TrainingOptions, build, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
+from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.simulation import DynamicsOptions, DynamicSimulator, RobotModel, ShapeStatus, Simulator
 
@@ -54,6 +55,19 @@ def modes(robot):
     basis = energy_basis(raw, matrix.multiply, 3)
     shapes = np.random.default_rng(0).normal(size=(30, 3)) @ (0.1 * basis.T)
     return model, matrix, basis, shapes
+
+
+def test_small_systems_are_solved_or_refused():
+    root = np.random.default_rng(0).normal(size=(7, 7))
+    matrix, columns = root @ root.T + np.eye(7), root[:, :3].copy()
+    definite, factor = factorise(np.tril(matrix))  # the upper triangle is not read
+    solved = columns.copy()
+    solve(factor, solved)
+    assert definite and matrix @ solved == pytest.approx(columns, abs=1e-12)
+    matrix[3, 3] = -1.0
+    assert not factorise(matrix)[0]
+    matrix[3, 3] = np.nan
+    assert not factorise(matrix)[0]
 
 
 def test_basis_is_orthonormal_in_energy_and_holds_its_snapshots(modes):

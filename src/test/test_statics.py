@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Payload, load_robot_file
+from gravcomp.mechanics.block_matrix import BlockMatrix
 from gravcomp.simulation import ShapeStatus, Simulator
 
 G = 9.81
@@ -130,6 +131,19 @@ def test_a_load_beyond_the_limit_is_reported_with_its_reason(simulator):
     assert after.status == ShapeStatus.OK and after.tip_position == pytest.approx(before.tip_position, abs=1e-6)
 
 
+def test_an_equilibrium_that_is_not_there_is_searched_for_less_and_less(monkeypatch):
+    """A loop must not wait a second at every sample: in between the last shape is kept, and the way back is taken at once."""
+    simulator = Simulator(load_robot_file("article").robot, reduced=False)
+    held = simulator.solve([-G, 0.0, 0.0])
+    searches, solve = [], simulator.solver.solve
+    monkeypatch.setattr(simulator.solver, "solve", lambda *a: searches.append(1) or solve(*a))
+    beyond = [simulator.step([-G, 0.0, 0.0], tension=np.array([3.0, 0, 0, 0, 0, 0])) for _ in range(60)]
+    assert len(searches) == 2 and {shape.status for shape in beyond} == {ShapeStatus.NOT_CONVERGED}
+    assert "is kept" in beyond[1].message and beyond[1].tip_position == pytest.approx(held.tip_position)
+    back = simulator.step([-G, 0.0, 0.0])
+    assert back.status == ShapeStatus.OK and back.tip_position == pytest.approx(held.tip_position, abs=1e-6)
+
+
 def test_a_payload_is_carried(simulator):
     robot = dataclasses.replace(simulator.robot, payload=Payload(0.002))
     loaded = Simulator(robot, reduced=False)
@@ -158,3 +172,25 @@ def test_an_unloaded_robot_at_rest_stays_there(simulator):
         assert shape.status == ShapeStatus.OK
         assert shape.tip_position == pytest.approx([0.0, 0.0, 0.1], abs=1e-12)
         assert np.diag(shape.response.compliance_aa).min() > 0.0
+
+
+def test_following_with_the_factors_of_steps_before_leads_where_fresh_ones_do(monkeypatch):
+    """Gravity turns at 20 deg/s while cables are wound in: the shape is the same, the linear answer nearly, at a part of the factors."""
+    follower, fresh = (Simulator(load_robot_file("article").robot, reduced=False) for _ in range(2))
+    factors, factor = [], BlockMatrix.factor
+    monkeypatch.setattr(BlockMatrix, "factor", lambda matrix: factors.append(1) or factor(matrix))
+    wound = np.array([1e-3, 0.2e-3, 0.0, 0.5e-3, 0.0, 0.8e-3])
+    used, steps = 0, 40
+    for k in range(steps):
+        angle = np.radians(0.2 * k)
+        gravity = -G * np.array([np.cos(angle), np.sin(angle), 0.0])
+        before = len(factors)
+        shape = follower.step(gravity, displacement=(1.0 + 0.02 * k) * wound)
+        used += len(factors) - before
+        assert shape.status == ShapeStatus.OK
+    exact = fresh.solve(gravity, displacement=(1.0 + 0.02 * (steps - 1)) * wound)
+    assert shape.backbone_position == pytest.approx(exact.backbone_position, abs=1e-6)
+    assert shape.cable_tension == pytest.approx(exact.cable_tension, abs=1e-4)
+    largest = np.abs(exact.response.compliance_ea).max()
+    assert shape.response.compliance_ea == pytest.approx(exact.response.compliance_ea, abs=0.02 * largest)
+    assert used < steps / 2

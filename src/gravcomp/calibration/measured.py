@@ -1,17 +1,7 @@
-"""Measured courses of the tip, and the windows in them at which the robot stands still.
+"""Measured courses of the tip, and the windows in them at which the robot stands still."""
 
-A CSV file has a header and one row a sample:
-
-    trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty: released),
-    tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z
-
-`trial` may be missing when there is one. A bag has `gravity`, `cable/state` and the tip as geometry_msgs/PoseStamped.
-"""
-
-import csv
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -104,65 +94,3 @@ def _is_still(window: Measured) -> bool:
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     turned = np.ptp(direction, axis=0).max() <= STILL_GRAVITY
     return bool(spread and same and cables and turned)
-
-
-def read_measured(path: str | Path, cables: tuple[str, ...], tip_topic: str | None = None) -> Measured:
-    """Read a CSV file or a rosbag2 folder. Raises MeasurementError."""
-    path = Path(path).expanduser()
-    if not path.exists():
-        raise MeasurementError(f"{path}: does not exist; a CSV file or a rosbag2 folder is needed")
-    if path.is_dir():
-        from gravcomp.calibration.bag import read_bag
-
-        return read_bag(path, cables, tip_topic)
-    return _read_csv(path, cables)
-
-
-def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
-    """Write what `read_measured` reads."""
-    gravity, tip = ["gravity_x", "gravity_y", "gravity_z"], ["tip_x_mm", "tip_y_mm", "tip_z_mm"]
-    direction = ["direction_x", "direction_y", "direction_z"] if measured.tip_direction is not None else []
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["trial", "time_s", *gravity, *(f"{name}_mm" for name in cables), *tip, *direction])
-        for row in range(len(measured.time)):
-            wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in measured.displacement[row]]
-            values = [f"{x:.5f}" for x in measured.gravity[row]] + wound + [f"{1e3 * x:.4f}" for x in measured.tip_position[row]]
-            if direction:
-                values += [f"{x:.6f}" for x in measured.tip_direction[row]]
-            writer.writerow([int(measured.trial[row]), f"{measured.time[row]:.4f}", *values])
-
-
-def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header, rows = reader.fieldnames or [], list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MeasurementError(f"{path}: cannot be read as CSV: {error}") from error
-    wound = [f"{name}_mm" for name in cables]
-    needed = ["time_s", "gravity_x", "gravity_y", "gravity_z", *wound, "tip_x_mm", "tip_y_mm", "tip_z_mm"]
-    missing = [name for name in needed if name not in header]
-    if missing:
-        raise MeasurementError(f"{path}: the column '{missing[0]}' is missing; needed: {', '.join(needed)}; found: {', '.join(header)}")
-
-    def column(name: str, empty: float | None = None, scale: float = 1.0) -> np.ndarray:
-        values = []
-        for line, row in enumerate(rows, start=2):
-            text = (row[name] or "").strip()
-            try:
-                values.append(empty if not text and empty is not None else float(text))
-            except ValueError as error:
-                raise MeasurementError(f"{path}, line {line}: {name} is '{text}'; a number is needed") from error
-        return np.array(values, dtype=float) * scale
-
-    directions = [f"direction_{axis}" for axis in "xyz"]
-    return Measured(
-        source=str(path),
-        trial=column("trial").astype(int) if "trial" in header else np.zeros(len(rows), dtype=int),
-        time=column("time_s"),
-        gravity=np.column_stack([column(f"gravity_{axis}") for axis in "xyz"]),
-        displacement=np.column_stack([column(name, empty=math.nan, scale=1e-3) for name in wound]),
-        tip_position=np.column_stack([column(f"tip_{axis}_mm", scale=1e-3) for axis in "xyz"]),
-        tip_direction=np.column_stack([column(name) for name in directions]) if set(directions) <= set(header) else None,
-    )

@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measured(args: argparse.Namespace, setup, sweep, tell):
-    from gravcomp.calibration.measured import read_measured
+    from gravcomp.calibration.files import read_measured
 
     if args.data != "virtual":
         return read_measured(args.data, setup.robot.cable_names, args.tip_topic)

@@ -6,6 +6,7 @@ from gravcomp.experiments import metrics
 from gravcomp.experiments.cases import GROUND, Case, target_of
 from gravcomp.experiments.drawing import REAL, TARGET, WITHOUT, Drawing
 from gravcomp.experiments.loop import ClosedLoop, Trace
+from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context, Setup
 from gravcomp.virtual.motion import WaypointMotion, base_orientation
@@ -20,7 +21,7 @@ _START = 4.0  # s before the passes, for the robot to come to rest at its first 
 
 def run(context: Context) -> Result:
     """The experiment."""
-    setups = {"calibrated": context.calibration.setup, "not calibrated": context.setup}
+    setups = {"calibrated": context.once(calibrate_on_virtual_robot).setup, "not calibrated": context.setup}
     jobs = [
         (setup, bend, weightless, context.brief)
         for bend in (0.0, 30.0)

@@ -10,6 +10,7 @@ from gravcomp.experiments import metrics
 from gravcomp.experiments.cases import Case, target_of
 from gravcomp.experiments.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.experiments.loop import SAMPLE_PERIOD, ClosedLoop
+from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context, Setup
 from gravcomp.launcher import LaunchError, NodeDied
@@ -45,7 +46,7 @@ class SwingingMotion(SyntheticMotion):
 def run(context: Context) -> Result:
     """The experiment."""
     measured, why = _graph_delays(context)
-    setup = context.calibration.setup
+    setup = context.once(calibrate_on_virtual_robot).setup
     delays = DELAYS[:3] if context.brief else DELAYS
     jobs = [(setup, delay, predicted) for delay in delays for predicted in ((False, True) if delay else (False,))]
     errors = dict(zip([job[1:] for job in jobs], context.map(_swing, jobs, "swinging base")))

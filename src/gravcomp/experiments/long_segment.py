@@ -8,6 +8,7 @@ from gravcomp.description import Robot
 from gravcomp.experiments import metrics
 from gravcomp.experiments.cases import GROUND, Case, Outcome, pooled_recovery, run_case
 from gravcomp.experiments.drawing import MODEL, REAL, REST, WITHOUT, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context
 from gravcomp.virtual.motion import base_orientation
@@ -29,7 +30,7 @@ def lengthened(robot: Robot) -> Robot:
 
 def run(context: Context) -> Result:
     """The experiment."""
-    calibrated = context.calibration.setup
+    calibrated = context.once(calibrate_on_virtual_robot).setup
     setup = dataclasses.replace(calibrated, robot=lengthened(calibrated.robot), nominal=lengthened(calibrated.nominal))
     inclinations = INCLINATIONS[1:2] if context.brief else INCLINATIONS
     cases = [Case(i, options=options) for options in ({}, BACKBONE) for i in inclinations]

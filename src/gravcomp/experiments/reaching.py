@@ -5,13 +5,14 @@ import numpy as np
 from gravcomp.experiments.cases import GROUND
 from gravcomp.experiments.drawing import REAL, TARGET, WITHOUT, Drawing, draw_robot
 from gravcomp.experiments.lumen import Reach, Reached, run_reach
+from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context
 
 
 def reaching(context: Context, name: str, title: str, question: str, reaches: tuple[Reach, ...]) -> Result:
     """Every reach with and without compensation, by the calibrated controller."""
-    setup = context.calibration.setup
+    setup = context.once(calibrate_on_virtual_robot).setup
     if context.brief:
         reaches = reaches[-1:]
     jobs = [(setup, reach, weightless) for reach in reaches for weightless in (True, False)]

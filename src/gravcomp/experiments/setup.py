@@ -3,8 +3,7 @@
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from gravcomp.config import from_mapping
 from gravcomp.description import Robot, RobotFile
@@ -14,8 +13,7 @@ from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.virtual.parameters import VirtualRobotParameters
 
-if TYPE_CHECKING:
-    from gravcomp.experiments.measuring import Calibration
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -73,13 +71,13 @@ class Context:
 
     def __init__(self, setup: Setup, sweep: Sweep, progress: Callable[[str], None] = lambda sentence: None, brief: bool = False):
         self.setup, self.sweep, self.progress, self.brief = setup, sweep, progress, brief
+        self._made: dict[Callable, Any] = {}
 
-    @cached_property
-    def calibration(self) -> "Calibration":
-        """The calibration run on the virtual robot, made once for all experiments that ask for it."""
-        from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-
-        return calibrate_on_virtual_robot(self)
+    def once(self, make: "Callable[[Context], Made]") -> "Made":
+        """What `make(context)` returns, made once for all experiments that ask for it."""
+        if make not in self._made:
+            self._made[make] = make(self)
+        return self._made[make]
 
     def map(self, function: Callable, jobs: list, what: str) -> list:
         """`sweep.map` that tells how far it is."""

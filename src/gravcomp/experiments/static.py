@@ -5,6 +5,7 @@ import numpy as np
 
 from gravcomp.experiments.cases import GROUND, Case, Outcome, pooled_recovery, run_case
 from gravcomp.experiments.drawing import MODEL, REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context
 from gravcomp.virtual.motion import base_orientation
@@ -27,7 +28,7 @@ CASES = (
 def run(context: Context) -> Result:
     """The experiment."""
     cases = CASES[3::3] if context.brief else CASES
-    calibrated = context.calibration
+    calibrated = context.once(calibrate_on_virtual_robot)
     jobs = [(setup, case) for setup in (context.setup, calibrated.setup) for case in cases]
     outcomes = context.map(run_case, jobs, "static compensation")
     plain, fitted = outcomes[: len(cases)], outcomes[len(cases) :]

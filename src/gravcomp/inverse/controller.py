@@ -40,7 +40,7 @@ class InverseController:
         self.robot = robot
         self.options = options
         self._names = robot.cable_names
-        self._solver = ProgrammeSolver(len(robot.cables))
+        self._solver = ProgrammeSolver()
         self.reset()
 
     def reset(self, displacement: np.ndarray | None = None) -> None:

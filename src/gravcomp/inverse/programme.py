@@ -16,29 +16,19 @@ cannot make up for the length that they take.
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
 from gravcomp.description.robot import Limits
-from gravcomp.inverse.limits import StepBounds, step_bounds
+from gravcomp.inverse.limits import step_bounds
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.scaling import Programme, ScaledProgramme, scaled
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
     from gravcomp.simulation.shape import Response
-
-
-class Programme(NamedTuple):
-    """min 1/2 x^T hessian x + gradient^T x over the tensions x (m,), subject to the bounds, with displacement =
-    compliance x + offset."""
-
-    hessian: np.ndarray
-    gradient: np.ndarray
-    compliance: np.ndarray
-    offset: np.ndarray
-    bounds: StepBounds
 
 
 def build_programme(
@@ -52,7 +42,7 @@ def build_programme(
     interval: float,
     damping: float,
     options: InverseOptions,
-) -> Programme:
+) -> ScaledProgramme:
     """The programme around the present state, for the next `interval` (s).
 
     tension (m,): the present tensions, reference of the proximal term; displacement (m,): commanded last; backbone_station (n,): of
@@ -105,7 +95,7 @@ def _built(
     )
     hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
     bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
-    return Programme(hessian, gradient, compliance, displacement_free, bounds)
+    return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds))
 
 
 @njit(cache=True)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 # Green's strain in compression from which on St. Venant-Kirchhoff's stress falls.
 _SOFTENING = -1.0 / 3.0
+# Steps from one vain search for an equilibrium to the next, the first and the longest pause; in between the last shape is kept. A search
+# takes a second, in which a controller would hear nothing that leads away from where there is no equilibrium.
+_FIRST_PAUSE, _LONGEST_PAUSE = 50, 3200
 
 
 class Simulator:
@@ -31,6 +34,7 @@ class Simulator:
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
+        self._pause = self._until_search = 0
         reduction = load(self.model) if reduced else None
         self._serving = reduction and ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
 
@@ -49,13 +53,15 @@ class Simulator:
     def reset(self) -> None:
         """Back to the straight robot."""
         self.solver.reset()
+        self._pause = self._until_search = 0
         if self._serving:
             self._serving.reset()
 
     def step(
         self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None
     ) -> Shape:
-        """Follow the equilibrium, starting from the last shape: for small changes, a control step apart.
+        """Follow the equilibrium, starting from the last shape: for small changes, a control step apart. Where it is lost it is
+        searched for from the straight robot, in vain less and less often: else the last shape is returned, NOT_CONVERGED.
 
         gravity (3,) in m/s^2; displacement (m,) in m, pulled in is positive, NaN for a released cable; or tension (m,) in
         N; neither: all cables released. Raises ValueError for wrong lengths and numbers that are not finite.
@@ -68,9 +74,14 @@ class Simulator:
         before = self.solver.state
         state = self.solver.track(gravity, cables)
         if not state.converged:
-            state = self.solver.solve(gravity, cables)
-            if not state.converged:
-                self.solver.state = before
+            if self._may_search():
+                state = self.solver.solve(gravity, cables)
+            else:
+                state = dataclasses.replace(before, residual=state.residual, converged=False, carried=1.0)
+        if state.converged:
+            self._pause = self._until_search = 0
+        else:
+            self.solver.state = before
         shape = self._shape(state, gravity, started)
         if not self._serving:
             return shape
@@ -91,6 +102,14 @@ class Simulator:
         if self._serving:
             self._serving.follow(state, gravity, cables)
         return self._shape(state, gravity, started)
+
+    def _may_search(self) -> bool:
+        """Whether it is time to search for an equilibrium that is lost."""
+        self._until_search -= 1
+        if self._until_search > 0:
+            return False
+        self._pause = self._until_search = min(max(2 * self._pause, _FIRST_PAUSE), _LONGEST_PAUSE)
+        return True
 
     def checked(
         self, gravity: np.ndarray, displacement: np.ndarray | None, tension: np.ndarray | None
@@ -138,6 +157,8 @@ class Simulator:
 
     def _why_not(self, state: Equilibrium) -> str:
         """What a person should know about a load that found no equilibrium."""
+        if state.carried == 1.0:  # not searched for
+            return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.carried:.0f} % of the load"
         softened = np.array([material.law == "svk" for material in self.model.mesh.materials])[self.model.mesh.region]
         if isinstance(self.model.elements, SolidElements) and softened.any():
