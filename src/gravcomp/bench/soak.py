@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from gravcomp.bench.probe import CurrentMonitor, Probe
-from gravcomp.bench.running_graph import NODES, RunningGraph
+from gravcomp.bench.running_graph import NODES, START_TIMEOUT, RunningGraph
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
 
@@ -28,8 +28,7 @@ def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
         progress("starting the graph")
         probe, monitor = Probe(graph), CurrentMonitor(graph, limit)
         try:
-            time.sleep(5.0)
-            probe.enable(True)
+            _enable(probe)
             graph.wait_for_commands()
             memory = _watch(graph, 60.0 * minutes, progress)
             probe.enable(False)
@@ -50,6 +49,17 @@ def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
         "limit_violations": monitor.violations,
         "holds": len([seen for seen in probe.states if seen.state.name in ("HOLDING", "FAULT")]),
     }
+
+
+def _enable(probe: Probe) -> None:
+    """Wait until the controller takes the order; on a new machine it compiles first."""
+    end = time.monotonic() + START_TIMEOUT
+    while True:
+        try:
+            return probe.enable(True)
+        except TimeoutError:
+            if time.monotonic() > end:
+                raise
 
 
 def _watch(graph: RunningGraph, duration: float, progress: Callable[[str], None]) -> dict[str, list[tuple[float, float]]]:

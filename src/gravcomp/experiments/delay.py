@@ -49,7 +49,9 @@ def run(context: Context) -> Result:
     setup = context.once(calibrate_on_virtual_robot).setup
     delays = DELAYS[:3] if context.brief else DELAYS
     jobs = [(setup, delay, predicted) for delay in delays for predicted in ((False, True) if delay else (False,))]
-    errors = dict(zip([job[1:] for job in jobs], context.map(_swing, jobs, "swinging base")))
+    runs = dict(zip([job[1:] for job in jobs], context.map(_swing, jobs, "swinging base")))
+    errors = {case: _rms(runs[case].error, case[0]) for case in runs}
+    moved = {case: _rms(np.linalg.norm(runs[case].tip - runs[0, False].tip, axis=1), case[0]) for case in runs if case[0]}
     in_ms = 1e3 * np.array(measured)
     median = float(np.median(in_ms)) if len(in_ms) else math.nan
     p99 = float(np.percentile(in_ms, 99)) if len(in_ms) else math.nan
@@ -58,13 +60,13 @@ def run(context: Context) -> Result:
         Figure("delay from IMU sample to motor current, median", median, "ms", "about 3 s", 100.0),
         Figure("delay from IMU sample to motor current, 99th percentile", p99, "ms", "about 3 s", 100.0),
     ]
-    if pair[0] in errors:
+    if pair[0] in runs:
         figures += [
-            Figure("tip error by a delay of 100 ms, without prediction", 1e3 * _extra(errors, *pair[0]), "mm"),
-            Figure("tip error by a delay of 100 ms, predicted", 1e3 * _extra(errors, *pair[1]), "mm"),
+            Figure("tip moved by a delay of 100 ms, without prediction", 1e3 * moved[pair[0]], "mm"),
+            Figure("tip moved by a delay of 100 ms, predicted", 1e3 * moved[pair[1]], "mm"),
         ]
-    if (300, False) in errors:
-        figures.append(Figure("tip error by the article's delay of 3 s", 1e3 * _extra(errors, 300, False), "mm"))
+    if (300, False) in runs:
+        figures.append(Figure("tip moved by the article's delay of 3 s", 1e3 * moved[300, False], "mm"))
     swing = SwingingMotion(np.radians(20.0), 6.0, 0.0)
     return Result(
         name="delay",
@@ -81,20 +83,21 @@ def run(context: Context) -> Result:
         parts=[
             Plot(
                 "Delays",
-                _drawing(in_ms, errors),
-                "Left: delays in the running graph. Right: what a delay adds to the tip's error while the base swings, without prediction and with"
+                _drawing(in_ms, moved),
+                "Left: delays in the running graph. Right: how far a delay moves the tip while the base swings, without prediction and with"
                 " gravity predicted by as much.",
             ),
             Table(
                 "Tip error on a swinging base",
-                ("delay, ms", "without prediction, mm RMS", "added by the delay, mm", "predicted, mm RMS", "added, mm"),
+                ("delay, ms", "without prediction, mm RMS", "moved by the delay, mm RMS", "predicted, mm RMS", "moved, mm RMS"),
                 [
-                    (10 * delay, 1e3 * errors[delay, False], 1e3 * _extra(errors, delay, False),
-                     1e3 * errors.get((delay, True), math.nan), 1e3 * _extra(errors, delay, True) if delay else "–")
+                    (10 * delay, 1e3 * errors[delay, False], 1e3 * moved[delay, False], 1e3 * errors[delay, True], 1e3 * moved[delay, True])
+                    if delay
+                    else (0, 1e3 * errors[0, False], "–", "–", "–")
                     for delay in delays
                 ],
-                f"The base swings by ±20 deg every 6 s, at most {np.degrees(swing.fastest):.0f} deg/s. RMS of the tip's distance from straight; the"
-                " delay's part is the root of the difference of squares to the undelayed run. Prediction reaches at most"
+                f"The base swings by ±20 deg every 6 s, at most {np.degrees(swing.fastest):.0f} deg/s. RMS of the tip's distance from straight, and"
+                " of the tip's distance from where the undelayed run has it at the same moment. Prediction reaches at most"
                 f" {1e3 * _LONGEST_HORIZON:.0f} ms ahead.",
             ),
         ],
@@ -124,8 +127,16 @@ def _graph_delays(context: Context) -> tuple[list[float], str]:
     return listener.delays, "" if listener.delays else listener.failure or "no command was traced on the bus"
 
 
-def _swing(job: tuple[Setup, int, bool]) -> float:
-    """RMS of the tip error in m."""
+@dataclasses.dataclass(frozen=True)
+class _Run:
+    """The tip's position (t, 3) m and its distance (t,) m from the target, from the moment at which the base begins to swing."""
+
+    tip: np.ndarray
+    error: np.ndarray
+
+
+def _swing(job: tuple[Setup, int, bool]) -> _Run:
+    """A run with a delay in samples, predicted or not."""
     setup, delay, predicted = job
     if predicted:
         horizon = min(delay * SAMPLE_PERIOD, _LONGEST_HORIZON)
@@ -137,17 +148,17 @@ def _swing(job: tuple[Setup, int, bool]) -> float:
     loop.run(_START)
     loop.forget()
     loop.run(_DURATION)
-    trace = loop.trace.between(_START + max(0.0, delay * SAMPLE_PERIOD))
+    trace = loop.trace
     error = metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
-    return float(np.sqrt((error.distance**2).mean()))
+    return _Run(trace.tip_position, error.distance)
 
 
-def _extra(errors: dict, delay: int, predicted: bool) -> float:
-    """What the delay adds, m."""
-    return math.sqrt(max(0.0, errors[delay, predicted] ** 2 - errors[0, False] ** 2))
+def _rms(values: np.ndarray, delay: int) -> float:
+    """Of the samples (t,) from the first on that a command of the swinging base has reached."""
+    return float(np.sqrt((values[delay:] ** 2).mean()))
 
 
-def _drawing(in_ms: np.ndarray, errors: dict) -> str:
+def _drawing(in_ms: np.ndarray, moved: dict) -> str:
     with Drawing(1, 2, width=10.5, height=3.3) as drawing:
         histogram, cost = drawing.axes
         if len(in_ms):
@@ -157,11 +168,11 @@ def _drawing(in_ms: np.ndarray, errors: dict) -> str:
         histogram.set_xlabel("from IMU sample to current in ms")
         histogram.set_ylabel("samples")
         for predicted, colour, label in ((False, WITHOUT, "without prediction"), (True, REAL, "gravity predicted")):
-            points = sorted((10 * d, 1e3 * _extra(errors, d, p)) for d, p in errors if d and p is predicted)
+            points = sorted((10 * d, 1e3 * moved[d, p]) for d, p in moved if p is predicted)
             cost.plot(*zip(*points), "o-", color=colour, label=label)
         cost.set_xscale("log")
         cost.set_yscale("symlog", linthresh=0.1)
         cost.set_xlabel("delay in ms")
-        cost.set_ylabel("added tip error in mm")
+        cost.set_ylabel("tip moved in mm")
         cost.legend()
     return drawing.svg
