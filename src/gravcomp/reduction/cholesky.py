@@ -8,9 +8,10 @@ from numba import njit
 def factorise(matrix: np.ndarray) -> tuple[bool, np.ndarray]:
     """Whether a symmetric matrix (r, r), given by its lower triangle, is positive definite, and its factor L then."""
     try:
-        return True, np.linalg.cholesky(matrix)
+        factor = np.linalg.cholesky(matrix)
     except Exception:  # LinAlgError; compiled code knows no other class
         return False, matrix
+    return np.isfinite(factor[-1, -1]), factor  # LAPACK lets NaN pass, and it ends there
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
