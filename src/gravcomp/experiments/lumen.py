@@ -109,6 +109,7 @@ class Reached:
     deviation: np.ndarray  # (t,) tip from the centreline
     camera: np.ndarray  # (t,) tip's direction against the centreline's
     tip_error: np.ndarray  # (t,) tip from what was asked for in soft_base
+    lateral: np.ndarray  # (t,) its part across the direction asked for
 
 
 def run_reach(job: tuple[Setup, Reach, bool]) -> Reached:
@@ -151,7 +152,9 @@ def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion) -> Rea
     room = 0.5 * (lumen.diameter - robot.segments[0].outer_diameter) - lumen.distance(body)
     # Only what has entered the mouth can touch the wall.
     clearance = np.where(body[:, :, 2] >= 0.0, room, np.inf).min(axis=1)
-    wanted = np.array([target_at(setup, reach, float(d)).tip_position for d in depth])
+    targets = [target_at(setup, reach, float(d)) for d in depth]
+    wanted, along = (np.array(column) for column in zip(*((t.tip_position, t.tip_direction) for t in targets)))
+    errors = metrics.tip_errors(trace.tip_position[rows], trace.tip_direction[rows], wanted, along)
     return Reached(
         reach=reach,
         time=time,
@@ -161,7 +164,8 @@ def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion) -> Rea
         clearance=clearance,
         deviation=lumen.distance(tip),
         camera=metrics.angle_between(camera, lumen.direction(depth)),
-        tip_error=np.linalg.norm(trace.tip_position[rows] - wanted, axis=1),
+        tip_error=errors.distance,
+        lateral=errors.lateral,
     )
 
 
