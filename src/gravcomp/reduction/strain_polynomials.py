@@ -40,16 +40,10 @@ class StrainPolynomials:
     linear: np.ndarray
     quadratic: np.ndarray
 
-    def evaluate(
-        self, q: np.ndarray, scale: float = 1.0, offset: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At q (r,): internal force (r,), tangent stiffness (r, r) in its lower triangle, and the strain eps (m,).
-
-        The stress is `scale` eps + `offset` (m,), which is how damping comes in; elastic by itself.
-        """
+    def evaluate(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """At q (r,): internal force (r,), tangent stiffness (r, r) in its lower triangle, and the strain eps (m,)."""
         jacobian, strain = strain_at(self.linear, self.quadratic, q)
-        stress = scale * strain if offset is None else scale * strain + offset
-        return jacobian @ stress, tangent(jacobian, self.quadratic, stress, scale), strain
+        return jacobian @ strain, tangent(jacobian, self.quadratic, strain, 1.0), strain
 
 
 @njit(cache=True)
