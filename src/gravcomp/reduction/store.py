@@ -16,7 +16,7 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 from gravcomp.simulation.model import RobotModel
 
 # Part of the key; to be raised when what is stored, or how it is trained, changes.
-_FORMAT = 6
+_FORMAT = 7
 
 
 @dataclass(frozen=True)
