@@ -1,8 +1,8 @@
 """fem_simulator: the robot's shape under the virtual gravity, one equilibrium a sample of gravity.
 
 The model stands still in `soft_base` while its gravity turns; its cables are where they were commanded to be, as fast as winches can
-follow, or where the motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from one stamp to
-the next, beginning at rest in the first equilibrium.
+follow, or where the motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from
+one stamp to the next, beginning at rest in the first equilibrium.
 """
 
 import sys

@@ -53,7 +53,8 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
                 ("lumen", "compensation", "least clearance, mm", "mean clearance, mm", "tip from centreline, mm", "tip error, mm",
                  "across, mm", "camera error, deg", "largest, deg"),
                 rows,
-                "Tip error: against the shape asked for in the robot's base; across: without what it is too short by. Tip from centreline and clearance: in the lumen's frame, so they hold"
+                "Tip error: against the shape asked for in the robot's base; across: without what it is too short by. Tip from"
+                " centreline and clearance: in the lumen's frame, so they hold"
                 " what the hand's trembling does to the base, too, which no cable can undo.",
             ),
         ],

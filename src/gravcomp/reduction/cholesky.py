@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+from gravcomp.reduction.rounding import REORDERED
+
 
 @njit(cache=True)
 def factorise(matrix: np.ndarray) -> tuple[bool, np.ndarray]:
@@ -14,7 +16,7 @@ def factorise(matrix: np.ndarray) -> tuple[bool, np.ndarray]:
     return np.isfinite(factor[-1, -1]), factor  # LAPACK lets NaN pass, and it ends there
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(cache=True, fastmath=REORDERED)
 def solve(factor: np.ndarray, columns: np.ndarray) -> None:
     """Replace `columns` B (r, k) by A^-1 B, where A = L L^T with L = `factor` (r, r).
 

@@ -18,6 +18,7 @@ from gravcomp.reduction.body import Point, body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
 from gravcomp.simulation.generalized_alpha import DynamicsOptions, GeneralizedAlpha
 from gravcomp.simulation.statics import CableInput
@@ -141,7 +142,7 @@ class ReducedDynamicSolver:
         return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(cache=True, fastmath=REORDERED)
 def _stepped(body, point, q, tension, rest, inertia, weight, wound, given, now, scale, offset, tolerance):
     """Whether the step converged, and at its end q, tension, point, force g and the norm of the forces out of balance in N.
 

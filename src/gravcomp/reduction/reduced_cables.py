@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-_REORDERED = {"reassoc", "contract", "nsz", "arcp"}
+from gravcomp.reduction.rounding import REORDERED
 
 
 class ReducedCables(NamedTuple):
@@ -29,7 +29,7 @@ class ReducedTendons(NamedTuple):
     jacobian: np.ndarray
 
 
-@njit(cache=True, fastmath=_REORDERED)
+@njit(cache=True, fastmath=REORDERED)
 def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
     """The cables at q (r,)."""
     count, r = len(cables.cable), len(q)
@@ -52,7 +52,7 @@ def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
     return ReducedTendons(tangent, length, displacement, jacobian)
 
 
-@njit(cache=True, fastmath=_REORDERED)
+@njit(cache=True, fastmath=REORDERED)
 def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, matrix: np.ndarray) -> None:
     """Add to the lower triangle of matrix (r, r) the stiffness that the tensions (m,) give the body.
 

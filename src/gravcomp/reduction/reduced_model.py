@@ -13,6 +13,7 @@ from numba import njit
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import pieces_of
 from gravcomp.reduction.reduced_cables import ReducedCables
+from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 from gravcomp.simulation.model import RobotModel
 from gravcomp.simulation.observation import observe
@@ -55,7 +56,7 @@ class ReducedModel:
         return math.sqrt(q @ q) / self.reach
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(cache=True, fastmath=REORDERED)
 def _observed(section_rest, section_change, q, answer):
     count, columns = len(section_rest) - 1, len(answer)
     sections, moved = section_rest.copy(), np.zeros((count + 1, 3, 3, columns))

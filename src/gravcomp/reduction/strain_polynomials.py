@@ -22,11 +22,11 @@ from numba import njit
 
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.basis import principal_combinations
+from gravcomp.reduction.rounding import REORDERED
 
 # Voigt's order 11 22 33 12 23 13 with doubled shear, as in the elements.
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 _POINTS_AT_ONCE = 400
-_REORDERED = {"reassoc", "contract", "nsz", "arcp"}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def _packed(i, j):
     return i * (i + 1) // 2 + j if j <= i else j * (j + 1) // 2 + i
 
 
-@njit(cache=True, fastmath=_REORDERED)
+@njit(cache=True, fastmath=REORDERED)
 def strain_at(linear, quadratic, q):
     """J^T (r, m) and eps (m,) at q (r,)."""
     r, modes = linear.shape
@@ -79,7 +79,7 @@ def strain_at(linear, quadratic, q):
     return jacobian, strain
 
 
-@njit(cache=True, fastmath=_REORDERED)
+@njit(cache=True, fastmath=REORDERED)
 def tangent(jacobian, quadratic, stress, scale):
     """scale J^T J + sum stress_m B_m (r, r), its lower triangle, from J^T (r, m) and the stress (m,)."""
     r, modes = jacobian.shape

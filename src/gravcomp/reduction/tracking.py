@@ -18,6 +18,7 @@ from gravcomp.reduction.body import body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
 from gravcomp.simulation.statics import CableInput
 
@@ -67,7 +68,7 @@ class ReducedTracker:
         return self.state
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(cache=True, fastmath=REORDERED)
 def _followed(body, point, q, tension, weight, wound, given, iterations, longest_step, near, tolerance):
     """Whether an equilibrium was reached, the point there (else the one at the start), the fields of its ReducedState up to the residual.
 
