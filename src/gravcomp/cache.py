@@ -47,5 +47,12 @@ def content_key(*content: Any) -> str:
 
 
 def configure_numba() -> None:
-    """Let Numba keep its compiled functions in the cache; to be called before the first import of numba."""
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder("numba")))
+    """Let Numba keep its compiled functions in the cache; to be called before the first import of numba.
+
+    Numba looks at a function's own file alone, but functions here call those of other files: the folder is that of all their contents.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
+    compiled = [text for text in (source.read_bytes() for source in sources) if b"numba" in text]
+    os.environ["NUMBA_CACHE_DIR"] = str(cache_folder("numba") / content_key(*compiled))

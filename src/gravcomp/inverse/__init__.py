@@ -1,5 +1,9 @@
 """The inverse problem: which cable displacements bring the modelled robot to its target."""
 
+from gravcomp.cache import configure_numba
+
+configure_numba()  # before the first module here imports Numba
+
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
