@@ -2,20 +2,18 @@
 
 import argparse
 import importlib
-import signal
 import sys
 
 from gravcomp.commands import COMMANDS, overview
+from gravcomp.environment.interrupt import run_interruptible
 
 
 def main(arguments: list[str]) -> int:
-    """Run one command; returns the exit code: 2 for a mistake in what was given, 130 for Ctrl-C."""
+    """Run one command; returns the exit code, 2 for a mistake in what was given."""
     if not arguments or arguments[0] not in COMMANDS:
         print(overview(), file=sys.stderr)
         return 2
     name, *rest = arguments
-    # SIGTERM ends a command like Ctrl-C does, so that its nodes are ended, too.
-    signal.signal(signal.SIGTERM, _interrupt)
     module = importlib.import_module(f"gravcomp.commands.{name.replace('-', '_')}")
     parser = argparse.ArgumentParser(prog=f"gravcomp {name}", description=COMMANDS[name], allow_abbrev=False)
     module.add_arguments(parser)
@@ -27,13 +25,7 @@ def main(arguments: list[str]) -> int:
     except (ConfigError, LaunchError, NodeDied, TimeoutError) as error:
         print(f"gravcomp {name}: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        return 130
-
-
-def _interrupt(*_) -> None:
-    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_interruptible(lambda: main(sys.argv[1:]))

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import pwd
+import signal
 import sys
 from pathlib import Path
 
@@ -30,6 +31,8 @@ def enter(root: Path, arguments: "list[str]") -> int:
     os.environ.setdefault("HOME", pwd.getpwuid(os.geteuid()).pw_dir)
     try:
         state = _ready(root) or _make(root)
+        # A Ctrl-C while the next interpreter starts waits until somebody is there to answer it.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     except SetupError as error:
         print(f"gravcomp: {error}", file=sys.stderr)
         return 3
