@@ -57,8 +57,7 @@ class Pair:
 
 
 @pytest.fixture
-def pair(monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+def pair():
     pair = Pair()
     yield pair
     pair.close()

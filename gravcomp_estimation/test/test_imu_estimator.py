@@ -37,7 +37,6 @@ SURELY = [
 def graph(monkeypatch):
     """Starts nodes of this package in one executor, in a domain of their own."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(101 + os.getpid() % 90))
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     graph = Graph()
     yield graph
     graph.close()

@@ -8,7 +8,6 @@ import threading
 import time
 
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
-os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 import pytest  # noqa: E402
 import rclpy  # noqa: E402

@@ -27,8 +27,7 @@ def run(args: argparse.Namespace) -> int:
     given = [a for a in args.arguments if a != "--"]
     targets = [] if any((root / a.split("::")[0]).exists() for a in given if not a.startswith("-")) else folders
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-ra", "--durations=10", *targets, *given]
-    # As in the nodes that the launcher starts: tests kill nodes, and shared memory of a killed one can hang its neighbours.
-    return subprocess.run(command, cwd=root, env={"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", **os.environ}).returncode
+    return subprocess.run(command, cwd=root).returncode
 
 
 def _provide_browser() -> None:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from gravcomp.doctor.finding import Finding
+from gravcomp.environment.middleware import reach
 
 _PACKAGES = ("rclpy", "numpy", "scipy", "numba", "python-can", "cantools", "filterpy", "proxsuite", "trimesh", "rosbags", "viser")
 _CAN_DEVICE = "280"  # ARPHRD_CAN in /sys/class/net/*/type
@@ -25,8 +26,7 @@ def _python() -> Finding:
 def _ros() -> Finding:
     distro = os.environ.get("ROS_DISTRO")
     source = f"installed ROS 2 {distro}" if distro else "ROS 2 Jazzy from wheels"
-    reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
-    return Finding("ok", "ROS", f"{source}; domain {os.environ.get('ROS_DOMAIN_ID', '0')}; discovery {reach}")
+    return Finding("ok", "ROS", f"{source}; domain {os.environ.get('ROS_DOMAIN_ID', '0')}; discovery {reach(os.environ)}")
 
 
 def _packages() -> list[Finding]:

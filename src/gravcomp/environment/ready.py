@@ -14,6 +14,7 @@ from gravcomp.commands import COMMANDS, overview
 from gravcomp.environment import packages, system_packages, workspace
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import choose_interpreter
+from gravcomp.environment.middleware import middleware
 
 SEARCH_PATHS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PATH")
 
@@ -51,8 +52,8 @@ def environment(root: Path, paths: "dict[str, str]") -> "dict[str, str]":
         parts = [p for p in paths[name].split(":") if p]
         parts += [p for p in os.environ.get(name, "").split(":") if p and p not in parts]
         result[name] = ":".join(parts)
-    # Nothing leaves the machine unless asked; one thread for matrices of this size.
-    result.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    result.update(middleware(os.environ))
+    # One thread for matrices of this size.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         result.setdefault(name, "1")
     return result

@@ -16,10 +16,6 @@ _NODE_ENVIRONMENT = {
     # Memory in huge pages where the kernel gives them: a node that wakes a hundred times a second finds its caches cold each time, and
     # with small pages it pays for their addresses, too (a tenth of its processor time, a fifth of the loop's delay).
     "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
-    # No shared memory between nodes: one that is killed leaves locks in it, which hold the others up for a second, or for ever at their end.
-    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
-    # Nodes that make themselves known often; a user's own profiles go first.
-    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
 }
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
