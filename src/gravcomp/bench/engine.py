@@ -138,10 +138,16 @@ def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: fl
     """Tip positions (k, 3) of the robot let go straight and horizontal, its cables released, and what each step takes (k,) in s."""
     gravity = np.array([-_GRAVITY, 0.0, 0.0])
     nodes = model.mesh.nodes
-    if isinstance(solver, DynamicSolver):
-        solver.place(np.zeros_like(nodes), gravity=gravity)
-    else:
-        solver.place(np.zeros(solver.model.size), np.zeros(model.tendons.count), gravity)
+
+    def place() -> None:
+        if isinstance(solver, DynamicSolver):
+            solver.place(np.zeros_like(nodes), gravity=gravity)
+        else:
+            solver.place(np.zeros(solver.model.size), np.zeros(model.tendons.count), gravity)
+
+    place()
+    solver.step(gravity, CableInput(), h)  # the first one compiles
+    place()
     tips, times = [], []
     for _ in range(round(0.6 / h)):
         begin = time.perf_counter()

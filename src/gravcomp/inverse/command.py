@@ -6,7 +6,7 @@ lengthen. Between the two u is continuous: the slack opens with the tension that
 cable could push, at the cable's own compliance, so nothing jumps when a cable goes idle.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,8 +14,7 @@ from numba import njit
 from gravcomp.inverse.status import ControllerCode
 
 
-@dataclass(frozen=True)
-class Command:
+class Command(NamedTuple):
     """displacement (m,) m and tension (m,) N of the cables; code and message say how well the target is kept;
     distance, lateral, axial m and tilt rad: what is predicted of the tip against its target (NaN: nothing); solve_time s."""
 

@@ -18,6 +18,7 @@ from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.limits import held_within, limits_met, within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, judge
 from gravcomp.inverse.errors import backbone_missed, tip_errors
@@ -49,7 +50,7 @@ class InverseController:
         self._solver.reset()
         self._damping = StepDamping()
         self._displacement = None if displacement is None else np.array(displacement, dtype=float)
-        self._tension = np.zeros(len(self.robot.cables))
+        self._tension = self._change = np.zeros(len(self.robot.cables))
 
     def step(
         self,
@@ -94,28 +95,30 @@ class InverseController:
                 message=f"{error}; the last command is kept",
                 solve_time=time.perf_counter() - started,
             )
-        change, displacement, effector, met, errors = _outcome(
+        tension, self._change, along, lengths, displacement, effector, met, any_met, errors = _outcome(
             np.ascontiguousarray(response.compliance_aa),
             response.displacement_free,
             np.ascontiguousarray(response.compliance_ea),
             response.effector_free,
             tension,
-            solution.tension,
-            solution.unwanted,
+            (solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper),
             options.slack,
             previous,
+            self._change,
             (limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max),
             limits.tension_max,
             target.tip_position,
             target.direction_or_zeros,
         )
-        self._damping.observe(change)
+        self._damping.observe(along, lengths)
         missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
-        code, message = judge(target=target, points_missed=missed, tilt=errors.tilt, met=met, names=self._names, options=options)
-        self._displacement, self._tension = displacement, solution.tension
+        code, message = judge(
+            target=target, points_missed=missed, tilt=errors.tilt, met=met if any_met else None, names=self._names, options=options
+        )
+        self._displacement, self._tension = displacement, tension
         return Command(
             displacement=displacement,
-            tension=solution.tension,
+            tension=tension,
             code=code,
             message=message,
             distance=errors.distance,
@@ -145,15 +148,17 @@ class InverseController:
 
 @njit(cache=True)
 def _outcome(
-    compliance_aa, displacement_free, compliance_ea, effector_free, before, tension, unwanted, slack, previous, travel, highest, tip,
+    compliance_aa, displacement_free, compliance_ea, effector_free, before, solution, slack, previous, last_change, travel, highest, tip,
     direction,
 ):  # fmt: skip
-    """What the tensions (m,) of the solution come to, from those `before`: change of path displacement (m,), displacement (m,) of
-    the winches, effector (e,), the limits met (3, m), errors of the tip. travel: longest way of a step, least and largest
-    displacement."""
+    """What the solution (arguments of `unscaled`) comes to, from the tensions `before` (m,): tension (m,), change of path displacement
+    (m,), its product with the last one and that of their lengths, displacement (m,) of the winches, effector (e,), the limits met and
+    whether any is, errors of the tip. travel: longest way of a step, least and largest displacement."""
+    tension, unwanted = unscaled(*solution)
     path = compliance_aa @ tension + displacement_free
     change = compliance_aa @ (tension - before)
+    along, lengths = (change * last_change).sum(), np.sqrt((change * change).sum() * (last_change * last_change).sum())
     displacement = held_within(cable_displacement(path, compliance_aa, unwanted, slack), previous, *travel)
     effector = compliance_ea @ tension + effector_free
-    met = limits_met(displacement, previous, *travel, tension, highest)
-    return change, displacement, effector, met, tip_errors(effector, tip, direction)
+    met, any_met = limits_met(displacement, previous, *travel, tension, highest)
+    return tension, change, along, lengths, displacement, effector, met, any_met, tip_errors(effector, tip, direction)

@@ -6,10 +6,6 @@ while steps agree, as in Levenberg's and Marquardt's method; the sign of agreeme
 displacement, because the loop has no other trial.
 """
 
-import math
-
-import numpy as np
-
 _LARGEST = 1e4
 # A change below this is noise of the gravity's direction, not an overshoot.
 _SMALLEST_CHANGE = 5e-6
@@ -21,14 +17,10 @@ class StepDamping:
 
     def __init__(self):
         self.factor = 1.0
-        self._change: np.ndarray | None = None
 
-    def observe(self, change: np.ndarray) -> None:
-        """Take in the change of path displacement (m,) that the last programme asked for."""
-        before, self._change = self._change, change
-        if before is None:
-            return
-        lengths, along = math.sqrt((change @ change) * (before @ before)), change @ before
+    def observe(self, along: float, lengths: float) -> None:
+        """Take in the changes of path displacement (m,) that the last two programmes asked for: their scalar product and the product of
+        their lengths, m^2."""
         if lengths <= _SMALLEST_CHANGE**2:
             return  # settled: with less damping it might not stay so
         if along < _BACK_AND_FORTH * lengths:

@@ -54,7 +54,7 @@ def held_within(displacement, previous, reach, farthest_out, farthest_in):
 
 @njit(cache=True)
 def limits_met(displacement, previous, reach, farthest_out, farthest_in, tension, highest):
-    """(3, m): which cables move as fast as they may, have the highest tension, are at an end of their travel.
+    """(3, m): which cables move as fast as they may, have the highest tension, are at an end of their travel; and whether any is.
 
     A micrometre and a millinewton are below what any winch resolves.
     """
@@ -62,4 +62,4 @@ def limits_met(displacement, previous, reach, farthest_out, farthest_in, tension
     met[0] = np.abs(displacement - previous) > reach - 1e-6
     met[1] = tension > highest - 1e-3
     met[2] = (displacement > farthest_in - 1e-6) | (displacement < farthest_out + 1e-6)
-    return met
+    return met, met.any()

@@ -74,15 +74,16 @@ def scaled(programme: Programme) -> ScaledProgramme:
 
 
 @njit(cache=True)
-def unscaled(solution: np.ndarray, multipliers: np.ndarray, scale: np.ndarray, lower: np.ndarray, upper: np.ndarray):
-    """Tensions (m,) N within their bounds and how far below the lower one each is wanted (m,) N, free of the solver's last bits.
+def unscaled(unknowns: np.ndarray, multipliers: np.ndarray, scale: np.ndarray, lower: np.ndarray, upper: np.ndarray):
+    """Tensions (m,) N within their bounds, and how far below the lower one the programme would like each (m,) N, 0 where that bound is
+    not active; free of the solver's last bits.
 
-    solution: m scaled tensions first; multipliers: those of m rows, then of the box.
+    unknowns: m scaled tensions first; multipliers: those of m rows, then of the box.
     """
     m = len(scale)
     tension, unwanted = np.empty(m), np.empty(m)
     for i in range(m):
-        tension[i] = min(max(np.rint(solution[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
+        tension[i] = min(max(np.rint(unknowns[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
         # The Hessian's diagonal is one, so a multiplier is also the step that would undo it.
         unwanted[i] = np.rint(max(0.0, -multipliers[m + i]) * scale[i] / _QUANTUM) * _QUANTUM
     return tension, unwanted

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gravcomp.inverse.scaling import NO_BOUND, ScaledProgramme, unscaled
+from gravcomp.inverse.scaling import NO_BOUND, ScaledProgramme
 
 _ELASTIC_COST = 1e4
 _ACCURACY = 1e-7
@@ -24,11 +24,11 @@ class SolverFailed(RuntimeError):
 
 
 class Solution(NamedTuple):
-    """tension (m,) N; unwanted (m,) N: how far below its lower bound the programme would like a tension, 0 where the
-    bound is not active; solve_time s; iterations."""
+    """What the solver found, in its units: the programme's unknowns, the multipliers of its rows and then of its box; solve_time s;
+    iterations. `scaling.unscaled` makes tensions of it."""
 
-    tension: np.ndarray
-    unwanted: np.ndarray
+    unknowns: np.ndarray
+    multipliers: np.ndarray
     solve_time: float
     iterations: int
 
@@ -63,8 +63,7 @@ class ProgrammeSolver:
             if not found:
                 self.reset()
                 raise SolverFailed(f"the solver ended with {results.info.status.name}")
-        tension, unwanted = unscaled(results.x, results.z, programme.scale, programme.tension_lower, programme.tension_upper)
-        return Solution(tension, unwanted, time.perf_counter() - started, int(results.info.iter))
+        return Solution(results.x, results.z, time.perf_counter() - started, results.info.iter)
 
     def _solved(self, qp, most_iterations: int, hessian, gradient, rows, lower, upper, box_lower, box_upper):
         """The QP, made where it is None and else started from its last solution, and whether it has a solution."""
@@ -77,9 +76,9 @@ class ProgrammeSolver:
         else:
             qp.update(H=hessian, g=gradient, C=rows, l=lower, u=upper, l_box=box_lower, u_box=box_upper)
         qp.solve()
-        results = qp.results
-        x = results.x
-        return qp, results.info.status == self._proxqp.PROXQP_SOLVED and math.isfinite(x @ x)
+        info = qp.results.info
+        # The status alone says 'solved' of numbers that are not finite.
+        return qp, info.status == self._proxqp.PROXQP_SOLVED and math.isfinite(info.objValue)
 
 
 def _with_elastic_bounds(hessian, gradient, rows, lower, upper, box_lower, box_upper):

@@ -24,15 +24,16 @@ def judge(
     target: Target,
     points_missed: float,
     tilt: float,
-    met: np.ndarray,
+    met: np.ndarray | None,
     names: tuple[str, ...],
     options: InverseOptions,
 ) -> tuple[ControllerCode, str]:
     """Code and sentence for a step.
 
-    points_missed (m): largest predicted distance of a weighted point; met (3, m): of `limits.limits_met`; names (m,) of the cables.
+    points_missed (m): largest predicted distance of a weighted point; met (3, m): of `limits.limits_met`, None: no limit is; names (m,) of
+    the cables.
     """
-    moving, at_tension, at_travel = (_listed(names, which) for which in met) if met.any() else ("", "", "")
+    moving, at_tension, at_travel = (_listed(names, which) for which in met) if met is not None else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
     if moving and not held:
         return ControllerCode.AT_LIMIT, f"moving as fast as allowed: displacement rate of {moving}"
