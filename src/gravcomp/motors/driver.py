@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.link import CanLink, lateness
+from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import MOTOR_IDS, Hardware
 from gravcomp.motors.bridge import Bridge, CableSnapshot, State, ZeroRecord
 from gravcomp.motors.guard import GuardClient
@@ -144,6 +145,7 @@ class BridgeDriver:
             return self.bridge.snapshot()
 
     def _run(self) -> None:
+        take_precedence()
         now = time.monotonic()
         self._next_tick = self._next_state = self._next_beat = self._next_heater = now
         while not self._ending.is_set():

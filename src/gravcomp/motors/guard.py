@@ -30,6 +30,7 @@ import time
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink, lateness
+from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import CanInterface, Hardware
 from gravcomp.motors.bridge import RotorRecord, ZeroRecord
 from gravcomp.motors.encoder import Encoder
@@ -281,6 +282,7 @@ def main() -> int:
         guard = Guard(settings)
     except OSError:
         return 0  # another guard was faster
+    take_precedence()
     guard.run()
     return 0
 

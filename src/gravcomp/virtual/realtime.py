@@ -5,9 +5,7 @@ machine it catches up, not faster than a wire of 1 Mbit/s carries the frames; wh
 frames are lost then (counted in `lost_time`), but virtual time keeps to the clock, so that rates and stamps fit together.
 """
 
-import contextlib
 import copy
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -16,6 +14,7 @@ import numpy as np
 
 from gravcomp.canbus.codec import layout
 from gravcomp.canbus.link import CanLink
+from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import CanInterface
 from gravcomp.virtual.robot import Truth, VirtualRobot
 
@@ -23,7 +22,6 @@ _SHORTEST_PERIOD, _LONGEST_PERIOD = 0.002, 0.004  # s, between two looks at the 
 _FRAME_TIME = 0.11e-3  # s on a wire of 1 Mbit/s
 _BURST = 0.02  # s of frames at once after a pause; receivers' socket buffers hold about 30 ms
 _LONGEST_LAG = 0.1  # s
-_NICENESS = -10
 _STEER_PERIOD = 0.01  # s
 
 RECEIVED_FRAMES = ("MotorCommand1to4", "MotorCommand5to8", "HeaterCommand")
@@ -60,7 +58,9 @@ class RealtimeRobot:
     def start(self) -> None:
         """Open the bus and start. Raises BusError."""
         self.link.open()
-        _take_precedence()
+        # The thread that spins the node too: it holds the interpreter and the lock now and then, and while it waits for a processor the
+        # robot would wait for it.
+        take_precedence()
         self._stop.clear()
         self._thread = threading.Thread(target=self._run, name="virtual_robot", daemon=True)
         self._thread.start()
@@ -74,7 +74,7 @@ class RealtimeRobot:
         self.link.close()
 
     def _run(self) -> None:
-        _take_precedence()
+        take_precedence()
         try:
             self._loop()
         except Exception as error:  # the node reports it; a thread that dies silently would look like a dead bus
@@ -107,13 +107,3 @@ class RealtimeRobot:
                 wire_free = max(wire_free, time.monotonic() - _BURST) + len(sent) * _FRAME_TIME
             if truth is not None:
                 self._on_truth(truth)
-
-
-def _take_precedence() -> None:
-    """Hardware does not wait for other processes; where the user may not ask for it, the calling thread takes its turn.
-
-    Both threads of the node ask: the one that spins holds the interpreter and the robot's lock now and then, and while it waits for a
-    processor the robot would wait for it.
-    """
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
