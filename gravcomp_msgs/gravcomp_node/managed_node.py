@@ -1,5 +1,6 @@
 """A lifecycle node whose parameters are one frozen data class, and which starts by itself unless told otherwise."""
 
+import gc
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -92,6 +93,8 @@ class ManagedNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         result = self._attempt(self.configure)
         self._is_configured = result == TransitionCallbackReturn.SUCCESS
+        if self._is_configured:
+            _set_memory_aside()
         return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -156,3 +159,11 @@ class ManagedNode(LifecycleNode):
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+
+
+def _set_memory_aside() -> None:
+    """Spare what stays (modules, compiled code, models) the collector's rounds: the first full one, a few seconds into the work, would
+    hold the node up for 0.1 to 0.4 s."""
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
