@@ -4,6 +4,8 @@ The lumen lies fixed in the world. Its centreline runs straight for `inlet` alon
 `plane` (about z from x). The base is pushed along the inlet's axis; with the tip at the arc length d along the centreline the robot shall
 lie on the centreline from d - L to d, and behind the inlet's mouth on the straight line before it.
 
+Bent cables shorten the robot. Who pushes the base can make up for it, as far as the model knows: `Feed` is that push beyond the way asked for.
+
 There is no contact, neither in the model nor in the virtual robot: a negative clearance says by how much the robot would press into the wall.
 """
 
@@ -19,6 +21,7 @@ from gravcomp.virtual.motion import BaseMotion, StaticMotion, SyntheticMotion, T
 
 REST = 4.0  # s before the base is pushed
 _TARGET_STEPS = 0.1  # s between two targets
+_FEED_GAIN = 0.3  # of what the model is short by, made up for until the next target
 # The tip leads; the body has weights, too, so that it follows the centreline.
 _STATIONS, _WEIGHTS = (0.25, 0.5, 0.75), (0.3, 0.3, 0.3)
 
@@ -78,21 +81,37 @@ class Reach:
         """Arc length of the tip asked for at a time."""
         return self.first + (self.last - self.first) * _smooth(np.clip((np.asarray(time) - REST) / self.duration, 0.0, 1.0))
 
-    def motion(self, length: float, seed: int) -> BaseMotion:
+    def motion(self, length: float, seed: int, feed: "Feed") -> BaseMotion:
         """How the base moves, in world axes with the lumen's mouth as origin."""
         still = StaticMotion(self.orientation)
-        return _PushedMotion(self, length, TremorMotion(self.orientation, seed) if self.hand else still)
+        return _PushedMotion(self, length, TremorMotion(self.orientation, seed) if self.hand else still, feed)
+
+
+class Feed:
+    """How far the base is pushed beyond the way asked for, over time; in m."""
+
+    def __init__(self) -> None:
+        self._time, self._value = [0.0], [0.0]
+
+    def at(self, time: float) -> float:
+        """Linear between the moments given, and as the last one says after it."""
+        return float(np.interp(time, self._time, self._value))
+
+    def add(self, time: float, short: float) -> None:
+        """Until `time`, push on by a part of what the model is `short` by."""
+        self._time.append(time)
+        self._value.append(self._value[-1] + _FEED_GAIN * short)
 
 
 class _PushedMotion(SyntheticMotion):
     """A base that is pushed along the inlet while a hand moves it besides."""
 
-    def __init__(self, reach: Reach, length: float, hand: BaseMotion):
-        self._reach, self._length, self._hand = reach, length, hand
+    def __init__(self, reach: Reach, length: float, hand: BaseMotion, feed: Feed):
+        self._reach, self._length, self._hand, self._feed = reach, length, hand, feed
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         orientation, shift = self._hand.pose(time)
-        along = float(self._reach.depth(time)) - self._length
+        along = float(self._reach.depth(time)) - self._length + self._feed.at(time)
         return orientation, shift + self._reach.orientation[:, 2] * along
 
 
@@ -112,23 +131,31 @@ class Reached:
     lateral: np.ndarray  # (t,) its part across the direction asked for
 
 
-def run_reach(job: tuple[Setup, Reach, bool]) -> Reached:
-    """Reach through; `weightless`: without compensation."""
-    setup, reach, weightless = job
-    length = setup.robot.length
-    motion = reach.motion(length, setup.seed)
+WITHOUT, HELD, FED = "without", "with", "with, base fed"
+"""Ways to reach: without compensation; with; with, and the base pushed on by what the model is short by."""
+
+
+def run_reach(job: tuple[Setup, Reach, str]) -> Reached:
+    """Reach through in one of the three ways."""
+    setup, reach, way = job
+    feed = Feed()
+    motion = reach.motion(setup.robot.length, setup.seed, feed)
     loop = ClosedLoop(setup, motion)
     while loop.time < REST + reach.duration - 1e-9:
-        loop.hold(target_at(setup, reach, float(reach.depth(loop.time))), weightless=weightless)
+        target = target_at(setup, reach, float(reach.depth(loop.time)), feed.at(loop.time))
+        if way == FED:
+            feed.add(loop.time + _TARGET_STEPS, float((target.tip_position - loop.shape.tip_position) @ target.tip_direction))
+        loop.hold(target, weightless=way == WITHOUT)
         loop.run(_TARGET_STEPS)
-    return _judged(setup, reach, loop.trace.between(REST), motion)
+    return _judged(setup, reach, loop.trace.between(REST), motion, feed)
 
 
-def target_at(setup: Setup, reach: Reach, depth: float) -> Target:
-    """The shape on the centreline with the tip at the arc length `depth`, in soft_base of a base that is held as it should be."""
+def target_at(setup: Setup, reach: Reach, depth: float, feed: float = 0.0) -> Target:
+    """The shape on the centreline with the tip at the arc length `depth`, in soft_base of a base that is held as it should be and fed by
+    `feed` (m)."""
     length, lumen = setup.robot.length, reach.lumen
-    base = np.array([0.0, 0.0, depth - length])
-    points = lumen.point(depth - length + np.array([*_STATIONS, 1.0]) * length) - base
+    base = depth - length + feed
+    points = lumen.point(base + np.array([*_STATIONS, 1.0]) * (length - feed)) - np.array([0.0, 0.0, base])
     return Target(
         tip_position=points[-1],
         tip_direction=lumen.direction(np.array(depth)),
@@ -139,7 +166,7 @@ def target_at(setup: Setup, reach: Reach, depth: float) -> Target:
     )
 
 
-def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion) -> Reached:
+def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion, feed: Feed) -> Reached:
     lumen, robot = reach.lumen, setup.robot
     rows = slice(0, len(trace.time), 5)
     time, depth = trace.time[rows], reach.depth(trace.time[rows])
@@ -152,7 +179,7 @@ def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion) -> Rea
     room = 0.5 * (lumen.diameter - robot.segments[0].outer_diameter) - lumen.distance(body)
     # Only what has entered the mouth can touch the wall.
     clearance = np.where(body[:, :, 2] >= 0.0, room, np.inf).min(axis=1)
-    targets = [target_at(setup, reach, float(d)) for d in depth]
+    targets = [target_at(setup, reach, float(d), feed.at(float(t))) for d, t in zip(depth, time)]
     wanted, along = (np.array(column) for column in zip(*((t.tip_position, t.tip_direction) for t in targets)))
     errors = metrics.tip_errors(trace.tip_position[rows], trace.tip_direction[rows], wanted, along)
     return Reached(
