@@ -1,5 +1,6 @@
 """The node gives for a replayed recording what the offline estimator gives, bit for bit, with the stamps of the samples."""
 
+import gc
 import os
 
 import numpy as np
@@ -101,6 +102,15 @@ def test_the_replayed_recording_gives_what_the_offline_estimator_gives(graph, tm
     assert np.array_equal(q, expected.orientation)
     assert gravity[0].header.frame_id == "soft_base" and orientation[0].header.frame_id == "imu_link"
     assert orientation[-1].orientation_covariance[0] > 0.0
+
+
+def test_the_collector_has_little_to_look_through_once_a_node_is_configured(graph):
+    graph.open()
+    graph.start(ImuEstimator)
+    try:
+        assert gc.get_freeze_count() > 20 * len(gc.get_objects())
+    finally:
+        gc.unfreeze()
 
 
 def test_status_comes_to_late_joiners_and_reset_begins_anew(graph):
