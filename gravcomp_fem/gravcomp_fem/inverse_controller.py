@@ -146,7 +146,9 @@ class InverseController(ManagedNode):
             )
             return
         try:
-            self._target = make()
+            target = make()
+            target.check_reach(self.robot_file.robot.length)
+            self._target = target
         except TargetError as error:
             self._say(ControllerCode.REFUSED, f"target refused: {error}; the last one is kept")
 

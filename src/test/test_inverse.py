@@ -277,6 +277,23 @@ def test_unusable_target_is_refused_with_a_reason(arguments, said):
         Target(**arguments)
 
 
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (dict(tip_position=[0, 0, 100.0]), "tip_position is 100 m from the base"),  # millimetres
+        (dict(tip_position=[0, 0, 0.1], backbone_station=[0.5], backbone_position=[[0, 1, 0]], backbone_weight=[1]), "backbone_position 0 is 1 m"),
+    ],
+)
+def test_points_out_of_any_reach_are_refused(arguments, said):
+    with pytest.raises(TargetError, match=f"{said}.*up to 0.15 m"):
+        Target(**arguments).check_reach(0.1)
+
+
+def test_points_without_weight_or_hardly_out_of_reach_are_asked_for():
+    Target([0, 0, 9.0], tip_position_weight=0.0, tip_direction=[0, 0, 1], tip_direction_weight=1.0).check_reach(0.1)
+    Target([0, 0, 0.12]).check_reach(0.1)
+
+
 def test_codes_are_those_of_the_message():
     names = {code.name: code.value for code in ControllerCode}
     message = (arc_robot_root() / "gravcomp_msgs" / "msg" / "ControllerStatus.msg").read_text()

@@ -14,6 +14,7 @@ import numpy as np
 
 
 _NO_DIRECTION = np.zeros(3)
+_REACH = 1.5  # robot's lengths
 
 
 class TargetError(ValueError):
@@ -61,6 +62,18 @@ class Target:
             raise TargetError("tip_direction_weight is given without a tip_direction")
         if weights.max() == 0.0:
             raise TargetError("every weight is 0; at least one part of the shape has to be asked for")
+
+    def check_reach(self, length: float) -> None:
+        """Raises TargetError where a point with a weight is out of any reach of a robot of `length` (m): a mistake in its unit or frame,
+        after which the cables would bend the robot as far as they can."""
+        points = {"tip_position": self.tip_position} if self.tip_position_weight > 0.0 else {}
+        points |= {f"backbone_position {k}": p for k, p in enumerate(self.backbone_position) if self.backbone_weight[k] > 0.0}
+        for name, point in points.items():
+            distance = float(np.linalg.norm(point))
+            if distance > _REACH * length:
+                raise TargetError(
+                    f"{name} is {distance:.3g} m from the base; a robot of {length:g} m is asked for points up to {_REACH * length:g} m away"
+                )
 
     @property
     def direction_or_zeros(self) -> np.ndarray:
