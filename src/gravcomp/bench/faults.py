@@ -182,7 +182,8 @@ def run(progress: Callable[[str], None], *, kills: int = 20, frames: int = 1_000
             safe, unanswered, stuck = _faults(campaign, progress)
             recovery, kill_safe, late = _kills(campaign, kills, progress)
             hostile = _hostile(campaign, frames, progress)
-            recovers = campaign.make_active()
+            if not campaign.make_active():
+                stuck.append("hostile frames and messages")
             campaign.note_dead()
         finally:
             campaign.close()
@@ -208,7 +209,6 @@ def run(progress: Callable[[str], None], *, kills: int = 20, frames: int = 1_000
         "worst_safe_ms": max([*safe.values(), *kill_safe.values()], default=None),
         "not_safe": unanswered,
         "not_back": stuck,
-        "back_after_hostility": recovers,
     }
 
 

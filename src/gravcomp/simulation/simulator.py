@@ -29,7 +29,8 @@ class Simulator:
 
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
         """`reduced`: use the reduced model where one is built. Raises MeshError for a body that cannot be computed with."""
-        from gravcomp.reduction import ReducedServing, load
+        from gravcomp.reduction.serving import ReducedServing
+        from gravcomp.reduction.store import load
 
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
