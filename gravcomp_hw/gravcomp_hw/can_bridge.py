@@ -19,7 +19,6 @@ from std_srvs.srv import Trigger
 
 from gravcomp.canbus.bus import BusError
 from gravcomp.canbus.imu_stream import ImuSample
-from gravcomp.canbus.precedence import take_precedence
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
@@ -43,7 +42,6 @@ class CanBridge(ManagedNode):
 
     def configure(self) -> None:
         p = self.parameters
-        take_precedence()  # the driver's thread does, too; commands and samples shall not wait longer than it
         self._hardware = self._read_hardware()
         self._driver = BridgeDriver(
             self._hardware, DriverOptions(p.control_rate, p.state_rate, p.zero, p.require_imu, p.guard, p.trace)

@@ -27,7 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder")
     parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
     add_page_arguments(parser)
-    parser.add_argument("--screenshots", metavar="DIR", help="pictures of the page, sagging and compensated; Chromium draws them, which slows the loop, and without a graphics card takes half a minute each")
+    parser.add_argument(
+        "--screenshots",
+        metavar="DIR",
+        help="pictures of the page, sagging and compensated; Chromium draws them, which slows the loop, and without a graphics card takes half a"
+        " minute each",
+    )
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 

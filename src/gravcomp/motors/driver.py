@@ -75,6 +75,8 @@ class BridgeDriver:
     def open(self) -> None:
         """Open the bus and begin to receive; no motor is driven. Raises BusError."""
         self.link.open()
+        # The calling thread too, and what it starts later: commands and samples shall not wait longer than the control does.
+        take_precedence()
         sys.setswitchinterval(_SWITCH_INTERVAL)
         with self._lock:
             self.bridge.configure()
@@ -145,7 +147,6 @@ class BridgeDriver:
             return self.bridge.snapshot()
 
     def _run(self) -> None:
-        take_precedence()
         now = time.monotonic()
         self._next_tick = self._next_state = self._next_beat = self._next_heater = now
         while not self._ending.is_set():

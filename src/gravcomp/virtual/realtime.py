@@ -74,7 +74,6 @@ class RealtimeRobot:
         self.link.close()
 
     def _run(self) -> None:
-        take_precedence()
         try:
             self._loop()
         except Exception as error:  # the node reports it; a thread that dies silently would look like a dead bus
