@@ -120,6 +120,12 @@ def test_the_robot_is_drawn(browser):
         time.sleep(2.0)
 
 
+def test_every_curve_has_a_range(page):
+    """Also those that have one without values: this robot has no truth."""
+    ranges = page.evaluate("Object.values(window.__viserTestpoints.uplots).map(u => [u.chart.scales.y.min, u.chart.scales.y.max])")
+    assert len(ranges) == 4 and all(low is not None and high > low for low, high in ranges), ranges
+
+
 def test_a_control_bends_the_robot(page, robot):
     end = time.monotonic() + PATIENCE
     slider = page.locator("text=bend °").locator("xpath=ancestor::*[.//input][1]").locator("input").last

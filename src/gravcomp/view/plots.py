@@ -10,6 +10,7 @@ from viser import uplot
 
 from gravcomp.view import colours
 from gravcomp.view.history import History
+from gravcomp.view.options import PageOptions
 from gravcomp.view.snapshot import Snapshot
 
 STAGES = ("model", "command", "motors")
@@ -23,29 +24,51 @@ class _Plot:
     labels: tuple[str, ...]
     strokes: tuple[str, ...]
     values: Callable[[Snapshot], list[float]]
-    reach: float | None = None  # y from -reach to reach; None: as the data asks for
+    reach: float | None = None  # y from -reach to reach; None: from 0 to what the data asks for
+    least: float = 1.0  # then at least so far
 
 
 class Plots:
-    """Four plots over the last `window` s, in the current GUI container."""
+    """Four plots of `options.window` s each, in the current GUI container."""
 
-    def __init__(self, server: viser.ViserServer, cables: tuple[str, ...], window: float, rate: float, dark: bool):
-        self._plots = _layout(cables)
-        self._history = History(sum(len(p.labels) for p in self._plots), window, rate)
-        self._handles = [_add(server, plot, window, dark) for plot in self._plots]
+    def __init__(self, server: viser.ViserServer, cables: tuple[str, ...], options: PageOptions):
+        self._plots, self._window = _layout(cables), options.window
+        self._history = History(sum(len(p.labels) for p in self._plots), options.window + options.look_back, options.rate)
+        self._tops = [plot.least for plot in self._plots]
+        self._handles = [_add(server, plot, options.window, options.dark) for plot in self._plots]
 
     def add(self, snapshot: Snapshot) -> None:
         """Remember what is plotted of a snapshot."""
         self._history.add(snapshot.time, np.concatenate([plot.values(snapshot) for plot in self._plots]))
 
-    def draw(self) -> None:
-        """Send the curves to the browser."""
-        time, *columns = self._history.columns()
+    def draw(self, until: float = math.inf) -> None:
+        """Send the curves that end at the time `until` (s, of the snapshots) to the browser."""
+        time, *columns = self._history.columns(self._window, until)
         if not len(time):
             return
-        for plot, handle in zip(self._plots, self._handles):
+        for i, (plot, handle) in enumerate(zip(self._plots, self._handles)):
             own, columns = columns[: len(plot.labels)], columns[len(plot.labels) :]
+            # The browser's own range is lost with the first value that is not known, and a robot without truth has a curve of such.
+            top = top_of(np.concatenate(own), self._tops[i], plot.least)
+            if plot.reach is None and top != self._tops[i]:
+                self._tops[i] = top
+                handle.scales = _scales(self._window, (0.0, top))
             handle.data = (time, *own)
+
+
+def top_of(values: np.ndarray, top: float, least: float) -> float:
+    """Where an axis from 0 ends: `top` as long as the values (never negative, NaN: unknown) fill a fair part of it, else the next of 1, 2, 5, 10...
+    that leaves a little room, at least `least`."""
+    largest = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
+    if max(0.3 * top, least) <= largest <= top or (largest <= top == least):
+        return top
+    wanted = max(1.1 * largest, least)
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return max(least, next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= wanted * (1 - 1e-9)))
+
+
+def _scales(window: float, y: tuple[float, float]) -> dict:
+    return {"x": {"time": False, "range": (-window, 0.0)}, "y": {"range": y}}
 
 
 def _layout(cables: tuple[str, ...]) -> list[_Plot]:
@@ -64,9 +87,9 @@ def _layout(cables: tuple[str, ...]) -> list[_Plot]:
     strokes = tuple(_CABLES[i % len(_CABLES)] for i in range(len(cables)))
     return [
         _Plot("tip error, mm", ("model", "truth"), (colours.css(colours.BRAND), colours.css(colours.TRUTH)), errors),
-        _Plot("cable tension, N", cables, strokes, tensions),
+        _Plot("cable tension, N", cables, strokes, tensions, least=0.2),
         _Plot("gravity in soft_base, m/s²", ("x", "y", "z"), _AXES, gravity, 11.0),
-        _Plot("delay since the IMU sample, ms", STAGES, _AXES[::-1], delays),
+        _Plot("delay since the IMU sample, ms", STAGES, _AXES[::-1], delays, least=5.0),
     ]
 
 
@@ -75,9 +98,7 @@ def _add(server: viser.ViserServer, plot: _Plot, window: float, dark: bool) -> v
     axis = {"stroke": ink, "grid": {"stroke": line, "width": 1}, "ticks": {"stroke": line, "width": 1}, "font": "11px sans-serif"}
     series = [{"label": "s"}]
     series += [{"label": label, "stroke": stroke, "width": 1.6, "points": {"show": False}} for label, stroke in zip(plot.labels, plot.strokes)]
-    scales = {"x": {"time": False, "range": (-window, 0.0)}}
-    if plot.reach is not None:
-        scales["y"] = {"range": (-plot.reach, plot.reach)}
+    scales = _scales(window, (0.0, plot.least) if plot.reach is None else (-plot.reach, plot.reach))
     chips = "".join(_chip(label, stroke) for label, stroke in zip(plot.labels, plot.strokes))
     server.gui.add_html(f'<div style="padding:.5em .7em 0;font-size:.82em"><b>{plot.title}</b><br>{chips}</div>')
     return server.gui.add_uplot(
