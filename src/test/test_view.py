@@ -13,6 +13,7 @@ from gravcomp.view.backbone import Backbone, arc_backbone, straight_backbone
 from gravcomp.view.colours import tension_colour
 from gravcomp.view.history import History
 from gravcomp.view.page import free_port
+from gravcomp.view.plots import top_of
 from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
 from gravcomp.view.scene import SCALE
 from gravcomp.view.skin import cable_skin, joined, lumen_skin, wall_skins
@@ -130,19 +131,31 @@ def test_quaternions_give_the_rotation_back():
 
 
 def test_the_plots_remember_their_window_and_no_more():
-    history = History(1, window=2.0, rate=20.0)
+    history = History(1, span=4.0, rate=20.0)
     for i in range(1000):
         history.add(i * 0.05, np.array([float(i)]))
-    time, value = history.columns()
+    time, value = history.columns(2.0)
     assert time[-1] == 0.0 and time[0] == pytest.approx(-2.0) and len(time) == 41
     assert value[-1] == 999.0 and value[0] == 959.0
+    earlier, value = history.columns(2.0, until=998 * 0.05 - 1.001)
+    np.testing.assert_allclose(earlier, time)
+    assert value[-1] == 977.0
+    assert not len(history.columns(2.0, until=0.0)[0])  # longer ago than is kept
+
+
+def test_an_axis_ends_above_what_is_known_and_stays_while_it_fits():
+    assert top_of(np.array([np.nan, 1.7, 0.2]), 1.0, 1.0) == 2.0
+    assert top_of(np.array([29.9, np.nan]), 2.0, 1.0) == 50.0
+    assert top_of(np.array([16.0]), 50.0, 1.0) == 50.0 and top_of(np.array([14.0]), 50.0, 1.0) == 20.0
+    assert top_of(np.full(3, np.nan), 50.0, 1.0) == 1.0 and top_of(np.zeros(3), 1.0, 1.0) == 1.0
+    assert top_of(np.array([0.03]), 0.2, 0.2) == 0.2 and top_of(np.array([0.19]), 0.5, 0.2) == 0.5
 
 
 def test_a_time_that_goes_back_begins_the_plots_anew():
-    history = History(1, window=2.0, rate=20.0)
+    history = History(1, span=2.0, rate=20.0)
     for t in (10.0, 11.0, 5.0):
         history.add(t, np.array([t]))
-    assert history.columns()[1].tolist() == [5.0]
+    assert history.columns(2.0)[1].tolist() == [5.0]
 
 
 def test_errors_are_distances_to_the_target(robot):
@@ -258,6 +271,33 @@ def test_every_fault_that_is_offered_is_one_of_the_virtual_robot(clicks, robot):
         assert fault.duration == 2.0
         assert fault.cable == (robot.cable_names[4] if "the cable" in option else "")
     assert clicks.set(clicks.handle("Clear all")) == [InjectFault("clear")]
+
+
+def test_looking_back_holds_what_was_while_the_robot_goes_on(clicks, robot):
+    shown = lambda: clicks.page._status.content  # noqa: E731
+    angle = lambda i: math.radians(0.1 * i)  # noqa: E731
+
+    def frame(i):
+        bent = arc_backbone(robot.length, angle(i), 0.0)
+        clicks.page.show(Snapshot(time=0.05 * i, status=f"frame {i}", backbone=bent, tension=np.zeros(6), displacement=np.zeros(6)))
+
+    for i in range(200):  # 10 s
+        frame(i)
+    clicks.set(clicks.handle("look back s"), 4.0)
+    for i in range(200, 260):
+        frame(i)
+        # 4 s before the frame at which the page was held, however long ago that is.
+        assert "frame 120" in shown() and "4.0 s ago" in shown()
+    tip = SCALE * arc_backbone(robot.length, angle(120), 0.0).tip
+    wall = np.concatenate([handle.vertices for handle in clicks.scene._body])
+    assert np.linalg.norm(wall - tip, axis=1).min() < SCALE * 0.0045
+    clicks.set(clicks.handle("look back s"), 1.0)
+    frame(260)
+    assert "frame 180" in shown()
+    clicks.set(clicks.handle("look back s"), 0.0)
+    for i in range(261, 290):
+        frame(i)
+    assert "frame 2" in shown() and "ago" not in shown()
 
 
 def test_light_graphics_leave_out_what_a_processor_draws_slowly(clicks):

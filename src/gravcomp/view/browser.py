@@ -44,10 +44,12 @@ class Browser:
             self.page.set_default_timeout(self._timeout)
             self.foreign: list[str] = []
             """Addresses outside the page's own that were asked for."""
-            own = (address, "data:", "blob:")
+            own = (address.partition("?")[0], "data:", "blob:")
             self.page.on("request", lambda request: None if request.url.startswith(own) else self.foreign.append(request.url))
             self.page.goto(address, wait_until="commit")
             self.page.wait_for_function(_IS_DRAWN, polling=500)
+            # Words about the browser itself, such as that a processor draws.
+            self.page.add_style_tag(content=".mantine-Notifications-root { display: none }")
         except Error as error:
             self._playwright.stop()
             raise BrowserError(f"the page at {address} could not be shown: {error.message.splitlines()[0]}") from error
@@ -58,6 +60,24 @@ class Browser:
     def __exit__(self, *_) -> None:
         self._chromium.close()
         self._playwright.stop()
+
+    def set_slider(self, label: str, value: float) -> None:
+        """Give the page's slider of that label a value, as by hand."""
+        slider = self.page.locator(f"text={label}").locator("xpath=ancestor::*[.//input][1]").locator("input").last
+        slider.fill(f"{value:g}")
+
+    def look_back(self, time: float) -> None:
+        """Turn the page to what it showed at `time` (s, monotonic). Raises BrowserError when it does not turn so far."""
+        from playwright.sync_api import Error
+
+        try:
+            self.set_slider("look back s", 0.1)
+            self.page.wait_for_function("document.querySelector('[data-held-at]')?.dataset.heldAt", polling=200)
+            held_at = float(self.page.locator("[data-held-at]").get_attribute("data-held-at"))
+            self.set_slider("look back s", round(held_at - time, 1))
+            self.page.wait_for_function(f"Math.abs(document.querySelector('[data-time]').dataset.time - {time}) < 0.2", polling=200)
+        except Error as error:
+            raise BrowserError(f"the page cannot be turned back: {error.message.splitlines()[0]}") from error
 
     def picture(self) -> bytes:
         """What is to be seen now, as PNG."""

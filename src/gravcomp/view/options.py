@@ -27,6 +27,8 @@ class PageOptions:
     port: int = parameter(8080, minimum=1, maximum=65535, read_only=True, description="port; the next free one when it is taken")
     rate: float = parameter(20.0, unit="Hz", minimum=1.0, maximum=60.0, read_only=True, description="of the page")
     window: float = parameter(20.0, unit="s", minimum=2.0, maximum=600.0, read_only=True, description="of the plots")
+    look_back: float = parameter(
+        120.0, unit="s", minimum=1.0, maximum=3600.0, read_only=True, description="how far back the page can be turned")
     graphics: str = parameter(
         "full", choices=GRAPHICS, read_only=True,
         description="at the start; light: without reflections and shadows, for machines whose processor draws")  # fmt: skip

@@ -14,6 +14,7 @@ from gravcomp.view.requests import Request
 from gravcomp.view.scene import Scene
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.status import cables_html, legend_html, status_html
+from gravcomp.view.timeline import Timeline
 
 PORTS_TRIED = 50
 _PANEL_WIDTH = 320  # px
@@ -29,6 +30,7 @@ class Page:
         self.address = f"http://{shown}:{self._server.get_port()}"
         self._names = robot.cable_names
         self._frame, self._idle_frames = 0, max(1, round(options.rate))
+        self._shown: Snapshot | None = None  # while the page is held
         gui = self._server.gui
         gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
         self._scene = Scene(self._server, robot, options)
@@ -41,7 +43,8 @@ class Page:
         self._legend = gui.add_html(legend_html(False))
         panel = gui.add_panel()
         with panel.add_tab(f"The last {options.window:g} s"):
-            self._plots = Plots(self._server, self._names, options.window, options.rate, options.dark)
+            self._timeline = Timeline(gui, options.look_back, options.rate)
+            self._plots = Plots(self._server, self._names, options)
         panel.dock_left()
         panel.set_width(_PANEL_WIDTH)
 
@@ -53,10 +56,16 @@ class Page:
     def show(self, snapshot: Snapshot) -> None:
         """Draw a snapshot: the scene at each call, curves at every second, words and figures at every fourth.
 
-        While nobody looks, once a second: a browser that comes finds the page as it is.
+        While nobody looks, once a second: a browser that comes finds the page as it is. While somebody looks back, the page stands.
         """
         self._plots.add(snapshot)
+        self._timeline.add(snapshot)
         self._frame += 1
+        held = self._timeline.held
+        if held is not None:
+            self._hold(*held)
+            return
+        self._shown = None
         alone = not self.clients
         if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
             return
@@ -65,11 +74,25 @@ class Page:
         if alone or self._frame % 2 == 0:
             self._plots.draw()
         if alone or self._frame % 4 == 0:
-            self._status.content = status_html(snapshot)
-            self._cables.content = cables_html(snapshot, self._names)
-            self._legend.content = legend_html(snapshot.truth is not None)
+            self._tell(snapshot, None)
             self._controls.show_virtual(snapshot.virtual)
             self._controls.show_recording(bool(snapshot.recording))
+
+    def _hold(self, snapshot: Snapshot, held_at: float) -> None:
+        """Show what was, once."""
+        if snapshot is self._shown:
+            return
+        self._shown = snapshot
+        with self._server.atomic():
+            self._scene.show(snapshot)
+        self._plots.draw(snapshot.time)
+        self._tell(snapshot, held_at)
+
+    def _tell(self, snapshot: Snapshot, held_at: float | None) -> None:
+        """Words and figures."""
+        self._status.content = status_html(snapshot, held_at)
+        self._cables.content = cables_html(snapshot, self._names)
+        self._legend.content = legend_html(snapshot.truth is not None)
 
     def requests(self) -> list[Request]:
         """What people asked for since the last call."""

@@ -11,8 +11,8 @@ _FIGURE = '<div style="flex:1"><div style="font-size:1.35em;font-weight:650;font
     '<div style="font-size:.74em;opacity:.68">{}</div></div>'  # fmt: skip
 
 
-def status_html(snapshot: Snapshot) -> str:
-    """What the controller says, the errors, and how the graph runs."""
+def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
+    """What the controller says, the errors, and how the graph runs; `held_at`: the time (s) from which one looks back, None when live."""
     dot = _DOTS.get(snapshot.status_level, _DOTS["off"])
     sentence = html.escape(snapshot.status or "waiting for the graph")
     figures = [
@@ -27,8 +27,11 @@ def status_html(snapshot: Snapshot) -> str:
     recording = ""
     if snapshot.recording:
         recording = f'<div style="margin-top:.4em;font-size:.8em;color:#ef4444">● recording {html.escape(snapshot.recording)}</div>'
+    if held_at is not None:
+        recording = f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">looking back: {held_at - snapshot.time:.1f} s ago</div>'
     return (
-        f'<div style="padding:.55em .9em .3em"><div style="display:flex;gap:.55em;align-items:baseline">'
+        f'<div data-time="{snapshot.time:.3f}" data-held-at="{"" if held_at is None else f"{held_at:.3f}"}" '
+        f'style="padding:.55em .9em .3em"><div style="display:flex;gap:.55em;align-items:baseline">'
         f'<span style="flex:none;width:.68em;height:.68em;border-radius:50%;background:{dot};align-self:center"></span>'
         f'<span data-gravcomp="status" style="font-size:.88em">{sentence}</span></div>'
         f'<div style="display:flex;gap:.8em;margin-top:.5em">{_row(figures)}</div>'
