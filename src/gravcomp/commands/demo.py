@@ -1,7 +1,6 @@
 """`gravcomp demo`: the main job on a virtual robot: it sags, is compensated, and is tilted; ends with the figures."""
 
 import argparse
-import contextlib
 import json
 import sys
 import tempfile
@@ -16,6 +15,8 @@ _SHORTEST = 10.0
 _TURNING = 0.2  # rad/s
 # Numba compiles once for each machine; the first start waits for it.
 _START_TIMEOUT = 300.0
+_LONGEST_LOOKED_BACK = 3000.0  # s
+_BROWSER_TIME = 200.0  # s from the play's end until a browser shows the page, at worst
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--screenshots",
         metavar="DIR",
-        help="pictures of the page, sagging and compensated; Chromium draws them, which slows the loop, and without a graphics card takes half a"
-        " minute each",
+        help="pictures of the page, sagging, compensated and tilted, by Chromium after the play",
     )
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
@@ -50,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
     if args.screenshots and args.headless:
         raise ConfigError("--screenshots shows the page, which --headless leaves out: give one of them")
+    if args.screenshots and args.duration > _LONGEST_LOOKED_BACK:
+        raise ConfigError(f"--screenshots looks back over the play: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s")
     prepare(args.robot, virtual=True)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
@@ -60,6 +62,11 @@ def run(args: argparse.Namespace) -> int:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
         motion |= {"motion": "tilt", "hold": compensate_until}
+    pictures = None
+    if args.screenshots:
+        compensated = relax_time + 0.9 * (compensate_until - relax_time)
+        moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
+        pictures = PagePictures(Path(args.screenshots), moments)
     graph = RobotGraph(args.robot, "udp_multicast", private_channel(), parameters={"virtual_robot": motion})
     nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
@@ -70,26 +77,27 @@ def run(args: argparse.Namespace) -> int:
         )  # fmt: skip
         specs = [*graph.loop(), judge]
         if not args.headless:
-            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+            kept = {"look_back": args.duration + _BROWSER_TIME} if args.screenshots else {}
+            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port, **kept))
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
-        with Graph(specs, logs, domain) as processes, contextlib.ExitStack() as open_windows:
+        with Graph(specs, logs, domain) as processes:
             processes.start()
-            pictures = None
             print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
             if not args.headless:
                 address = show_page(processes, args.no_open)
-            if args.screenshots:
-                pictures = open_windows.enter_context(PagePictures(address, Path(args.screenshots), relax_time, compensate_until))
             ready = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller"]
             processes.wait(lambda: _all_active(_read(result_file), ready), _START_TIMEOUT, "the nodes' start")
             # Last, because its motion begins with its activation.
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
             state = _follow(processes, result_file, args, pictures)
+            problem = pictures.take(address) if pictures else ""
             figures = {**state["figures"], "nodes": state["nodes"], "source": args.imu and Path(args.imu).name or "scenario: sag, compensate, tilt"}
     _print_summary(figures)
     if args.json:
         print(json.dumps(figures), flush=True)
+    if problem:
+        raise ConfigError(problem)
     return 0
 
 
@@ -123,7 +131,7 @@ def _all_active(state: dict, names: list[str]) -> bool:
 
 
 def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=None) -> dict:
-    """Show the run until the judge is done, and take the page's `pictures`; returns its last state. Raises NodeDied."""
+    """Show the run until the judge is done, with the moments of the page's `pictures`; returns its last state. Raises NodeDied."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -149,7 +157,7 @@ def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=Non
                 phase = state["phase"]
                 console.print(f"{state['elapsed']:5.1f} s  {phase}", highlight=False)
             if pictures:
-                pictures.take(state.get("elapsed", 0.0))
+                pictures.follow(state.get("elapsed", 0.0), time.monotonic())
             error = state.get("tip_error_mm")
             note = "" if error is None else f"tip error {error:5.1f} mm"
             progress.update(task, description=phase, completed=state.get("elapsed", 0.0), note=note)

@@ -1,36 +1,42 @@
-"""The pictures that `demo --screenshots` takes of the live page: once while the robot sags, once while it is compensated."""
+"""The pictures that `demo --screenshots` takes of the live page once the play is over: the page is turned back to each moment.
+
+So the browser, which takes a processor for itself where there is no graphics card, neither disturbs the play nor is too late for it.
+"""
 
 import sys
 from pathlib import Path
 
 from gravcomp.config import ConfigError
-from gravcomp.view.browser import Browser, BrowserError
+from gravcomp.view.browser import Browser, BrowserError, find_chromium
 
 
 class PagePictures:
-    """Looks at the page; `take` writes sagging.png and compensated.png into `folder` when their times (s) have come.
+    """`moments`: when (s into the play) to take the picture of which name. Raises ConfigError when there is no browser or no folder."""
 
-    Raises ConfigError when the folder cannot be made or there is no browser.
-    """
-
-    def __init__(self, address: str, folder: Path, sagging_until: float, compensated_until: float):
-        # Late in each phase, when the robot has come to rest; a picture takes a second or two.
-        self._due = [(0.6 * sagging_until, folder / "sagging.png"), (sagging_until + 0.7 * (compensated_until - sagging_until), folder / "compensated.png")]
+    def __init__(self, folder: Path, moments: dict[str, float]):
+        self._folder, self._due, self._times = folder, dict(moments), {}
+        if find_chromium() is None:
+            raise ConfigError("--screenshots: no Chromium on this machine: apt-get install chromium")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._browser = Browser(address)
-        except (OSError, BrowserError) as error:
-            raise ConfigError(f"--screenshots {folder}: {error}") from error
+        except OSError as error:
+            raise ConfigError(f"--screenshots {folder}: cannot be made: {error.strerror}") from error
 
-    def __enter__(self) -> "PagePictures":
-        return self
+    def follow(self, elapsed: float, now: float) -> None:
+        """Note when a moment has come: `elapsed` (s) into the play at the time `now` (s, monotonic)."""
+        for name, moment in self._due.items():
+            if name not in self._times and elapsed >= moment:
+                self._times[name] = now
 
-    def __exit__(self, *details) -> None:
-        self._browser.__exit__(*details)
-
-    def take(self, elapsed: float) -> None:
-        """Write each picture whose time has come, `elapsed` (s) after the run's begin."""
-        while self._due and elapsed >= self._due[0][0]:
-            _, path = self._due.pop(0)
-            self._browser.save(path)
-            print(f"Picture of the page: {path}", file=sys.stderr, flush=True)
+    def take(self, address: str) -> str:
+        """Write NAME.png of each moment that has come; returns why not all could be, or nothing."""
+        try:
+            with Browser(f"{address}?fixedDpr=1") as browser:
+                for name, time in self._times.items():
+                    browser.look_back(time)
+                    path = self._folder / f"{name}.png"
+                    browser.save(path)
+                    print(f"Picture of the page: {path}", file=sys.stderr, flush=True)
+        except (BrowserError, OSError) as error:
+            return f"--screenshots: {error}"
+        return ""
