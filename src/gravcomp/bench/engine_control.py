@@ -19,7 +19,7 @@ _DIRECTIONS, _SETTLING = 200, 80
 _DIRECTION_WEIGHT = 1e-3
 
 
-def reduced_model(progress: Progress) -> dict:
+def reduced_model(progress: Progress, every: int = 1) -> dict:
     """`reduction_build_s` (0: was built before); `reduced_step_ms`: one closed-loop step, model and inverse problem,
     and `inverse_us`: the inverse problem alone, both while gravity turns at random at 10 deg/s; `reduced_error_mm`:
     worst tip distance from the full model under the same commands at 10 and 90 deg/s; `reduced_share`: of the steps
@@ -30,7 +30,7 @@ def reduced_model(progress: Progress) -> dict:
     target = straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
     steps, solves, served, errors = [], [], [], {}
     for rate in (10, 90):
-        for seed in range(3):
+        for seed in range(0, 3, every):
             progress(f"reduced model at {rate} deg/s, path {seed + 1} of 3")
             gravities = random_path(np.radians(rate), 400, seed)
             loop = list(closed_loop(Simulator(model), gravities, target))
@@ -57,7 +57,7 @@ def reduced_motion(model: RobotModel, progress: Progress) -> ReducedDynamicSolve
     return ReducedDynamicSolver(reduced, mass, model.mesh.materials[0].damping_time, model.length)
 
 
-def compensation(progress: Progress) -> dict:
+def compensation(progress: Progress, every: int = 1) -> dict:
     """What the full model says of the displacements found, over random directions of gravity: `inverse_lateral_mm`
     (position alone is kept), and with a weight on the tip's direction `inverse_tilt_deg` and
     `inverse_lateral_with_direction_mm`; `inverse_shortening_mm`: the axial error left; `inverse_least_tension_n`:
@@ -65,7 +65,7 @@ def compensation(progress: Progress) -> dict:
     robot = load_robot_file("article").robot
     simulator, full = Simulator(robot), Simulator(robot, reduced=False)
     lateral, lateral_tilted, tilt, shortening, least = [], [], [], [], []
-    for number, gravity in enumerate(_directions(_DIRECTIONS)):
+    for number, gravity in list(enumerate(_directions(_DIRECTIONS)))[::every]:
         progress(f"compensation, direction {number + 1} of {_DIRECTIONS}")
         for weight in (0.0, _DIRECTION_WEIGHT):
             target = straight_target(robot.length, tip_direction_weight=weight)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gravcomp.bench.imu_ablation import ablation, board_samples
+from gravcomp.bench.imu_ablation import DURATION, ablation, board_samples
 from gravcomp.bench.orientation_peers import run_peers
 from gravcomp.orientation import EstimatorOptions, FilterOptions, GravityEstimator, estimate_recording
 from gravcomp.orientation.inclination import inclination_rmse
@@ -29,10 +29,10 @@ HORIZON = 0.02  # s
 CHUNK = 500  # samples
 
 
-def run(progress: Callable[[str], None]) -> dict:
-    """All figures of the estimator; see the keys' units in their names."""
+def run(progress: Callable[[str], None], *, every: int = 1) -> dict:
+    """All figures of the estimator, on every `every`-th of the trials and of the minutes; see the keys' units in their names."""
     figures: dict = {}
-    files = broad_files()
+    files = broad_files()[::every]
     if files:
         full = {f.stem: read_recording(f) for f in files}
         figures |= _on_broad({name: r.averaged(3) for name, r in full.items()}, full, progress)
@@ -43,7 +43,7 @@ def run(progress: Callable[[str], None]) -> dict:
     figures["us_per_sample"] = _cost()
     progress("temperature control from 20 degC")
     figures["thermal"] = _thermal()
-    figures["ablation"] = ablation(progress)
+    figures["ablation"] = ablation(progress, duration=DURATION / every)
     return figures
 
 

@@ -6,6 +6,8 @@ import json
 import sys
 from pathlib import Path
 
+from gravcomp.config import ConfigError
+
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "estimator": "orientation on recorded data with optical truth, temperature control",
@@ -25,6 +27,15 @@ OPTIONS = {
 }
 """Keyword arguments of a benchmark's `run` that can be set: default and meaning."""
 
+BRIEF = {
+    "engine": {"every": 10},
+    "estimator": {"every": 5},
+    "graph": {"listen": 4.0, "cost": 4.0},
+    "faults": {"kills": 1, "frames": 10_000, "every": 6},
+    "soak": {"minutes": 0.2},
+}
+"""The same under --brief."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments: those of each benchmark below its name."""
@@ -34,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         own = choices.add_parser(name, help=summary, description=summary)
         own.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
         own.add_argument("--write", metavar="DOCUMENT", help="renew the table of figures in a Markdown document, between its marks")
+        own.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
         for option, (default, meaning) in OPTIONS.get(name, {}).items():
             own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
 
@@ -46,10 +58,12 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.experiments import figures_table
 
     command = f"bench {args.benchmark}"
+    if args.write and args.brief:
+        raise ConfigError("--write puts the figures of whole benchmarks into a document; --brief shortens them: give one of both")
     if args.write:
         figures_table.check_place(Path(args.write), command)
     module = importlib.import_module(f"gravcomp.bench.{args.benchmark}")
-    options = {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
+    options = BRIEF[args.benchmark] if args.brief else {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
     console = Console(stderr=True)
     with console.status(command) as status:
         measured = module.run(lambda what: status.update(f"{command}: {what}"), **options)
