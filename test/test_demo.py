@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from documents import documented
+from gravcomp.view.browser import find_chromium
+
 LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]
 
 
@@ -35,7 +38,7 @@ def check_compensation(figures: dict) -> None:
 
 def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     mark = f"GRAVCOMP_TEST={os.getpid()}-scenario"
-    answer = gravcomp("demo", "--headless", "--duration", "25", "--json", GRAVCOMP_TEST=mark.split("=")[1])
+    answer = gravcomp(*documented("./gravcomp demo --headless --duration 30 --json")[1:], GRAVCOMP_TEST=mark.split("=")[1])
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
     # Truth and model sag, straighten and turn alike.
@@ -45,18 +48,38 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
 
 def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
-    answer = gravcomp("demo", "--headless", "--duration", "30", "--imu", str(trial[0]), "--json")
+    answer = gravcomp(*documented("./gravcomp demo --imu FILE", FILE=trial[0])[1:], "--json")
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
     assert answer.json["source"] == trial[0].name
     assert answer.json["tip_error_without_mm"] > 2.0 * answer.json["tip_error_with_mm"]
 
 
+@pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine: apt-get install chromium")
+@pytest.mark.timeout(600)
+def test_pictures_of_the_page_show_each_moment(gravcomp, tmp_path):
+    import numpy as np
+    from PIL import Image
+
+    line = documented("./gravcomp demo --screenshots src/doc/pictures")[1:]
+    answer = gravcomp(*[str(tmp_path) if word == "src/doc/pictures" else word for word in line], "--duration", "12", timeout=580)
+    assert answer.code == 0, answer.err
+    middle = {}
+    for name in ("sagging", "compensated", "tilted"):
+        picture = np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")).astype(int)
+        middle[name] = picture[:, 420:-420]
+        # Thousands of colours beside the panels: shaded surfaces, not an empty canvas.
+        assert len(np.unique(middle[name].reshape(-1, 3), axis=0)) > 2000
+    # The robot is somewhere else in each.
+    for a, b in (("sagging", "compensated"), ("compensated", "tilted")):
+        assert (np.abs(middle[a] - middle[b]).max(axis=2) > 40).mean() > 0.003
+
+
 @pytest.mark.parametrize("delay", [0.3, 2.5, 9.0])
 def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, delay, monkeypatch):
     mark = f"{os.getpid()}-ctrl-c-{delay}"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
-    process = gravcomp_process("demo", "--headless", "--duration", "60")
+    process = gravcomp_process(*documented("./gravcomp demo")[1:])
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     process.wait(timeout=20.0)

@@ -1,7 +1,4 @@
-"""What the documents say exists: commands with their options, links, topics, services, parameters, modules.
-
-Command lines that are cheap are run as they stand.
-"""
+"""What the documents say exists: commands with their options, links, topics, services, parameters, modules."""
 
 import argparse
 import ast
@@ -9,22 +6,16 @@ import importlib
 import importlib.util
 import re
 import shlex
-from pathlib import Path
 
 import pytest
 
+from documents import COMMAND_LINES, NAMES, PACKAGES, ROOT, code_of, inline_of
 from gravcomp.commands import COMMANDS
 from gravcomp.config import load_yaml
 from gravcomp.config.parameters import declared_parameters
 from gravcomp.description import shipped_robots
 from gravcomp.description.hardware import Hardware
 from gravcomp.graph.nodes import NODES, node
-
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("gravcomp_hw", "gravcomp_estimation", "gravcomp_fem", "gravcomp_msgs")
-FOLDERS = ("src", *PACKAGES)
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.md"))])
-NAMES = [str(path.relative_to(ROOT)) for path in DOCUMENTS]
 
 # What stands for a value that the reader puts in.
 PLACEHOLDERS = {"COMMAND": "demo", "S": "10", "N": "1"}
@@ -44,31 +35,6 @@ class StrictParser(argparse.ArgumentParser):
         raise ValueError(message)
 
 
-def code_of(path: Path) -> list[str]:
-    """Code lines, without comments, and inline code of a document."""
-    text = path.read_text()
-    lines = re.findall(r"^ {4}(\S.*)$", text, re.MULTILINE)
-    lines += [line for block in re.findall(r"```(?:bash|sh)?\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
-    return [re.sub(r"\s+# .*", "", line).strip() for line in lines] + inline_of(text)
-
-
-def inline_of(text: str) -> list[str]:
-    """What stands between single backticks."""
-    return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
-
-
-def commands_of(path: Path) -> list[list[str]]:
-    """Every `./gravcomp ...` line with words, one for each alternative a|b."""
-    found = []
-    for line in code_of(path):
-        if not line.startswith("./gravcomp "):
-            continue
-        words = shlex.split(line.replace("\\|", "|"))[1:]
-        choices = next((w for w in words if re.fullmatch(r"\w+(\|\w+)+", w)), None)
-        found += [[c if w == choices else w for w in words] for c in choices.split("|")] if choices else [words]
-    return found
-
-
 def parser_of(command: str) -> StrictParser:
     parser = StrictParser(prog=f"./gravcomp {command}")
     importlib.import_module(f"gravcomp.commands.{command.replace('-', '_')}").add_arguments(parser)
@@ -79,9 +45,6 @@ def filled(words: list[str]) -> list[str]:
     """The words with values in place of the placeholders."""
     words = [PLACEHOLDERS.get(word, word) for word in words]
     return [SUBCOMMANDS.get(words[0], word) if word == "NAME" else word for word in words]
-
-
-COMMAND_LINES = sorted({tuple(words) for path in DOCUMENTS for words in commands_of(path)})
 
 
 def test_there_are_commands_to_check():
@@ -106,21 +69,6 @@ SUBHELPS = {words[:2] for words in COMMAND_LINES if words[0] in ("bench", "model
 def test_help_is_given(gravcomp, words):
     answer = gravcomp(*words, "--help")
     assert answer.code == 0 and f"gravcomp {' '.join(words)}" in answer.out
-
-
-# Cheap enough to be run as they stand: they start no node and build nothing.
-CHEAP = (("model", "solve"), ("model", "view"), ("doctor", "--robot"))
-RUN = [words for words in COMMAND_LINES if words[:2] in CHEAP and len(words) > 2 and not {"ROBOT", "ROBOT.yaml"} & set(words)]
-
-
-@pytest.mark.parametrize("words", RUN, ids=" ".join)
-def test_a_cheap_command_line_runs(gravcomp, tmp_path, monkeypatch, words):
-    monkeypatch.chdir(tmp_path)
-    answer = gravcomp(*(str(ROOT / word) if word.startswith("src/") else word for word in words))
-    # The doctor ends with 1 where this machine lacks something; that is an answer.
-    assert answer.code in ((0, 1) if words[0] == "doctor" else (0,)), answer.err
-    if "--out" in words:
-        assert (tmp_path / words[words.index("--out") + 1]).exists()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -165,10 +113,13 @@ def check_ros2(words: list[str]) -> None:
                     assert (ROOT / word).exists(), f"{word} does not exist"
         case ["run", package, executable, *rest]:
             assert EXECUTABLES.get(executable) == package
-            for word in rest:
-                if ":=" in word:
-                    key = word.partition(":=")[0]
+            names = {port.name for kind in ("takes", "gives") for port in getattr(node(executable), kind)} | {"__ns", "__node"}
+            for option, word in zip(rest, rest[1:]):
+                key = word.partition(":=")[0]
+                if option == "-p":
                     assert key in parameters_of(executable) | {"use_sim_time"}, f"{executable} has no parameter {key}"
+                if option == "-r":
+                    assert key in names, f"{executable} has no topic {key}"
         case ["service", "call", name, kind, *_]:
             _, executable, service = name.split("/")
             assert (f"~/{service}", kind) in [(port.name, port.type) for port in node(executable).services]

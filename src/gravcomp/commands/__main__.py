@@ -17,6 +17,10 @@ def main(arguments: list[str]) -> int:
     module = importlib.import_module(f"gravcomp.commands.{name.replace('-', '_')}")
     parser = argparse.ArgumentParser(prog=f"gravcomp {name}", description=COMMANDS[name], allow_abbrev=False)
     module.add_arguments(parser)
+    if own := getattr(module, "OWN", ()):
+        # argparse would take options that it does not know for mistakes.
+        count = next((i for i, word in enumerate(rest) if word not in own), len(rest))
+        rest.insert(count, "--")
     from gravcomp.config import ConfigError
     from gravcomp.launcher import LaunchError, NodeDied
 

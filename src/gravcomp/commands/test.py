@@ -6,6 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+OWN = ("--fast", "-h", "--help")
+"""Arguments of the command's own, which come first; all others are pytest's."""
+
 FOLDERS = ("src/test", "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
 # What only tests need, and what it is for.
 _BROWSER = {"chromium": "the viewer's tests"}

@@ -1,0 +1,160 @@
+"""What a `ros2 ...` line of the documents does: by the command itself where it is installed, else by the same calls of rclpy.
+
+The wheels of ROS 2 bring no command line. The calls here are those that ros2cli makes: the node's own services for parameters and the
+lifecycle, a message made from YAML for `topic pub` and `service call`, one message for `topic echo`, a count for `topic hz`.
+"""
+
+import importlib
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+
+import rclpy
+import yaml
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from gravcomp.launcher.node_process import find_executable
+
+PATIENCE = 60.0  # s
+_HEARD = 3.0  # s that `topic hz` listens
+
+
+class Ros2:
+    """Runs lines against the graph of this process's domain; each raises AssertionError when it does not do what it is for."""
+
+    def __init__(self) -> None:
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self._node = rclpy.create_node("ros2_line", context=self._context)
+        self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def close(self) -> None:
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def run(self, line: str) -> str:
+        """What the line prints."""
+        if shutil.which("ros2"):
+            endless = line.startswith(("ros2 topic hz", "ros2 topic echo"))
+            words = ["timeout", "--signal=INT", "15", *shlex.split(line)] if endless else shlex.split(line)
+            done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
+            assert done.returncode == 0 or endless, done.stderr
+            return done.stdout
+        match shlex.split(line)[1:]:
+            case ["service", "call", name, kind, *content]:
+                return str(self._call(kind, name, *content))
+            case ["topic", "pub", "--once", name, kind, content]:
+                return self._publish(kind, name, content)
+            case ["topic", "hz", name]:
+                return f"average rate: {self._rate(name):.3f}"
+            case ["topic", "echo", name, "--field", field]:
+                return str(getattr(self._one(name), field))
+            case ["param", "set", node, name, value]:
+                return self._set(node, name, float(value))
+            case ["param", "describe", node, name]:
+                return str(self._ask(DescribeParameters, f"{node}/describe_parameters", DescribeParameters.Request(names=[name])).descriptors[0])
+            case ["lifecycle", "get", node]:
+                return self._ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
+            case ["lifecycle", "set", node, transition]:
+                return self._change(node, transition)
+        raise AssertionError(f"nobody knows what {line} does")
+
+    def state_of(self, node: str) -> str:
+        return self._ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
+
+    def _call(self, kind: str, name: str, content: str = "{}") -> object:
+        service = _interface(kind)
+        answer = self._ask(service, name, _filled(service.Request(), content))
+        assert answer.success, answer.message
+        return answer
+
+    def _ask(self, service: type, name: str, request: object) -> object:
+        client = self._node.create_client(service, name)
+        try:
+            assert client.wait_for_service(PATIENCE), f"nobody serves {name}"
+            future = client.call_async(request)
+            self._executor.spin_until_future_complete(future, PATIENCE)
+            assert future.done(), f"no answer of {name}"
+            return future.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def _publish(self, kind: str, name: str, content: str) -> str:
+        message = _filled(_interface(kind)(), content)
+        publisher = self._node.create_publisher(type(message), name, 10)
+        self._until(lambda: publisher.get_subscription_count() > 0, f"nobody listens to {name}")
+        publisher.publish(message)
+        assert publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=PATIENCE))
+        self._node.destroy_publisher(publisher)
+        return f"publishing #1: {message}"
+
+    def _rate(self, name: str) -> float:
+        times: list[float] = []
+        self._listen(name, lambda _: times.append(time.monotonic()), lambda: times and time.monotonic() - times[0] > _HEARD)
+        return (len(times) - 1) / (times[-1] - times[0])
+
+    def _one(self, name: str) -> object:
+        heard: list = []
+        self._listen(name, heard.append, lambda: heard)
+        return heard[-1]
+
+    def _listen(self, name: str, callback, done) -> None:
+        self._until(lambda: self._node.get_publishers_info_by_topic(name), f"nobody publishes {name}")
+        (offer,) = self._node.get_publishers_info_by_topic(name)
+        latched = offer.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT, durability=durability)
+        subscription = self._node.create_subscription(_interface(offer.topic_type), name, callback, qos)
+        self._until(done, f"nothing came on {name}")
+        self._node.destroy_subscription(subscription)
+
+    def _set(self, node: str, name: str, value: float) -> str:
+        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+        (result,) = self._ask(SetParameters, f"{node}/set_parameters", request).results
+        assert result.successful, result.reason
+        return "Set parameter successful"
+
+    def _change(self, node: str, label: str) -> str:
+        transition = getattr(Transition, f"TRANSITION_{label.upper()}")
+        assert self._ask(ChangeState, f"{node}/change_state", ChangeState.Request(transition=Transition(id=transition))).success
+        return "Transitioning successful"
+
+    def _until(self, done, what: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < end, what
+            self._executor.spin_once(0.05)
+
+
+def run_node(line: str, environment: dict[str, str], seconds: float | None) -> tuple[int, str]:
+    """The exit code and the output of a `ros2 run ...` line: SIGINT after `seconds`, None: it ends by itself."""
+    _, run, package, executable, *arguments = shlex.split(line)
+    assert run == "run"
+    command = shlex.split(line) if shutil.which("ros2") else [find_executable(package, executable), *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+    try:
+        output, _ = process.communicate(timeout=seconds or PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE)
+    return process.returncode, output
+
+
+def _interface(kind: str) -> type:
+    """The class of pkg/msg/Name or pkg/srv/Name."""
+    package, folder, name = kind.split("/")
+    return getattr(importlib.import_module(f"{package}.{folder}"), name)
+
+
+def _filled(message: object, content: str) -> object:
+    for field, value in yaml.safe_load(content).items():
+        setattr(message, field, value)
+    return message
