@@ -23,6 +23,7 @@ from gravcomp_node.managed_node import OK, WARN
 
 _LOOK_INTERVAL = 0.25  # s, between looks for new topics
 _DEPTH = 1000
+_ANY = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=_DEPTH)  # takes from every publisher
 _GLOBAL = ("/tf", "/tf_static", "/clock", "/diagnostics", "/rosout", "/parameter_events")
 
 
@@ -63,11 +64,9 @@ class Recorder(ManagedNode):
             if topic in self._refused or not self._belongs(topic):
                 continue
             offers = [p.qos_profile for p in self.get_publishers_info_by_topic(topic)]
-            if not offers:  # subscribed to by somebody, published by nobody
-                continue
             if topic not in self._recorded:
                 self._begin(topic, kinds, offers)
-            elif _matching(offers) != self._recorded[topic].qos:
+            elif offers and _matching(offers) != self._recorded[topic].qos:
                 self._follow(self._recorded[topic], topic, offers)
         self.report(
             WARN if self._refused else OK, f"recording {len(self._recorded)} topics into {self._bag.path}",
@@ -83,8 +82,9 @@ class Recorder(ManagedNode):
         try:
             if len(kinds) != 1:
                 raise BagError(f"it has several types: {', '.join(kinds)}")
-            kind = _message_class(kinds[0])
-            recording = _Recording(kind, self._bag.add_topic(topic, kinds[0], [_stored(q) for q in offers]))
+            recording = _Recording(_message_class(kinds[0]), kinds[0])
+            if offers:
+                recording.connection = self._bag.add_topic(topic, kinds[0], [_stored(q) for q in offers])
         except (BagError, ImportError, AttributeError) as error:
             self._refused.add(topic)
             self.get_logger().warning(f"{topic} is not recorded: {error}")
@@ -95,9 +95,13 @@ class Recorder(ManagedNode):
     def _follow(self, recording: "_Recording", topic: str, offers: list[QoSProfile]) -> None:
         if recording.subscription is not None:
             self.destroy_subscription(recording.subscription)
-        recording.qos = _matching(offers)
+        # Who listens to a topic that nobody offers yet hears also whoever says one word there and goes, as `ros2 topic pub --once` does.
+        recording.qos = _matching(offers) if offers else _ANY
 
         def write(message: bytes) -> None:
+            if recording.connection is None:
+                said_by = [_stored(p.qos_profile) for p in self.get_publishers_info_by_topic(topic)]
+                recording.connection = self._bag.add_topic(topic, recording.type_name, said_by)
             self._bag.write(recording.connection, time.time_ns(), message)
 
         recording.subscription = self.create_subscription(recording.kind, topic, write, recording.qos, raw=True)
@@ -108,7 +112,8 @@ class _Recording:
     """A topic that goes into the bag."""
 
     kind: type
-    connection: Connection
+    type_name: str
+    connection: Connection | None = None  # None until the topic is offered, or something was said there
     qos: QoSProfile | None = None
     subscription: Subscription | None = None
 

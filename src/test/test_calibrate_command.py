@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bag_of_topics import TopicBag
 from gravcomp.calibration.files import write_csv
 from gravcomp.calibration.measured import Measured, StillWindows
 from gravcomp.commands.__main__ import main
@@ -18,7 +19,6 @@ from gravcomp.experiments.setup import Setup
 
 MODULUS = 0.6e6  # Pa
 LOOSE = -0.03  # m
-MESSAGES = Path(__file__).parents[2] / "gravcomp_msgs" / "msg"
 
 
 @pytest.fixture(scope="module")
@@ -116,28 +116,14 @@ def test_unusable_data_end_in_a_sentence(here, capsys):
 
 
 def write_bag(path: Path, measured: Measured) -> None:
-    """The measurement as the graph's topics would hold it, two seconds between trials; released cables are paid out."""
-    from rosbags.rosbag2 import Writer
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(get_types_from_msg((MESSAGES / "CableState.msg").read_text(), "gravcomp_msgs/msg/CableState"))
-    vector, pose, state = "geometry_msgs/msg/Vector3Stamped", "geometry_msgs/msg/PoseStamped", "gravcomp_msgs/msg/CableState"
-    types = {name.rsplit("/", 1)[1]: kind for name, kind in store.types.items() if name.startswith(("geometry_msgs/", "std_msgs/", "builtin", "gravcomp"))}
-    with Writer(path, version=9) as bag:
-        topics = {kind: bag.add_connection(topic, kind, typestore=store) for topic, kind in (("/gravity", vector), ("/measured/tip", pose), ("/cable/state", state))}
+    """The measurement as the graph's topics would hold it, two seconds between trials; released cables are paid out. The virtual robot's
+    truth/gravity is no second robot's."""
+    with TopicBag(path) as bag:
         start = 0.0
         for trial in measured.trials():
-            for time, gravity, wound, tip in zip(trial.time, trial.gravity, trial.displacement, trial.tip_position):
-                stamp = round(1e9 * (start + time - trial.time[0]))
-                header = types["Header"](stamp=types["Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="soft_base")
-                none = np.zeros(0)
-                wound = np.nan_to_num(wound, nan=LOOSE)
-                messages = {
-                    vector: types["Vector3Stamped"](header=header, vector=types["Vector3"](*gravity.tolist())),
-                    state: types["CableState"](header, 3, "", none, wound, none, none, none),
-                    pose: types["PoseStamped"](header, types["Pose"](types["Point"](*tip.tolist()), types["Quaternion"](0.0, 0.0, 0.0, 1.0))),
-                }
-                for kind, message in messages.items():
-                    bag.write(topics[kind], stamp, store.serialize_cdr(message, kind))
+            for time, gravity, wound, tip in zip(start + trial.time - trial.time[0], trial.gravity, trial.displacement, trial.tip_position):
+                bag.vector("/gravity", time, gravity)
+                bag.vector("/truth/gravity", time, gravity)
+                bag.state("/cable/state", time, np.nan_to_num(wound, nan=LOOSE))
+                bag.pose("/measured/tip", time, tip)
             start += trial.time[-1] - trial.time[0] + 2.0

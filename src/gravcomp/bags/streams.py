@@ -80,8 +80,10 @@ def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
             raise BagError(f"{path}: '{name}' is {found[name]}; {want.kind} is needed")
         full = name if name.startswith("/") else f"/{name}"
         topics = [t for t, kind in found.items() if kind == want.kind and (t == name if name.startswith("/") else t.endswith(full))]
-        if len(topics) == 1:
-            return topics[0]
+        # The virtual robot's truth/gravity lies below the namespace of the robot's own gravity.
+        spaces = sorted((topic[: len(topic) - len(full) + 1], topic) for topic in topics)
+        if spaces and all(space.startswith(spaces[0][0]) for space, _ in spaces):
+            return spaces[0][1]
         if topics:
             raise BagError(f"{path}: has several topics '{name}': {', '.join(sorted(topics))}; record one robot, or name the topic")
     if want.optional:

@@ -1,19 +1,28 @@
 """`gravcomp reproduce NAME`: one of the article's experiments, or `all`, with a report page, plots and JSON."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError
 from gravcomp.experiments import EXPERIMENTS, experiment
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from gravcomp.experiments.result import Result
+    from gravcomp.experiments.setup import Setup
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     lines = "\n".join(f"  {name:<14}{summary}" for name, summary in EXPERIMENTS.items())
-    parser.description = f"Reproduce the article's experiments on the virtual robot:\n\n{lines}\n  {'all':<14}all of them, with an index page"
+    parser.description = f"Reproduce the article's experiments on the virtual robot, or judge a recording of your own robot (--bag):\n\n{lines}\n  {'all':<14}all of them, with an index page"
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("name", choices=[*EXPERIMENTS, "all"], metavar="NAME", help="the experiment, or all")
     parser.add_argument("--out", metavar="DIR", default="reports", help="where pages and JSON go (default: reports)")
@@ -23,6 +32,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, help="processes for sweeps (default: one a core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
     parser.add_argument("--write", metavar="DOCUMENT", help="renew each experiment's table of figures in a Markdown document, between its marks")
+    parser.add_argument(
+        "--bag", metavar="BAG", help="judge a recording of the graph on a robot of your own in place of the virtual robot (`gravcomp record`; with its"
+        " measured tip as geometry_msgs/PoseStamped on measured/tip)")  # fmt: skip
+    parser.add_argument("--tip-topic", metavar="TOPIC", help="of the measured tip in the bag (default: measured/tip, else truth/tip)")
     parser.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
 
 
@@ -39,6 +52,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.experiments.sweep import Sweep
 
     names = list(EXPERIMENTS) if args.name == "all" else [args.name]
+    if args.write and args.bag:
+        raise ConfigError("--write puts the virtual robot's figures into a document; --bag judges another's: give one of both")
     if args.write:
         if args.brief:
             raise ConfigError("--write puts the figures of whole experiments into a document; --brief shortens them: give one of both")
@@ -50,8 +65,10 @@ def run(args: argparse.Namespace) -> int:
     except OSError as error:
         raise ConfigError(f"--out is {folder}: cannot be made: {error.strerror}") from error
     file = load_robot_file(args.robot)
-    prepare_model(args.robot)
     console = Console(stderr=True)
+    if args.bag:
+        return _judge(args, Setup.of(file), folder, console)
+    prepare_model(args.robot)
     results = []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Sweep(args.workers, args.dask) as sweep, Progress(*columns, console=console, transient=True) as progress:
@@ -80,6 +97,40 @@ def run(args: argparse.Namespace) -> int:
                 figures_table.renew(Path(args.write), f"reproduce {name}", result.figures)
         if len(results) > 1:
             console.print(f"[bold]index[/bold]  {write_index(results, folder)}")
+    return _end(args, results)
+
+
+def _judge(args: argparse.Namespace, setup: Setup, folder: Path, console: Console) -> int:
+    """The recorded robot in place of the virtual one. Raises ConfigError; with `all`, what the bag cannot tell is only said."""
+    from gravcomp.experiments import figures_table
+    from gravcomp.experiments.recorded import JUDGES, judge
+    from gravcomp.experiments.recorded.run import RecordedRun
+    from gravcomp.experiments.report import write_report
+
+    recorded = RecordedRun(Path(args.bag).expanduser(), setup, args.tip_topic)
+    # One name for each way of judging.
+    names = list({module: name for name, module in reversed(JUDGES.items())}.values()) if args.name == "all" else [args.name]
+    results = []
+    for name in names:
+        started = time.perf_counter()
+        try:
+            result = judge(name).run(recorded)
+        except ConfigError as error:
+            if args.name != "all":
+                raise
+            console.print(f"{name}: {error}", highlight=False)
+            continue
+        result.name, result.bag, result.seconds = name, args.bag, time.perf_counter() - started
+        result.parameters["robot"] = setup.source
+        console.print(figures_table.rich_table(result.title, result.figures))
+        console.print(f"[dim]{write_report(result, folder)}[/dim]\n")
+        results.append(result)
+    if not results:
+        raise ConfigError(f"{args.bag}: nothing of it can be judged")
+    return _end(args, results)
+
+
+def _end(args: argparse.Namespace, results: list[Result]) -> int:
     if args.json:
         document = {"experiments": [result.to_mapping() for result in results], "reached": all(r.reached for r in results)}
         print(json.dumps(document))

@@ -60,8 +60,8 @@ def write_report(result: Result, folder: Path) -> Path:
     """Write NAME.html and NAME.json into the folder; the page's path."""
     folder.mkdir(parents=True, exist_ok=True)
     document = {**result.to_mapping(), "versions": versions()}
-    (folder / f"{result.name}.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
-    page = folder / f"{result.name}.html"
+    (folder / f"{result.file}.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
+    page = folder / f"{result.file}.html"
     page.write_text(_page(result), encoding="utf-8")
     return page
 
@@ -71,7 +71,7 @@ def write_index(results: list[Result], folder: Path) -> Path:
     rows = []
     for result in results:
         for place, figure in enumerate(result.figures):
-            name = f'<a href="{result.name}.html">{html.escape(result.title)}</a>' if place == 0 else ""
+            name = f'<a href="{result.file}.html">{html.escape(result.title)}</a>' if place == 0 else ""
             rows.append(f"<tr><td>{name}</td>{_figure_cells(figure)}</tr>")
     judged = [f for r in results for f in r.figures if f.reached is not None]
     reached = sum(bool(f.reached) for f in judged)
@@ -90,7 +90,7 @@ def _page(result: Result) -> str:
     parts = "".join(_table(part) if isinstance(part, Table) else _plot(part) for part in result.parts)
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in result.notes)
     parameters = html.escape(json.dumps(plain(result.parameters), indent=1))
-    body = f"""<header><p class="kicker">gravcomp reproduce {result.name}</p><h1>{html.escape(result.title)}</h1>
+    body = f"""<header><p class="kicker">gravcomp {html.escape(result.command)}</p><h1>{html.escape(result.title)}</h1>
 <p class="question">{html.escape(result.question)}</p><p class="ground">{html.escape(result.ground)}</p></header>
 <section><table><tr><th>figure</th><th>here</th><th>the article</th><th>to be reached</th><th></th></tr>{figures}</table></section>
 {parts}

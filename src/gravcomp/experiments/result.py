@@ -59,7 +59,8 @@ class Plot:
 
 @dataclass
 class Result:
-    """One experiment. `ground` says what was run and what stood for the real robot; `parts` are tables and plots in reading order."""
+    """One experiment. `ground` says what was run and what stood for the real robot; `parts` are tables and plots in reading order; `bag`: the
+    recording that was judged in place of the virtual robot."""
 
     name: str
     title: str
@@ -71,6 +72,17 @@ class Result:
     notes: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+    bag: str = ""
+
+    @property
+    def file(self) -> str:
+        """The name of its page's and JSON's files, without their ending."""
+        return f"{self.name}-recorded" if self.bag else self.name
+
+    @property
+    def command(self) -> str:
+        """What makes it."""
+        return f"reproduce {self.name} --bag {self.bag}" if self.bag else f"reproduce {self.name}"
 
     @property
     def reached(self) -> bool:

@@ -1,0 +1,70 @@
+"""Bags for tests, written without an installed ROS."""
+
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+MESSAGES = Path(__file__).parents[2] / "gravcomp_msgs" / "msg"
+OWN = ("CableState", "CableCommand", "ControllerStatus", "ShapeTarget")
+
+
+class TopicBag:
+    """A bag being written: `with TopicBag(path) as bag: bag.vector("/gravity", time, (x, y, z))`, time in s as stamp and as reception.
+
+    `late` (s): by how much the reception is later than the stamp.
+    """
+
+    def __init__(self, path: Path):
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        for name in OWN:
+            self._store.register(get_types_from_msg((MESSAGES / f"{name}.msg").read_text(), f"gravcomp_msgs/msg/{name}"))
+        self._types = {kind.rsplit("/", 1)[1]: made for kind, made in self._store.types.items()
+                       if kind.startswith(("geometry_msgs/", "std_msgs/", "builtin", "gravcomp", "sensor_msgs/"))}  # fmt: skip
+        self._bag = Writer(path, version=9)
+        self._topics: dict = {}
+
+    def __enter__(self) -> "TopicBag":
+        self._bag.open()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._bag.close()
+
+    def vector(self, topic: str, time: float, value) -> None:
+        self._write(topic, "geometry_msgs/msg/Vector3Stamped", time, vector=self._types["Vector3"](*map(float, value)))
+
+    def pose(self, topic: str, time: float, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
+        pose = self._types["Pose"](self._types["Point"](*map(float, position)), self._types["Quaternion"](*map(float, orientation)))
+        self._write(topic, "geometry_msgs/msg/PoseStamped", time, pose=pose)
+
+    def state(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
+        none = np.zeros(0)
+        self._write(topic, "gravcomp_msgs/msg/CableState", time, late, state=3, message="", command=none, displacement=np.asarray(displacement, float),
+                    velocity=none, current=none, tension=none)  # fmt: skip
+
+    def command(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
+        self._write(topic, "gravcomp_msgs/msg/CableCommand", time, late, displacement=np.asarray(displacement, float), tension=np.zeros(0))
+
+    def status(self, topic: str, time: float, code: int) -> None:
+        self._write(topic, "gravcomp_msgs/msg/ControllerStatus", time, code=code, message="", distance=0.0, lateral=0.0, axial=0.0, tilt=0.0, solve_time=0.0)
+
+    def bend(self, topic: str, time: float, angle: float, plane: float) -> None:
+        point, vector, none = self._types["Point"](0.0, 0.0, 0.0), self._types["Vector3"](0.0, 0.0, 0.0), np.zeros(0)
+        self._write(topic, "gravcomp_msgs/msg/ShapeTarget", time, tip_position=point, tip_position_weight=1.0, tip_direction=vector, tip_direction_weight=0.0,
+                    backbone_station=none, backbone_position=[], backbone_weight=none, bend=True, bend_angle=angle, bend_plane=plane)  # fmt: skip
+
+    def imu(self, topic: str, time: float, gyro, accel) -> None:
+        vector, none = self._types["Vector3"], np.zeros(9)
+        self._write(topic, "sensor_msgs/msg/Imu", time, orientation=self._types["Quaternion"](0.0, 0.0, 0.0, 1.0), orientation_covariance=none,
+                    angular_velocity=vector(*map(float, gyro)), angular_velocity_covariance=none,
+                    linear_acceleration=vector(*map(float, accel)), linear_acceleration_covariance=none)  # fmt: skip
+
+    def _write(self, topic: str, kind: str, time: float, late: float = 0.0, **fields) -> None:
+        if topic not in self._topics:
+            self._topics[topic] = self._bag.add_connection(topic, kind, typestore=self._store)
+        stamp = round(1e9 * time)
+        header = self._types["Header"](stamp=self._types["Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="soft_base")
+        message = self._store.types[kind](header=header, **fields)
+        self._bag.write(self._topics[topic], stamp + round(1e9 * late), self._store.serialize_cdr(message, kind))
