@@ -152,6 +152,7 @@ def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
         ("./gravcomp bench estimator --write src/doc/figures.md", "cost of a sample"),
         ("./gravcomp bench graph", "two robots"),
         ("./gravcomp bench graph --write src/doc/figures.md", "two robots"),
+        ("./gravcomp bench page --write src/doc/figures.md", "page"),
         ("./gravcomp bench faults --write src/doc/figures.md", "hostile frames"),
         ("./gravcomp bench soak --write src/doc/figures.md", "lost"),
         ("./gravcomp reproduce static --brief", "recovery rate"),

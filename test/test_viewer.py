@@ -92,7 +92,8 @@ def robot(address):
 
 @pytest.fixture(scope="module")
 def browser(address, robot):
-    with Browser(address, width=1100, height=500, patience=PATIENCE) as browser:
+    with Browser(width=1100, height=500, patience=PATIENCE) as browser:
+        browser.open(address)
         yield browser
 
 

@@ -11,6 +11,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.view.backbone import Backbone, arc_backbone, straight_backbone
 from gravcomp.view.colours import tension_colour
+from gravcomp.view.graphics import chosen
 from gravcomp.view.history import History
 from gravcomp.view.page import free_port
 from gravcomp.view.plots import top_of
@@ -198,7 +199,7 @@ class Clicks:
         from gravcomp.view.options import PageOptions
         from gravcomp.view.page import Page
 
-        self.page = Page(robot, PageOptions(port=8890))
+        self.page = Page(robot, PageOptions(port=8890, graphics="full"))
         self.controls, self.scene = self.page._controls, self.page._scene
 
     def set(self, handle, value=None) -> list:
@@ -307,6 +308,13 @@ def test_light_graphics_leave_out_what_a_processor_draws_slowly(clicks):
     assert not scene._key.cast_shadow and not scene._rim.visible and scene._sky.visible
     clicks.set(clicks.handle("graphics"), "full")
     assert scene._key.cast_shadow and not scene._sky.visible
+
+
+def test_without_a_graphics_chip_graphics_are_light(tmp_path):
+    assert chosen("auto", tmp_path) == "light" and chosen("full", tmp_path) == "full"
+    (tmp_path / "dri").mkdir()
+    (tmp_path / "dri" / "renderD128").touch()
+    assert chosen("auto", tmp_path) == "full" and chosen("light", tmp_path) == "light"
 
 
 def test_a_lumen_is_drawn_where_there_is_one(robot):

@@ -61,6 +61,17 @@ ROWS = {
         Row("bridge_cpu", "bridge with six motors at 500 Hz feedback, share of a core", "", 0.5),
         Row("two_robots_hz.slower", "two robots at 100 Hz on this machine: commands followed a second, the slower one", "Hz", 99.0, True),
     ),
+    "page": (
+        Row("drawn_s", "page drawn after the start of all nodes, in an open browser", "s", 5.0),
+        Row("updates_hz", "updates that the page is sent", "Hz", 19.0, True),
+        Row("animation_hz", "what the browser draws here", "Hz"),
+        Row("delay_ms.without.median", "the loop's delay without a viewer, median", "ms"),
+        Row("delay_ms.served.median", "with a viewer that nobody looks at, median", "ms"),
+        Row("delay_ms.looked_at.median", "with a page that is looked at on this machine, median", "ms"),
+        Row("delay_ms.without.p99", "without a viewer, 99th percentile", "ms"),
+        Row("delay_ms.served.p99", "with a viewer that nobody looks at, 99th percentile", "ms"),
+        Row("delay_ms.looked_at.p99", "with a page that is looked at on this machine, 99th percentile", "ms", 25.0),
+    ),
     "faults": (
         Row("frames", "hostile frames and messages", "", 1_000_000, True),
         Row("crashes", "crashes", "", 0),

@@ -10,6 +10,7 @@ from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.multicast import private_channel
 from gravcomp.description.hardware import CanInterface
 from gravcomp.launcher import Graph
+from gravcomp.launcher.page_address import wait_for_page
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
 NODES = ("virtual_robot", *(executable for _, executable in LOOP))
@@ -20,21 +21,31 @@ START_TIMEOUT = 300.0
 
 
 class RunningGraph:
-    """Virtual robot and loop; starts on entering. `parameters`: executable -> parameters.
+    """Virtual robot and loop, and the viewer where it is asked for; starts on entering. `parameters`: executable -> parameters.
 
-    Attributes: can (CanInterface), namespace, robot (RobotGraph).
+    Attributes: can (CanInterface), namespace, robot (RobotGraph), page (the viewer's address).
     """
 
-    def __init__(self, parameters: dict[str, dict] | None = None):
+    def __init__(self, parameters: dict[str, dict] | None = None, *, viewer: bool = False):
         self.can = CanInterface(channel=private_channel())
         self.namespace = f"/bench_{os.getpid()}_{self.can.channel.rpartition(':')[2]}"
         self.robot = robot = RobotGraph("article", self.can.interface, self.can.channel, self.namespace, parameters or {})
         specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop()]
+        self._viewer = robot.node("gravcomp_fem", "viewer") if viewer else None
+        self.page = ""
         self._specs = {spec.executable: spec for spec in specs}
         self._graph = Graph(specs)
 
     def __enter__(self) -> "RunningGraph":
-        self._graph.start()
+        try:
+            if self._viewer:
+                # Before the others, as the commands do.
+                self._graph.start_one(self._viewer)
+                self.page = wait_for_page(self._graph)
+            self._graph.start()
+        except BaseException:
+            self._graph.stop()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -51,16 +51,14 @@ def run(args: argparse.Namespace) -> int:
         if args.gravity != "imu":
             use = "publish" if args.gravity == "arm" else "check"
             specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf)))
-        if args.viewer:
-            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
         with Graph([*specs, player], logs, domain) as processes:
+            if args.viewer:
+                show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
             processes.start()
             print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
-            if args.viewer:
-                show_page(processes, args.no_open)
             figures = _follow(processes, result)
     _print_summary(figures)
     if args.json:

@@ -12,6 +12,7 @@ BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "estimator": "orientation on recorded data with optical truth, temperature control",
     "graph": "the running graph: delay and rates, the bridge's share of a core",
+    "page": "the live page in a browser: how soon, how often, and what it costs the loop",
     "faults": "malformed frames and messages, faults, killed processes: what reaches the motors",
     "soak": "a long run: lost commands, growing memory",
 }
@@ -31,6 +32,7 @@ BRIEF = {
     "engine": {"every": 10},
     "estimator": {"every": 5},
     "graph": {"listen": 4.0, "cost": 4.0},
+    "page": {"listen": 5.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6},
     "soak": {"minutes": 0.2},
 }

@@ -76,16 +76,14 @@ def run(args: argparse.Namespace) -> int:
             start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes,
         )  # fmt: skip
         specs = [*graph.loop(), judge]
-        if not args.headless:
-            kept = {"look_back": args.duration + _BROWSER_TIME} if args.screenshots else {}
-            specs.append(graph.node("gravcomp_fem", "viewer", port=args.port, **kept))
+        pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
         with Graph(specs, logs, domain) as processes:
+            if not args.headless:
+                address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
             processes.start()
             print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
-            if not args.headless:
-                address = show_page(processes, args.no_open)
             ready = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller"]
             processes.wait(lambda: _all_active(_read(result_file), ready), _START_TIMEOUT, "the nodes' start")
             # Last, because its motion begins with its activation.

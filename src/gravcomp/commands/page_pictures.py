@@ -31,7 +31,8 @@ class PagePictures:
     def take(self, address: str) -> str:
         """Write NAME.png of each moment that has come; returns why not all could be, or nothing."""
         try:
-            with Browser(f"{address}?fixedDpr=1") as browser:
+            with Browser() as browser:
+                browser.open(f"{address}?fixedDpr=1")  # sharp, however slowly it is drawn
                 for name, time in self._times.items():
                     browser.look_back(time)
                     path = self._folder / f"{name}.png"

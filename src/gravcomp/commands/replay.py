@@ -58,18 +58,17 @@ def run(args: argparse.Namespace) -> int:
         graph.node("gravcomp_fem", "fem_simulator", use_sim_time=True),
         graph.node("gravcomp_fem", "inverse_controller", use_sim_time=True),
     ]
-    if args.viewer:
-        specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
+    viewer = [graph.node("gravcomp_fem", "viewer", port=args.port)] if args.viewer else []
     if args.out:
         specs.append(graph.node("gravcomp_fem", "recorder", out=str(Path(args.out).resolve())))
     replay = graph.node(
         "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
-        wait_for=[spec.executable for spec in specs], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
+        wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
     with Graph([*specs, replay], Path(args.logs) if args.logs else None) as processes:
+        if viewer:
+            show_page(processes, viewer[0], args.no_open)
         processes.start()
-        if args.viewer:
-            show_page(processes, args.no_open)
         _follow(processes, replay.name, recording.duration, args.speed)
         time.sleep(_SETTLE)
     figures = {

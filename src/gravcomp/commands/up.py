@@ -40,15 +40,13 @@ def run(args: argparse.Namespace) -> int:
     specs = graph.loop()
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
-    if args.viewer:
-        specs.append(graph.node("gravcomp_fem", "viewer", port=args.port))
     with Graph(specs, Path(args.logs) if args.logs else None) as processes:
+        if args.viewer:
+            show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
         processes.start()
         names = ", ".join(processes.processes)
         bus = f" Bus: {interface} {channel}." if interface or channel else ""
         print(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.", file=sys.stderr, flush=True)
-        if args.viewer:
-            show_page(processes, args.no_open)
         while True:
             processes.check()
             time.sleep(0.2)

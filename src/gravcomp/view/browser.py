@@ -25,33 +25,43 @@ def find_chromium() -> str | None:
 
 
 class Browser:
-    """A window of `width` x `height` px onto the page at `address`; a context manager.
+    """A window of `width` x `height` px; a context manager. `open` shows a page.
 
-    `page` is Playwright's page. Raises BrowserError when no Chromium is installed or the page does not come within `patience` (s).
+    `page` is Playwright's page; `received`: messages of the page's server until now; `foreign`: addresses outside the page's own that were
+    asked for. Raises BrowserError when no Chromium is installed; what is waited for has to come within `patience` (s).
     """
 
-    def __init__(self, address: str, width: int = 1600, height: int = 900, patience: float = 120.0):
+    def __init__(self, width: int = 1600, height: int = 900, patience: float = 120.0):
         from playwright.sync_api import Error, sync_playwright
 
         executable = find_chromium()
         if executable is None:
             raise BrowserError("no Chromium on this machine: apt-get install chromium")
         self._timeout = 1e3 * patience
+        self.received, self.foreign = 0, []
         self._playwright = sync_playwright().start()
         try:
             self._chromium = self._playwright.chromium.launch(executable_path=executable, args=list(_ARGUMENTS))
             self.page = self._chromium.new_page(viewport={"width": width, "height": height})
-            self.page.set_default_timeout(self._timeout)
-            self.foreign: list[str] = []
-            """Addresses outside the page's own that were asked for."""
-            own = (address.partition("?")[0], "data:", "blob:")
-            self.page.on("request", lambda request: None if request.url.startswith(own) else self.foreign.append(request.url))
+        except Error as error:
+            self._playwright.stop()
+            raise BrowserError(f"{executable} does not start: {error.message.splitlines()[0]}") from error
+        self.page.set_default_timeout(self._timeout)
+        self.page.on("websocket", lambda socket: socket.on("framereceived", self._count))
+        self._own: tuple[str, ...] = ()
+        self.page.on("request", lambda request: None if request.url.startswith(self._own) else self.foreign.append(request.url))
+
+    def open(self, address: str) -> None:
+        """Show the page at `address` and wait until it is drawn. Raises BrowserError when it does not come."""
+        from playwright.sync_api import Error
+
+        self._own = (address.partition("?")[0], "data:", "blob:")
+        try:
             self.page.goto(address, wait_until="commit")
-            self.page.wait_for_function(_IS_DRAWN, polling=500)
+            self.page.wait_for_function(_IS_DRAWN, polling=200)
             # Words about the browser itself, such as that a processor draws.
             self.page.add_style_tag(content=".mantine-Notifications-root { display: none }")
         except Error as error:
-            self._playwright.stop()
             raise BrowserError(f"the page at {address} could not be shown: {error.message.splitlines()[0]}") from error
 
     def __enter__(self) -> "Browser":
@@ -60,6 +70,9 @@ class Browser:
     def __exit__(self, *_) -> None:
         self._chromium.close()
         self._playwright.stop()
+
+    def _count(self, _: object) -> None:
+        self.received += 1
 
     def set_slider(self, label: str, value: float) -> None:
         """Give the page's slider of that label a value, as by hand."""

@@ -6,7 +6,7 @@ import queue
 import numpy as np
 import viser
 
-from gravcomp.view.options import GRAPHICS
+from gravcomp.view.graphics import GRAPHICS
 from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, Request, SetTarget, TiltBase
 from gravcomp.view.scene import BASE, SCALE, WORLD, Scene
 

@@ -3,9 +3,7 @@
 import dataclasses
 
 from gravcomp.config import parameter
-
-GRAPHICS = ("full", "light")
-
+from gravcomp.view.graphics import AUTO, GRAPHICS
 
 @dataclasses.dataclass(frozen=True)
 class LumenOptions:
@@ -30,7 +28,7 @@ class PageOptions:
     look_back: float = parameter(
         120.0, unit="s", minimum=1.0, maximum=3600.0, read_only=True, description="how far back the page can be turned")
     graphics: str = parameter(
-        "full", choices=GRAPHICS, read_only=True,
-        description="at the start; light: without reflections and shadows, for machines whose processor draws")  # fmt: skip
+        AUTO, choices=(AUTO, *GRAPHICS), read_only=True,
+        description="at the start; light: without reflections and shadows, for machines whose processor draws; auto: light where this one has no graphics chip")  # fmt: skip
     dark: bool = parameter(True, read_only=True, description="dark colours")
     lumen: LumenOptions = dataclasses.field(default_factory=LumenOptions)

@@ -8,6 +8,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.view import colours
 from gravcomp.view.controls import Controls
+from gravcomp.view.graphics import chosen
 from gravcomp.view.options import PageOptions
 from gravcomp.view.plots import Plots
 from gravcomp.view.requests import Request
@@ -34,12 +35,14 @@ class Page:
         gui = self._server.gui
         gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
         self._scene = Scene(self._server, robot, options)
+        graphics = chosen(options.graphics)
+        self._scene.set_graphics(graphics)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(_PANEL_WIDTH)
         self._status = gui.add_html("")
         with gui.add_folder("Cables"):
             self._cables = gui.add_html("")
-        self._controls = Controls(self._server, self._scene, robot.length, self._names, options.graphics)
+        self._controls = Controls(self._server, self._scene, robot.length, self._names, graphics)
         self._legend = gui.add_html(legend_html(False))
         panel = gui.add_panel()
         with panel.add_tab(f"The last {options.window:g} s"):

@@ -42,7 +42,6 @@ class Scene:
             shaft_radius=SCALE * 0.0009, head_radius=SCALE * 0.0026, head_length=SCALE * 0.007)  # fmt: skip
         if options.lumen.diameter > 0.0:
             self._add_lumen(options.lumen)
-        self.set_graphics(options.graphics)
 
     def set_graphics(self, graphics: str) -> None:
         """'full': reflections and shadows; 'light': without, ten times faster where a processor draws in place of a graphics chip."""
