@@ -9,14 +9,14 @@ Intervals are at 95 %, from the Jacobian at the solution. Residuals of neighbour
 correlation rho from sample to sample leaves: the variance is multiplied by (1 + rho) / (1 - rho).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
-from gravcomp.simulation import DynamicsOptions, DynamicSimulator, ShapeStatus
+from gravcomp.simulation import DynamicsOptions, DynamicSimulator, Shape, ShapeStatus
 
 STRAIGHT = 2e-3  # m: a course whose tip begins nearer than that to the straight robot's begins straight
 COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
@@ -56,20 +56,25 @@ class MotionFit:
 
 def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> tuple[np.ndarray, np.ndarray]:
     """Tip positions (t, 3) in m and directions (t, 3) at the course's times. Raises RuntimeError where the motion cannot be followed."""
+    straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
+    rows = [straight if shape is None else (shape.tip_position, shape.tip_direction) for shape in predict_shapes(robot, course, options)]
+    tips, directions = zip(*rows)
+    return np.array(tips), np.array(directions)
+
+
+def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> Iterator[Shape | None]:
+    """The shapes at the course's times, None for a beginning at the straight robot. Raises RuntimeError as `predict_course`."""
     simulator = DynamicSimulator(robot, options)
     if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT:
-        shape = simulator.settle(course.gravity[0], course.displacement[0])
-        tips, directions = [shape.tip_position], [shape.tip_direction]
+        yield simulator.settle(course.gravity[0], course.displacement[0])
     else:
         simulator.let_go(course.gravity[0])
-        tips, directions = [np.array([0.0, 0.0, robot.length])], [np.array([0.0, 0.0, 1.0])]
+        yield None
     for gravity, displacement, duration in zip(course.gravity[1:], course.displacement[1:], np.diff(course.time)):
         shape = simulator.step(gravity, displacement, duration=duration)
         if shape.status == ShapeStatus.NOT_CONVERGED:
             raise RuntimeError(f"the motion cannot be followed: {shape.message}")
-        tips.append(shape.tip_position)
-        directions.append(shape.tip_direction)
-    return np.array(tips), np.array(directions)
+        yield shape
 
 
 def fit_motion(

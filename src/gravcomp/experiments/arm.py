@@ -4,12 +4,13 @@ import numpy as np
 
 from gravcomp.experiments import metrics
 from gravcomp.experiments.cases import GROUND, Case, target_of
-from gravcomp.experiments.drawing import REAL, TARGET, WITHOUT, Drawing
+from gravcomp.experiments.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
 from gravcomp.experiments.loop import ClosedLoop, Trace
 from gravcomp.experiments.measuring import calibrate_on_virtual_robot
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 from gravcomp.experiments.setup import Context, Setup
-from gravcomp.virtual.motion import WaypointMotion, base_orientation
+from gravcomp.inverse.target import arc_points
+from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
 
@@ -46,6 +47,14 @@ def run(context: Context) -> Result:
         for name, (r, errors) in judged.items():
             mean = [1e3 * errors.distance.mean(), 1e3 * errors.distance.max(), 1e3 * errors.lateral.mean()]
             rows.append((shape, name, f"{r:.5f}", *mean, float(np.degrees(errors.tilt.mean()))))
+        plots.append(
+            Plot(
+                f"{shape.capitalize()}: at the five poses",
+                _shapes(without, fitted, arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station)),
+                "From the side, gravity downwards, at the end of each stop of the first pass. Grey: the shape asked for. Pink: without compensation. Vermilion:"
+                " compensated, calibrated.",
+            )
+        )
         plots.append(
             Plot(
                 f"{shape.capitalize()}: tip over time",
@@ -99,6 +108,30 @@ def _recovery(trace: Trace, target: np.ndarray) -> float:
     """r between the tip asked for and the true one, in world axes from the base."""
     wanted = metrics.rotate(trace.base_orientation, np.broadcast_to(target, trace.tip_position.shape))
     return metrics.recovery_rate(wanted, metrics.rotate(trace.base_orientation, trace.tip_position))
+
+
+def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
+    """`wanted`: backbone (b, 3) of the shape asked for, in soft_base."""
+    with Drawing(1, len(INCLINATIONS), width=11.5, height=2.9) as drawing:
+        for axes, inclination in zip(drawing.axes, INCLINATIONS):
+            base = base_orientation(np.radians(inclination))
+            draw_robot(axes, side_view(wanted, base), REST, "asked for")
+            for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated")):
+                draw_robot(axes, side_view(trace.backbone[_end_of_stop(trace, base)], base), colour, label)
+            axes.set_title(f"{inclination:g}°")
+            equal_axes(axes)
+        drawing.axes[0].legend(loc="lower left")
+    return drawing.svg
+
+
+def _end_of_stop(trace: Trace, base: np.ndarray) -> int:
+    """The last sample of the first stretch during which the base stands as `base` (3, 3)."""
+    q = np.moveaxis(trace.base_orientation, -1, 0)
+    turned = 2.0 * np.arccos(np.clip(np.abs(quaternion(base) @ q), 0.0, 1.0))
+    there = turned < np.radians(0.5)
+    first = int(np.argmax(there))
+    left = np.flatnonzero(~there[first:])
+    return first + int(left[0]) - 1 if len(left) else len(there) - 1
 
 
 def _course(without: Trace, fitted: Trace, target: np.ndarray) -> str:

@@ -3,19 +3,21 @@
 import numpy as np
 
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import fit_motion, predict_course
+from gravcomp.calibration.motion import fit_motion, predict_course, predict_shapes
 from gravcomp.description import Robot
-from gravcomp.experiments.drawing import MODEL, REAL, Drawing
-from gravcomp.experiments.free_fall import free_fall
+from gravcomp.experiments.drawing import MODEL, REAL, REST, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.experiments.free_fall import SAMPLE, falling_rod, free_fall
 from gravcomp.experiments.metrics import angle_between
 from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.experiments.setup import Context, Setup
+from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Real to simulation: free fall"
 
 INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll: none of those that are judged
 _DURATION, _REST = 4.0, 1.0  # s: of a fall, and of its end that counts as rest
+_SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after it was let go at which shapes are drawn
 
 
 def run(context: Context) -> Result:
@@ -67,6 +69,12 @@ def run(context: Context) -> Result:
                 "Across the robot, in the vertical plane: vermilion the virtual robot, blue the calibrated model. Below: distance and angle"
                 " between both.",
             ),
+            Plot(
+                "Shapes",
+                _shapes([(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0]),
+                f"From the side, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the robot was let go. Grey the rest shape without"
+                " gravity, vermilion the virtual robot, blue the calibrated model's axis.",
+            ),
             Table(
                 "Errors by pose",
                 ("inclination", "model", "worst, mm", "at rest, mm", "worst, deg", "at rest, deg"),
@@ -102,6 +110,30 @@ def _predict(job: tuple[Robot, Measured]) -> tuple[np.ndarray, np.ndarray]:
 
 def _errors(course: Measured, tip: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.linalg.norm(tip - course.tip_position, axis=1), angle_between(direction, course.tip_direction)
+
+
+def _fall_shapes(setup: Setup, robot: Robot, inclination: float, fall: Measured) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at the times shown."""
+    base = base_orientation(np.radians(inclination))
+    samples = [round(t / SAMPLE) for t in _SHOWN]
+    course = fall.rows(np.arange(samples[-1] + 1))
+    modelled = dict(enumerate(predict_shapes(robot, course)))
+    true = dict(enumerate(falling_rod(setup, base, _SHOWN[-1])))
+    return [(true[k][0], modelled[k].backbone_position @ base.T) for k in samples]
+
+
+def _shapes(falls: list[tuple[float, list]]) -> str:
+    with Drawing(1, len(falls), width=11.5, height=3.4, squeeze=False) as drawing:
+        for axes, (inclination, shapes) in zip(drawing.axes[0], falls):
+            straight = np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, 0.1], 9)
+            draw_robot(axes, side_view(straight, base_orientation(np.radians(inclination))), REST, "rest shape", alpha=0.6)
+            for k, (true, modelled) in enumerate(shapes):
+                draw_robot(axes, true[:, [0, 2]], REAL, "virtual robot" if k == 0 else None, alpha=0.45 + 0.55 * (k + 1) / len(shapes))
+                axes.plot(*(1e3 * modelled[:, [0, 2]].T), color=MODEL, linewidth=1.2, linestyle="--", label="model" if k == 0 else None)
+            axes.set_title(f"{inclination:g}°")
+            equal_axes(axes)
+        drawing.axes[0, 0].legend(loc="lower left")
+    return drawing.svg
 
 
 def _courses(inclinations: tuple, falls: list[Measured], models: list) -> str:
