@@ -1,4 +1,5 @@
-"""The article's experiments, one module each with `TITLE` and `run(context) -> Result`; `loop` is the closed loop that they share.
+"""The article's experiments, one module each with `TITLE` and `run(context) -> Result`; `loop` is the closed loop that they share, and
+`recorded` judges a bag of one's own robot by the same measures.
 
 EXPERIMENTS names them in the order of the article; nothing is imported before it is run.
 """
