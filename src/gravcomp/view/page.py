@@ -50,6 +50,7 @@ class Page:
             self._plots = Plots(self._server, self._names, options)
         panel.dock_left()
         panel.set_width(_PANEL_WIDTH)
+        self._server.on_client_disconnect(self._left)
 
     @property
     def clients(self) -> int:
@@ -65,10 +66,22 @@ class Page:
         self._timeline.add(snapshot)
         self._frame += 1
         held = self._timeline.held
-        if held is not None:
+        if held is None:
+            self._shown = None
+            self._draw(snapshot)
+        else:
             self._hold(*held)
-            return
-        self._shown = None
+        if self._frame % 4 == 0:
+            self._controls.show_virtual(snapshot.virtual)
+            self._controls.show_recording(bool(snapshot.recording))
+
+    def _left(self, _: viser.ClientHandle) -> None:
+        """Whoever comes after the last one has left finds the robot as it is."""
+        if not self.clients:
+            self._timeline.return_to_live()
+
+    def _draw(self, snapshot: Snapshot) -> None:
+        """Show what is."""
         alone = not self.clients
         if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
             return
@@ -78,8 +91,6 @@ class Page:
             self._plots.draw()
         if alone or self._frame % 4 == 0:
             self._tell(snapshot, None)
-            self._controls.show_virtual(snapshot.virtual)
-            self._controls.show_recording(bool(snapshot.recording))
 
     def _hold(self, snapshot: Snapshot, held_at: float) -> None:
         """Show what was, once."""

@@ -25,6 +25,10 @@ class Timeline:
             self._snapshots.clear()
         self._snapshots.append(snapshot)
 
+    def return_to_live(self) -> None:
+        """Stop looking back."""
+        self._ago.value = 0.0
+
     @property
     def held(self) -> tuple[Snapshot, float] | None:
         """What the page shall show in place of the newest, and at which time (s) it was held; None while it is live."""
