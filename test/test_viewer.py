@@ -127,10 +127,9 @@ def test_every_curve_has_a_range(page):
     assert len(ranges) == 4 and all(low is not None and high > low for low, high in ranges), ranges
 
 
-def test_a_control_bends_the_robot(page, robot):
+def test_a_control_bends_the_robot(browser, robot):
     end = time.monotonic() + PATIENCE
-    slider = page.locator("text=bend °").locator("xpath=ancestor::*[.//input][1]").locator("input").last
-    slider.fill("40")
+    browser.set_slider("bend °", 40)
     # An arc of 100 mm bent by 40 degrees ends 33.5 mm beside the axis.
     while robot.tip is None or np.hypot(*robot.tip[:2]) < 0.028:
         assert time.monotonic() < end, f"the tip is at {robot.tip}"

@@ -93,8 +93,13 @@ class Browser:
             raise BrowserError(f"the page cannot be turned back: {error.message.splitlines()[0]}") from error
 
     def picture(self) -> bytes:
-        """What is to be seen now, as PNG."""
-        return self.page.screenshot(timeout=self._timeout)
+        """What is to be seen now, as PNG. Raises BrowserError."""
+        from playwright.sync_api import Error
+
+        try:
+            return self.page.screenshot(timeout=self._timeout)
+        except Error as error:
+            raise BrowserError(f"no picture of the page: {error.message.splitlines()[0]}") from error
 
     def save(self, path: Path) -> None:
         """Write what is to be seen now."""
