@@ -57,25 +57,25 @@ class Ros2:
             case ["topic", "echo", name, "--field", field]:
                 return str(getattr(self._one(name), field))
             case ["param", "set", node, name, value]:
-                return self._set(node, name, float(value))
+                return self._set(node, name, yaml.safe_load(value))
             case ["param", "describe", node, name]:
-                return str(self._ask(DescribeParameters, f"{node}/describe_parameters", DescribeParameters.Request(names=[name])).descriptors[0])
+                return str(self.ask(DescribeParameters, f"{node}/describe_parameters", DescribeParameters.Request(names=[name])).descriptors[0])
             case ["lifecycle", "get", node]:
-                return self._ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
+                return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
             case ["lifecycle", "set", node, transition]:
                 return self._change(node, transition)
         raise AssertionError(f"nobody knows what {line} does")
 
     def state_of(self, node: str) -> str:
-        return self._ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
+        return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
 
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)
-        answer = self._ask(service, name, _filled(service.Request(), content))
+        answer = self.ask(service, name, _filled(service.Request(), content))
         assert answer.success, answer.message
         return answer
 
-    def _ask(self, service: type, name: str, request: object) -> object:
+    def ask(self, service: type, name: str, request: object) -> object:
         client = self._node.create_client(service, name)
         try:
             assert client.wait_for_service(PATIENCE), f"nobody serves {name}"
@@ -89,7 +89,7 @@ class Ros2:
     def _publish(self, kind: str, name: str, content: str) -> str:
         message = _filled(_interface(kind)(), content)
         publisher = self._node.create_publisher(type(message), name, 10)
-        self._until(lambda: publisher.get_subscription_count() > 0, f"nobody listens to {name}")
+        self.until(lambda: publisher.get_subscription_count() > 0, f"nobody listens to {name}")
         publisher.publish(message)
         assert publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=PATIENCE))
         self._node.destroy_publisher(publisher)
@@ -106,28 +106,31 @@ class Ros2:
         return heard[-1]
 
     def _listen(self, name: str, callback, done) -> None:
-        self._until(lambda: self._node.get_publishers_info_by_topic(name), f"nobody publishes {name}")
+        self.until(lambda: self._node.get_publishers_info_by_topic(name), f"nobody publishes {name}")
         (offer,) = self._node.get_publishers_info_by_topic(name)
         latched = offer.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT, durability=durability)
         subscription = self._node.create_subscription(_interface(offer.topic_type), name, callback, qos)
-        self._until(done, f"nothing came on {name}")
+        self.until(done, f"nothing came on {name}")
         self._node.destroy_subscription(subscription)
 
-    def _set(self, node: str, name: str, value: float) -> str:
-        value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
-        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
-        (result,) = self._ask(SetParameters, f"{node}/set_parameters", request).results
+    def _set(self, node: str, name: str, value: float | str) -> str:
+        if isinstance(value, str):
+            given = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+        else:
+            given = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=given)])
+        (result,) = self.ask(SetParameters, f"{node}/set_parameters", request).results
         assert result.successful, result.reason
         return "Set parameter successful"
 
     def _change(self, node: str, label: str) -> str:
         transition = getattr(Transition, f"TRANSITION_{label.upper()}")
-        assert self._ask(ChangeState, f"{node}/change_state", ChangeState.Request(transition=Transition(id=transition))).success
+        assert self.ask(ChangeState, f"{node}/change_state", ChangeState.Request(transition=Transition(id=transition))).success
         return "Transitioning successful"
 
-    def _until(self, done, what: str) -> None:
+    def until(self, done, what: str) -> None:
         end = time.monotonic() + PATIENCE
         while not done():
             assert time.monotonic() < end, what

@@ -53,7 +53,7 @@ class ImuEstimator(ManagedNode):
         self._reset_service = self.create_service(Trigger, "~/reset", self._on_reset)
         self._reset_bias_service = self.create_service(Trigger, "~/reset_bias", self._on_reset_bias)
         self._make_estimator()
-        self._heater = HeaterControl(self.parameters.heater)
+        self._heater = HeaterControl(self.parameters.heater, self._heater.ambient if hasattr(self, "_heater") else None)
 
     def activate(self) -> None:
         self._estimator.reset()
@@ -84,6 +84,9 @@ class ImuEstimator(ManagedNode):
         for timer in self._timers_active:
             self.destroy_timer(timer)
         self._heater_duty.publish(Float32(data=0.0))
+        # Latched: whoever comes later shall not take the last word for the present.
+        stopped = messages.header(self._stamp_ns, self.parameters.imu_frame)
+        self._status.publish(ImuStatus(header=stopped, code=ImuStatus.NO_DATA, message="not active"))
         self._save_bias_model()
 
     def cleanup(self) -> None:
@@ -101,7 +104,7 @@ class ImuEstimator(ManagedNode):
             self._make_estimator()
             self.get_logger().info("the filter starts anew with the changed parameters")
         if old.heater != new.heater:
-            self._heater = HeaterControl(new.heater)
+            self._heater = HeaterControl(new.heater, self._heater.ambient)
 
     def _make_estimator(self) -> None:
         mount = quat.from_roll_pitch_yaw(*self.robot_file.robot.imu_mount.rpy)

@@ -1,6 +1,8 @@
 """inverse_controller: the cable displacements that bring the modelled robot to its target, one programme a deformation."""
 
+import math
 import sys
+import time
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
@@ -15,6 +17,8 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 
 # People read the status; the loop does not. A change of the code is told at once.
 _STATUS_PERIOD = 0.1  # s
+_REFUSAL_SHOWN = 5.0  # s
+_INACTIVE = "not active, so nothing is sent: activate the node first"
 _LEVELS = {
     ControllerCode.INACTIVE: OK,
     ControllerCode.OK: OK,
@@ -47,6 +51,7 @@ class InverseController(ManagedNode):
         self._problem.reset()
         self._last_stamp: float | None = None
         self._told_code, self._told_at = None, 0.0
+        self._refusal, self._refused_at = "", -math.inf
         self._last_arrival = self.get_clock().now()
         self._inputs = [
             self.create_subscription(Deformation, "robot/deformation", self._on_deformation, SENSOR),
@@ -69,7 +74,10 @@ class InverseController(ManagedNode):
         self.destroy_publisher(self._status)
 
     def parameters_changed(self, old: InverseControllerParameters, new: InverseControllerParameters) -> None:
-        self._problem.options = new.inverse
+        if hasattr(self, "_problem"):
+            self._problem.options = new.inverse
+        if old.enabled != new.enabled:
+            self._enabled, self._relaxing = new.enabled, False
 
     def _straight(self) -> Target:
         return straight_target(
@@ -140,25 +148,34 @@ class InverseController(ManagedNode):
 
     def _take_target(self, header, make) -> None:
         if header.frame_id not in ("", self.parameters.frame):
-            self._say(
-                ControllerCode.REFUSED,
-                f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept",
-            )
+            self._refuse(f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept")
             return
         try:
             target = make()
             target.check_reach(self.robot_file.robot.length)
             self._target = target
         except TargetError as error:
-            self._say(ControllerCode.REFUSED, f"target refused: {error}; the last one is kept")
+            self._refuse(f"target refused: {error}; the last one is kept")
+
+    def _refuse(self, sentence: str) -> None:
+        """Say it long enough to be seen."""
+        self._refusal, self._refused_at = sentence, time.monotonic()
+        self.get_logger().warning(sentence, throttle_duration_sec=1.0)
+        self._say(ControllerCode.REFUSED, sentence)
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if not self.is_active:
+            response.message = _INACTIVE
+            return response
         self._enabled, self._relaxing = request.data, False
         response.success = True
         response.message = "compensating" if request.data else "no commands are sent; the motors hold"
         return response
 
     def _on_relax(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not self.is_active:
+            response.message = _INACTIVE
+            return response
         self._relaxing = True
         response.success, response.message = True, "paying the cables out until ~/enable is called"
         return response
@@ -166,16 +183,18 @@ class InverseController(ManagedNode):
     # Status.
 
     def _publish_status(self, command: Command, header) -> None:
-        self.report(_LEVELS.get(command.code, WARN), command.message, solve_time_us=round(1e6 * command.solve_time))
+        refused = time.monotonic() - self._refused_at < _REFUSAL_SHOWN
+        code, message = (ControllerCode.REFUSED, self._refusal) if refused else (command.code, command.message)
+        self.report(_LEVELS.get(code, WARN), message, solve_time_us=round(1e6 * command.solve_time))
         stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
-        if command.code == self._told_code and 0.0 <= stamp - self._told_at < _STATUS_PERIOD:
+        if code == self._told_code and 0.0 <= stamp - self._told_at < _STATUS_PERIOD:
             return
-        self._told_code, self._told_at = command.code, stamp
+        self._told_code, self._told_at = code, stamp
         self._status.publish(
             ControllerStatus(
                 header=header,
-                code=int(command.code),
-                message=command.message,
+                code=int(code),
+                message=message,
                 distance=float(command.distance),
                 lateral=float(command.lateral),
                 axial=float(command.axial),

@@ -160,7 +160,8 @@ class CanBridge(ManagedNode):
         snapshot, imu, link = driver.snapshot(), driver.imu.counters, driver.link.counters
         level = _LEVELS.get(snapshot.state, WARN)
         fault = driver.imu.fault
-        sentence = f"{snapshot.state.name.lower()}: {snapshot.message}" + (f"; {fault}" if fault else "")
+        state = f"{snapshot.state.name.lower()}: "
+        sentence = state + snapshot.message.removeprefix(state) + (f"; {fault}" if fault else "")
         self.report(
             max(level, WARN) if fault else level,
             sentence,

@@ -41,7 +41,7 @@ class ManagedNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._apply_change)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._level, self._sentence, self._values = OK, "starting", {}
+        self._level, self._sentence, self._values = WARN, "not configured", {}
         self.create_timer(1.0, self._publish_diagnostics)
 
     # Hooks.
@@ -94,11 +94,13 @@ class ManagedNode(LifecycleNode):
         result = self._attempt(self.configure)
         self._is_configured = result == TransitionCallbackReturn.SUCCESS
         if self._is_configured:
+            self.report(WARN, "configured, not active")
             _set_memory_aside()
         return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         super().on_activate(state)
+        self.report(OK, "active")
         result = self._attempt(self.activate)
         self.is_active = result == TransitionCallbackReturn.SUCCESS
         return result
@@ -107,15 +109,20 @@ class ManagedNode(LifecycleNode):
         self.is_active = False
         result = self._attempt(self.deactivate)
         super().on_deactivate(state)
+        if result == TransitionCallbackReturn.SUCCESS:
+            self.report(WARN, "not active")
         return result
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         self._is_configured = False
-        return self._attempt(self.cleanup)
+        result = self._attempt(self.cleanup)
+        if result == TransitionCallbackReturn.SUCCESS:
+            self.report(WARN, "not configured")
+        return result
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.shut_down()
-        self.finished = True
+        self.report(WARN, "shut down: end the process and start it again to use it")
         return TransitionCallbackReturn.SUCCESS
 
     def _attempt(self, step: Any) -> TransitionCallbackReturn:

@@ -24,7 +24,7 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
         value = given.get(leaf.key, leaf.default)
         if override is not None:
             # Checked here and not by rclpy, so that the error says what is allowed, and '1' is as good as '1.0'.
-            value = override.value
+            value = None if _is_unset(override.value, leaf) else override.value
             convert(value, leaf.type, leaf.parameter, source=f"parameter of {node.get_name()}", key=leaf.key)
         value = _ros_value(value, leaf.type)
         node.declare_parameter(leaf.key, value, _descriptor(leaf, value), ignore_override=True)
@@ -48,6 +48,8 @@ def read(node: Node, cls: type, changes: list[Parameter] = ()) -> Any:
         value = changed[leaf.key] if leaf.key in changed else node.get_parameter(leaf.key).value
         if value is not None and not isinstance(value, (bool, int, float, str)):
             value = list(value)
+        if _is_unset(value, leaf):
+            value = None
         *path, last = leaf.key.split(".")
         place = mapping
         for step in path:
@@ -64,6 +66,15 @@ def check_defaults(cls: type, defaults: dict, source: str) -> None:
         if key not in leaves:
             raise ConfigError(f"{source}: unknown key '{key}'; allowed: {', '.join(sorted(leaves))}")
         convert(value, leaves[key].type, leaves[key].parameter, source=source, key=key)
+
+
+def _is_unset(value: Any, leaf: DeclaredParameter) -> bool:
+    """Whether a parameter that may be unset is: `ros2 param dump` writes null, which comes back from a file and from `ros2 param load` as a word."""
+    return _may_be_unset(leaf) and value in (None, "null", "None")
+
+
+def _may_be_unset(leaf: DeclaredParameter) -> bool:
+    return type(None) in typing.get_args(leaf.type)
 
 
 def _flatten(mapping: dict, prefix: str = "") -> dict:
@@ -104,7 +115,7 @@ def _descriptor(leaf: DeclaredParameter, value: Any) -> ParameterDescriptor:
         additional_constraints=f"allowed: {declared.allowed()}",
         read_only=declared.read_only,
         # An unset or empty value tells ROS no type, so it may change; `read` checks it all the same.
-        dynamic_typing=value is None or value == [],
+        dynamic_typing=_may_be_unset(leaf) or value == [],
     )
     if leaf.type is float and (declared.minimum is not None or declared.maximum is not None):
         low = -1e308 if declared.minimum is None else float(declared.minimum)

@@ -1,5 +1,6 @@
 """A node's process: from the command line to a clean end under SIGINT and SIGTERM."""
 
+import gc
 import signal
 import sys
 
@@ -46,6 +47,7 @@ def run(node_class: type[ManagedNode], argv: list[str] | None = None) -> int:
             node.shut_down()
             node.destroy_node()
         rclpy.try_shutdown()
+        gc.unfreeze()  # what was set aside when the node was configured ends with it
     return 0
 
 

@@ -43,6 +43,16 @@ def test_a_fixed_target_is_kept_and_cut_to_what_is_allowed():
     assert HeaterControl(HeaterOptions(rise=60.0)).update(0, 20.0).target == 60.0
 
 
+def test_a_chip_that_is_still_warm_does_not_raise_the_target():
+    """Neither after a reset, nor in a new control of the same process, nor after a new start, however often."""
+    control = HeaterControl()
+    assert control.update(0, 20.0).target == 35.0
+    control.reset()
+    assert control.update(2 * SECOND, 35.0).target == 35.0
+    assert HeaterControl(ambient=control.ambient).update(0, 35.0).target == 35.0
+    assert HeaterControl().update(0, 35.0).target == HeaterControl().update(0, 45.0).target == 45.0
+
+
 def test_the_chip_renews_its_reading_only_every_1_28_s_in_steps_of_an_eighth():
     plant, readings = ThermalPlant(), []
     for _ in range(300):

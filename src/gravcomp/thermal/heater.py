@@ -1,7 +1,8 @@
 """Keeping the IMU at a temperature: target, PID at the rhythm of the chip's readings, ready flag, and faults that switch the heater off.
 
 The reading is renewed every 1.28 s only: the loop runs once a renewal, never on the repetitions between them. The target is fixed, or lies
-`rise` above the ambient, which is what the cold chip read first. A dead heater and over-temperature stay until `reset`; a dead
+`rise` above the ambient, which is what the cold chip read first. It is learned once, and never above `warmest_ambient`: after a new start the
+chip is still warm, and the target would climb each time. A dead heater and over-temperature stay until `reset`; a dead
 sensor and a bad reading end with the next good reading.
 """
 
@@ -22,6 +23,8 @@ class HeaterOptions:
     rise: float = parameter(15.0, unit="degC", minimum=0, maximum=60, description="target above the ambient, used where no target is given")
     target: float | None = parameter(None, unit="degC", minimum=0, maximum=65, description="fixed target; none: ambient + rise")
     ambient: float | None = parameter(None, unit="degC", minimum=-40, maximum=60, description="ambient; none: the first reading")
+    warmest_ambient: float = parameter(
+        30.0, unit="degC", minimum=0, maximum=60, description="a first reading above it is of a chip that is still warm, and counts as this")
     highest_target: float = parameter(60.0, unit="degC", minimum=0, maximum=65, description="a target above it is cut to it")
     over_temperature: float = parameter(70.0, unit="degC", minimum=20, maximum=105, description="heater off for good from here")
     largest_excess: float = parameter(15.0, unit="degC", minimum=3, maximum=60, description="heater off for good so far above the target")
@@ -64,13 +67,15 @@ class HeaterState:
 class HeaterControl:
     """Takes temperature readings by stamp, gives the duty; `check` tells when none comes any more."""
 
-    def __init__(self, options: HeaterOptions | None = None):
+    def __init__(self, options: HeaterOptions | None = None, ambient: float | None = None):
+        """`ambient` (degC): learned by an earlier control of the same chip. Attribute `ambient`: the learned one, None before."""
         self.options = options or HeaterOptions()
+        self.ambient = ambient
         self._pid = Pid(self.options.pid)
         self.reset()
 
     def reset(self) -> None:
-        """Forget faults, target and history."""
+        """Forget faults, target and history, but not the learned ambient."""
         self._pid.reset()
         self._target = math.nan
         self._temperature = math.nan
@@ -127,7 +132,9 @@ class HeaterControl:
         options = self.options
         if options.target is not None:
             return min(options.target, options.highest_target)
-        ambient = first if options.ambient is None else options.ambient
+        if self.ambient is None:
+            self.ambient = min(first, options.warmest_ambient)
+        ambient = self.ambient if options.ambient is None else options.ambient
         return min(ambient + options.rise, options.highest_target)
 
     def _watch_heater(self, stamp_ns: int) -> None:

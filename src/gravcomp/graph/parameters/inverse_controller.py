@@ -10,7 +10,7 @@ from gravcomp.inverse.options import InverseOptions
 class InverseControllerParameters:
     """What can be set on the node; the cables' limits are in the robot's file under `robot.limits`."""
 
-    enabled: bool = parameter(True, description="send commands from activation on, without ~/enable")
+    enabled: bool = parameter(True, description="send commands, as by ~/enable")
     hold_straight: bool = parameter(True, description="keep the robot straight until the first target comes")
     tip_position_weight: float = parameter(
         1.0, minimum=0.0, maximum=1e3, description="of a target that is a pose, and of the straight robot"

@@ -1,0 +1,125 @@
+"""Nodes as users of ros2cli meet them: lifecycle to its end, what is told of nodes that do not work, parameters out and in again."""
+
+import os
+import random
+import time
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="it starts nodes: ./gravcomp test")
+
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from ros2_line import Ros2  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+
+from gravcomp.launcher import NodeProcess, NodeSpec  # noqa: E402
+from gravcomp_msgs.msg import ControllerStatus, ImuStatus  # noqa: E402
+
+pytestmark = pytest.mark.timeout(300)
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Observer(Ros2):
+    """Also hears diagnostics and statuses."""
+
+    def __init__(self):
+        super().__init__()
+        self.diagnostics: dict[str, tuple[bytes, str]] = {}
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.diagnostics[status.name.lstrip("/")] = (status.level, status.message)
+
+    def listen(self, kind: type, topic: str) -> list:
+        """Messages of a latched topic, as they come; in another list each time."""
+        heard: list = []
+        self._node.create_subscription(kind, topic, heard.append, LATCHED)
+        return heard
+
+
+
+@pytest.fixture(scope="module")
+def observer():
+    before = os.environ.get("ROS_DOMAIN_ID")
+    os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(1, 100))
+    observer = Observer()
+    yield observer
+    observer.close()
+    os.environ.pop("ROS_DOMAIN_ID") if before is None else os.environ.update(ROS_DOMAIN_ID=before)
+
+
+@pytest.fixture
+def start(tmp_path, observer):
+    """Starts a node and waits until it answers."""
+    processes = []
+
+    def start(package: str, executable: str, **parameters) -> NodeProcess:
+        processes.append(NodeProcess(NodeSpec(package, executable, parameters), tmp_path / f"{executable}.log"))
+        observer.state_of(f"/{executable}")
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.stop()
+
+
+def test_a_node_that_is_shut_down_is_finalized_and_stays(start, observer):
+    process = start("gravcomp_estimation", "imu_estimator")
+    observer.run("ros2 lifecycle set /imu_estimator active_shutdown")
+    assert observer.state_of("/imu_estimator") == "finalized"
+    observer.until(lambda: "shut down" in observer.diagnostics.get("imu_estimator", (b"", ""))[1], "nothing is told of the end")
+    assert process.exit_code is None
+
+
+def test_diagnostics_tell_that_a_node_does_not_work(start, observer):
+    start("gravcomp_estimation", "imu_estimator")
+    for transition, said in (("deactivate", "not active"), ("cleanup", "not configured")):
+        observer.run(f"ros2 lifecycle set /imu_estimator {transition}")
+        observer.until(lambda said=said: observer.diagnostics.get("imu_estimator", (b"", ""))[1] == said, f"it is not said: {said}")
+        assert observer.diagnostics["imu_estimator"][0] == b"\x01"
+
+
+def test_whoever_comes_late_hears_that_the_estimator_is_not_active(start, observer):
+    start("gravcomp_estimation", "imu_estimator")
+    observer.run("ros2 lifecycle set /imu_estimator deactivate")
+    heard = observer.listen(ImuStatus, "imu/status")
+    observer.until(lambda: heard, "no latched status")
+    assert heard[-1].code == ImuStatus.NO_DATA and heard[-1].message == "not active"
+
+
+def test_a_controller_that_is_not_active_promises_nothing(start, observer):
+    start("gravcomp_fem", "inverse_controller")
+    observer.run("ros2 lifecycle set /inverse_controller deactivate")
+    for kind, name, request in ((SetBool, "enable", SetBool.Request(data=True)), (Trigger, "relax", Trigger.Request())):
+        answer = observer.ask(kind, f"/inverse_controller/{name}", request)
+        assert not answer.success and "not active" in answer.message
+    observer.run("ros2 lifecycle set /inverse_controller activate")
+    assert observer.ask(Trigger, "/inverse_controller/relax", Trigger.Request()).success
+
+
+def test_a_refused_target_is_told_in_the_log_as_well(start, observer, tmp_path):
+    start("gravcomp_fem", "inverse_controller")
+    heard = observer.listen(ControllerStatus, "controller/status")
+    observer.run("ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'")
+    observer.until(lambda: heard and heard[-1].code == ControllerStatus.REFUSED, "it is not refused")
+    assert "at most a full turn" in heard[-1].message
+    end = time.monotonic() + 10.0
+    while "at most a full turn" not in (log := (tmp_path / "inverse_controller.log").read_text()):
+        assert time.monotonic() < end, log
+        time.sleep(0.1)
+
+
+def test_what_is_dumped_of_parameters_that_are_unset_can_be_given_again(start, observer):
+    """`ros2 param dump` writes null for them."""
+    start("gravcomp_estimation", "imu_estimator", **{"heater.target": None, "heater.ambient": 21.0})
+    assert observer.state_of("/imu_estimator") == "active"
+    assert "successful" in observer.run("ros2 param set /imu_estimator heater.ambient None")
+
+
+def test_a_node_ends_without_complaints(start, observer, tmp_path):
+    process = start("gravcomp_fem", "inverse_controller")
+    process.stop()
+    assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text()
