@@ -119,7 +119,8 @@ class Viewer(ManagedNode):
                 tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
                 model=d.model, model_time=d.solve_time)  # fmt: skip
         if motors:
-            shown.update(motors_tension=np.array(motors.message.tension), motors_state=_MOTOR_STATES.get(motors.message.state, "?"))
+            shown.update(motors_tension=np.array(motors.message.tension), motors_state=_MOTOR_STATES.get(motors.message.state, "?"),
+                         motors_message=motors.message.message)  # fmt: skip
         if status:
             shown.update(status=status.message.message, status_level=_LEVELS.get(status.message.code, "warn"))
         if self._recorder and self._recorder.exit_code is not None:

@@ -173,6 +173,13 @@ def test_words_from_the_graph_cannot_become_markup(robot):
     assert "<b>" not in cables_html(snapshot, ("<b>",) * 6)
 
 
+def test_what_the_motors_do_stands_beside_what_the_model_says():
+    stopped = status_html(Snapshot(time=0.0, status="the target is kept", status_level="ok", motors_state="stopped", motors_message="no current <b>"))
+    assert "the target is kept" in stopped and "motors stopped: no current &lt;b&gt;" in stopped and "#ef4444" in stopped
+    assert "motors homing: winding in" in status_html(Snapshot(time=0.0, motors_state="homing", motors_message="homing: winding in"))
+    assert "motors" not in status_html(Snapshot(time=0.0, status="the target is kept"))
+
+
 def test_colours_of_tension_run_from_dark_to_bright():
     brightness = [sum(tension_colour(t)) for t in np.linspace(0.0, 1.0, 11)]
     assert all(a < b for a, b in zip(brightness, brightness[1:]))

@@ -27,7 +27,8 @@ class Snapshot:
     model: str = ""
     model_time: float = 0.0  # s, of one step of the model
     motors_tension: np.ndarray | None = None  # (m,) N, from the motors' currents
-    motors_state: str = ""
+    motors_state: str = ""  # of the bridge, as its message CableState names it, in small letters
+    motors_message: str = ""  # why
     truth: Backbone | None = None  # of the virtual robot
     target: TargetView | None = None
     status: str = ""  # the controller's sentence

@@ -7,14 +7,20 @@ from gravcomp.view import colours
 from gravcomp.view.snapshot import Snapshot
 
 _DOTS = {"ok": "#22c55e", "warn": "#f59e0b", "error": "#ef4444", "off": "#94a3b8"}
+_MOTORS = {"active": "ok", "inactive": "off", "unconfigured": "off", "stopped": "error", "fault": "error"}  # all else: warn
 _FIGURE = '<div style="flex:1"><div style="font-size:1.35em;font-weight:650;font-variant-numeric:tabular-nums">{}</div>' \
     '<div style="font-size:.74em;opacity:.68">{}</div></div>'  # fmt: skip
 
 
 def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
     """What the controller says, the errors, and how the graph runs; `held_at`: the time (s) from which one looks back, None when live."""
-    dot = _DOTS.get(snapshot.status_level, _DOTS["off"])
-    sentence = html.escape(snapshot.status or "waiting for the graph")
+    sentence = _sentence(_DOTS.get(snapshot.status_level, _DOTS["off"]), snapshot.status or "waiting for the graph", "status")
+    # The model keeps a target also while the motors stand: both have to be seen.
+    motors = ""
+    if snapshot.motors_state:
+        state = f"motors {snapshot.motors_state}: "
+        said = state + snapshot.motors_message.removeprefix(f"{snapshot.motors_state}: ")
+        motors = _sentence(_DOTS[_MOTORS.get(snapshot.motors_state, "warn")], said, "motors")
     figures = [
         (_mm(snapshot.tip_error), "tip to target, model"),
         (_mm(snapshot.true_tip_error), "tip to target, virtual robot"),
@@ -31,11 +37,17 @@ def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
         recording = f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">looking back: {held_at - snapshot.time:.1f} s ago</div>'
     return (
         f'<div data-time="{snapshot.time:.3f}" data-held-at="{"" if held_at is None else f"{held_at:.3f}"}" '
-        f'style="padding:.55em .9em .3em"><div style="display:flex;gap:.55em;align-items:baseline">'
-        f'<span style="flex:none;width:.68em;height:.68em;border-radius:50%;background:{dot};align-self:center"></span>'
-        f'<span data-gravcomp="status" style="font-size:.88em">{sentence}</span></div>'
+        f'style="padding:.55em .9em .3em">{sentence}{motors}'
         f'<div style="display:flex;gap:.8em;margin-top:.5em">{_row(figures)}</div>'
         f'<div style="display:flex;gap:.8em;margin-top:.35em">{_row(more)}</div>{recording}</div>'
+    )
+
+
+def _sentence(dot: str, sentence: str, name: str) -> str:
+    return (
+        '<div style="display:flex;gap:.55em;align-items:baseline">'
+        f'<span style="flex:none;width:.68em;height:.68em;border-radius:50%;background:{dot};align-self:center"></span>'
+        f'<span data-gravcomp="{name}" style="font-size:.88em">{html.escape(sentence)}</span></div>'
     )
 
 
