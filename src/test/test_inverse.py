@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from arc_robot import LENGTH, LIMITS, STATIONS, ArcRobot, effector
 
+from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Limits
 from gravcomp.inverse import (
     ControllerCode,
@@ -23,6 +24,7 @@ from gravcomp.inverse.limits import StepBounds
 from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.scaling import Programme, scaled, unscaled
 from gravcomp.inverse.solver import ProgrammeSolver
+from gravcomp.simulation import ShapeStatus, Simulator
 
 GRAVITY = 9.81
 
@@ -83,6 +85,20 @@ def test_bent_shape_is_reached_and_kept_while_gravity_turns():
     across -= across @ target.tip_direction * target.tip_direction
     assert np.linalg.norm(across) < 0.1e-3
     assert command.code == ControllerCode.OK
+
+
+@pytest.mark.parametrize("angle, plane", [(1.5, 0.0), (1.5, 0.7), (2.0, 1.57), (2.6, 0.4)])
+def test_a_bend_far_from_the_sagging_robot_is_reached(angle, plane):
+    """Against gravity and by more than a right angle: the way there is along the target's direction, not away from it."""
+    robot = load_robot_file("article").robot
+    simulator, control, target = Simulator(robot, reduced=False), InverseController(robot), bend_target(robot.length, angle, plane)
+    displacement = None
+    for _ in range(250):
+        shape = simulator.step([-GRAVITY, 0.0, 0.0], displacement)
+        assert shape.status == ShapeStatus.OK
+        command = control.step(shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension)
+        displacement = command.displacement
+    assert np.linalg.norm(shape.tip_position - target.tip_position) < 3e-3
 
 
 def test_backbone_weight_straightens_the_middle():
@@ -237,7 +253,9 @@ def test_weights_are_the_squares_of_the_rows():
         along = response.effector_free[6 + 9 : 6 + 12] - response.effector_free[6 + 6 : 6 + 9]
         axial = point @ along / np.linalg.norm(along)
         middle = 0.7 * (point @ point - 0.75 * axial**2)
-        return tip[:2] @ tip[:2] + 0.25 * tip[2] ** 2 + 1e-3 * np.sum((e[3:6] - [0, 0, 1]) ** 2) + middle
+        towards = response.effector_free[3:6]
+        along_target = (1.0 - 0.5 * (towards[2] / np.linalg.norm(towards)) ** 2) ** 2  # 0.25 for a tip that points there
+        return tip[:2] @ tip[:2] + along_target * tip[2] ** 2 + 1e-3 * np.sum((e[3:6] - [0, 0, 1]) ** 2) + middle
 
     tension = np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.1])
     x = tension / programme.scale

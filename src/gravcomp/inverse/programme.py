@@ -12,7 +12,8 @@ with M the roots of the weights, D the diagonal of W_aa, and c = trace(W_ea^T M^
 and rho numbers that suit any robot. The energy eps picks, among tensions of equal effect, those without cables that
 work against each other; the proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see
 `damping`). Of the errors of tip and backbone the part along the robot counts less, because cables only pull: they
-cannot make up for the length that they take.
+cannot make up for the length that they take. At the tip that is the part along the target's direction, less the more the tip still points
+elsewhere.
 """
 
 import math
@@ -112,7 +113,9 @@ def _weighted_errors(
     if tip_weight > 0.0:
         axis = tip_axis(effector, direction)
         jacobian[:3], offset[:3] = change[:3], free[:3] - tip
-        _weigh(jacobian[:3], offset[:3], axis, less, tip_weight)
+        # Along the target's direction means along the robot only where it points there: far from it, that is the way to go.
+        aligned = max(0.0, (axis * _unit(effector[3:6])).sum())
+        _weigh(jacobian[:3], offset[:3], axis, less * aligned * aligned, tip_weight)
         row = 3
     if direction_weight > 0.0:
         jacobian[row : row + 3], offset[row : row + 3] = change[3:6], free[3:6] - direction
