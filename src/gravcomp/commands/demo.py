@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         motion |= {"motion": "tilt", "hold": compensate_until}
     pictures = None
     if args.screenshots:
-        compensated = relax_time + 0.9 * (compensate_until - relax_time)
+        compensated = relax_time + 0.75 * (compensate_until - relax_time)  # before the base turns
         moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
         pictures = PagePictures(Path(args.screenshots), moments)
     graph = RobotGraph(args.robot, "udp_multicast", private_channel(), parameters={"virtual_robot": motion})
