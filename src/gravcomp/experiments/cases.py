@@ -96,8 +96,7 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
 
 def mean_errors(trace: Trace, target: Target) -> metrics.TipErrors:
     """The mean tip errors over a trace, as floats."""
-    errors = metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
-    return metrics.TipErrors(*(float(getattr(errors, name).mean()) for name in ("distance", "lateral", "axial", "tilt")))
+    return metrics.means(metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction))
 
 
 def pooled_recovery(outcomes: list[Outcome], *, at_rest: bool = True) -> float:

@@ -56,6 +56,16 @@ def tip_errors(position: np.ndarray, direction: np.ndarray, target_position: np.
     )
 
 
+def means(errors: TipErrors) -> TipErrors:
+    """Each error's mean over the course, as floats."""
+    return TipErrors(*(float(getattr(errors, name).mean()) for name in TipErrors.__dataclass_fields__))
+
+
+def inclination_deg(gravity: np.ndarray) -> float:
+    """Of the base, from gravity (3,) in soft_base: 0 where the robot's axis is horizontal, 90 where it points up."""
+    return float(np.degrees(np.arctan2(-gravity[2], np.hypot(gravity[0], gravity[1]))))
+
+
 def sag(backbone: np.ndarray, target: np.ndarray) -> np.ndarray:
     """(t, n) m: distance of the backbone points (t, n, 3) from those of the target (n, 3), across the target's curve: the length that
     pulling cables take from the robot is no sag."""

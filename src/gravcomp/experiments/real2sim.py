@@ -71,7 +71,7 @@ def run(context: Context) -> Result:
             ),
             Plot(
                 "Shapes",
-                _shapes([(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0]),
+                _shapes([(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0], setup.robot.length),
                 f"From the side, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the robot was let go. Grey the rest shape without"
                 " gravity, vermilion the virtual robot, blue the calibrated model's axis.",
             ),
@@ -122,10 +122,10 @@ def _fall_shapes(setup: Setup, robot: Robot, inclination: float, fall: Measured)
     return [(true[k][0], modelled[k].backbone_position @ base.T) for k in samples]
 
 
-def _shapes(falls: list[tuple[float, list]]) -> str:
+def _shapes(falls: list[tuple[float, list]], length: float) -> str:
     with Drawing(1, len(falls), width=11.5, height=3.4, squeeze=False) as drawing:
         for axes, (inclination, shapes) in zip(drawing.axes[0], falls):
-            straight = np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, 0.1], 9)
+            straight = np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, length], 9)
             draw_robot(axes, side_view(straight, base_orientation(np.radians(inclination))), REST, "rest shape", alpha=0.6)
             for k, (true, modelled) in enumerate(shapes):
                 draw_robot(axes, true[:, [0, 2]], REAL, "virtual robot" if k == 0 else None, alpha=0.45 + 0.55 * (k + 1) / len(shapes))

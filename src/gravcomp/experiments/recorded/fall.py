@@ -10,7 +10,7 @@ from gravcomp.calibration.measured import Measured
 from gravcomp.calibration.motion import STRAIGHT, predict_course
 from gravcomp.config import ConfigError
 from gravcomp.experiments.drawing import MODEL, REAL, Drawing
-from gravcomp.experiments.metrics import angle_between
+from gravcomp.experiments.metrics import angle_between, inclination_deg
 from gravcomp.experiments.recorded.run import RELEASED, Course, RecordedRun
 from gravcomp.experiments.result import Figure, Plot, Result, Table
 
@@ -39,7 +39,7 @@ def run(recorded: RecordedRun) -> Result:
     def worst(errors: list[np.ndarray], at_rest: bool) -> float:
         return max(float(e[rest].max() if at_rest else e.max()) for e, rest in zip(errors, rests))
 
-    inclinations = [float(np.degrees(np.arctan2(-g[2], np.hypot(g[0], g[1])))) for g in (fall.gravity[0] for fall in falls)]
+    inclinations = [inclination_deg(fall.gravity[0]) for fall in falls]
     return Result(
         name="real2sim",
         title="Real to simulation: free fall, recorded",

@@ -96,19 +96,16 @@ def _rest(course: Course, rows: np.ndarray) -> _Rest | None:
     )
     if not still:
         return None
-    errors = errors_of(window)
-    means = metrics.TipErrors(*(float(getattr(errors, name).mean()) for name in ("distance", "lateral", "axial", "tilt")))
-    return _Rest(rows, int(window.phase[0]), down.mean(axis=0), means)
+    return _Rest(rows, int(window.phase[0]), down.mean(axis=0), metrics.means(errors_of(window)))
 
 
 def _table(rests: list[_Rest]) -> Table:
     rows = []
     for rest in (r for r in rests if r.phase == HELD):
         before = [r for r in rests if r.phase == RELEASED and metrics.angle_between(r.down, rest.down) < _SAME_POSE]
-        inclination = float(np.degrees(np.arctan2(-rest.down[2], np.hypot(rest.down[0], rest.down[1]))))
         e = rest.errors
         without = f"{1e3 * before[-1].errors.distance:.2f}" if before else "–"
-        rows.append((f"{inclination:.0f}°", without, 1e3 * e.distance, 1e3 * e.lateral, 1e3 * e.axial, float(np.degrees(e.tilt))))
+        rows.append((f"{metrics.inclination_deg(rest.down):.0f}°", without, 1e3 * e.distance, 1e3 * e.lateral, 1e3 * e.axial, float(np.degrees(e.tilt))))
     header = ("inclination of the base", "tip error released, mm", "held, mm", "lateral, mm", "axial, mm", "tilt, deg")
     return Table("At rest", header, rows, "Released at the same direction of gravity, where the recording has that. 0°: the robot lies horizontally; 90°: it points up.")
 
