@@ -15,7 +15,8 @@ from gravcomp.inverse import TargetError, bend_target, straight_target
 from gravcomp.inverse.status import ControllerCode
 
 RELEASED, HELD, BETWEEN = 0, 1, 2
-_KEEPING = (ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE)
+# A refused target leaves the last one in force.
+_KEEPING = (ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE, ControllerCode.REFUSED)
 _RATE = 100.0  # Hz that are kept of the tip
 _WANTED = {
     "tip": Wanted(POSE, TIP_TOPICS),
