@@ -100,12 +100,16 @@ def test_a_controller_that_is_not_active_promises_nothing(start, observer):
     assert observer.ask(Trigger, "/inverse_controller/relax", Trigger.Request()).success
 
 
-def test_a_refused_target_is_told_in_the_log_as_well(start, observer, tmp_path):
+def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tmp_path):
+    """Also while there is no deformation to follow, which the controller says several times a second."""
     start("gravcomp_fem", "inverse_controller")
     heard = observer.listen(ControllerStatus, "controller/status")
+    observer.until(lambda: heard and heard[-1].code == ControllerStatus.STALE, "it does not say that nothing comes")
     observer.run("ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'")
-    observer.until(lambda: heard and heard[-1].code == ControllerStatus.REFUSED, "it is not refused")
-    assert "at most a full turn" in heard[-1].message
+    begin = time.monotonic()
+    observer.until(lambda: "at most a full turn" in heard[-1].message, "it is not refused")
+    observer.until(lambda: time.monotonic() > begin + 2.0, "")
+    assert heard[-1].code == ControllerStatus.STALE and "at most a full turn" in heard[-1].message
     end = time.monotonic() + 10.0
     while "at most a full turn" not in (log := (tmp_path / "inverse_controller.log").read_text()):
         assert time.monotonic() < end, log

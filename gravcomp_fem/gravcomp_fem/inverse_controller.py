@@ -65,6 +65,7 @@ class InverseController(ManagedNode):
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
         self.destroy_timer(self._watch)
+        self._refused_at = -math.inf
         self._say(ControllerCode.INACTIVE, "not active")
 
     def cleanup(self) -> None:
@@ -183,8 +184,7 @@ class InverseController(ManagedNode):
     # Status.
 
     def _publish_status(self, command: Command, header) -> None:
-        refused = time.monotonic() - self._refused_at < _REFUSAL_SHOWN
-        code, message = (ControllerCode.REFUSED, self._refusal) if refused else (command.code, command.message)
+        code, message = self._with_refusal(command.code, command.message)
         self.report(_LEVELS.get(code, WARN), message, solve_time_us=round(1e6 * command.solve_time))
         stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
         if code == self._told_code and 0.0 <= stamp - self._told_at < _STATUS_PERIOD:
@@ -203,7 +203,16 @@ class InverseController(ManagedNode):
             )
         )
 
+    def _with_refusal(self, code: ControllerCode, sentence: str) -> tuple[ControllerCode, str]:
+        """What is told: a refusal stays for a while, also beside the reason why no command is sent, which comes again and again."""
+        if time.monotonic() - self._refused_at > _REFUSAL_SHOWN or self._refusal in sentence:
+            return code, sentence
+        if code in (ControllerCode.STALE, ControllerCode.INACTIVE, ControllerCode.SOLVER_FAILED):
+            return code, f"{sentence}; {self._refusal}"
+        return ControllerCode.REFUSED, self._refusal
+
     def _say(self, code: ControllerCode, sentence: str, header=None) -> None:
+        code, sentence = self._with_refusal(code, sentence)
         status = ControllerStatus(code=int(code), message=sentence)
         status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
         self._told_code = None

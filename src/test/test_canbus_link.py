@@ -112,6 +112,11 @@ def test_a_receiver_that_is_held_up_for_0_1_s_loses_no_frame_and_knows_when_each
     a.close(), b.close()
 
 
+def test_a_private_channel_is_given_once():
+    """The kernel gives free ports at random: of 400, three would be found twice if none were taken."""
+    assert len({private_channel() for _ in range(400)}) == 400
+
+
 def test_runs_on_private_channels_do_not_hear_each_other():
     a, b = (CanLink(CanInterface(channel=private_channel())) for _ in range(2))
     a.open(), b.open()

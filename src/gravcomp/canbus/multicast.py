@@ -23,6 +23,7 @@ _SO_TIMESTAMPNS = 35
 _TIMESPEC = struct.Struct("@ll")
 _SO_RCVBUFFORCE = 33
 _RECEIVE_BUFFER = 1 << 20  # bytes: some 2500 frames, 0.7 s of full traffic
+_TAKEN: list[socket.socket] = []  # the ports of private_channel
 
 
 class LoopbackMulticastBus(can.BusABC):
@@ -135,10 +136,14 @@ def enlarge_receive_buffer(receiver: socket.socket) -> None:
 
 
 def private_channel() -> str:
-    """A channel that no other run on this host uses: a group of its own and a port that is free now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    """A channel that no other run on this host uses: a group of its own, and a port that is taken for as long as this process lives.
+
+    The port is kept on 127.0.0.1, where no bus listens, so that the kernel gives it to nobody else.
+    """
+    probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    probe.bind(("127.0.0.1", 0))
+    _TAKEN.append(probe)
+    port = probe.getsockname()[1]
     return f"239.74.{port >> 8}.{port & 0xFF}:{port}"
 
 
