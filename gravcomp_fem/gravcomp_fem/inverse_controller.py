@@ -113,6 +113,7 @@ class InverseController(ManagedNode):
                 backbone_station=message.backbone_station,
                 tension=message.cable_tension,
                 interval=interval,
+                followed=message.status != Deformation.NOT_CONVERGED,
             )
         else:
             self._say(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header)

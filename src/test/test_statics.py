@@ -145,6 +145,33 @@ def test_an_equilibrium_that_is_not_there_is_searched_for_less_and_less(monkeypa
     assert back.status == ShapeStatus.OK and back.tip_position == pytest.approx(held.tip_position, abs=1e-6)
 
 
+def test_an_equilibrium_lost_by_a_small_step_is_not_searched_for_at_once(monkeypatch):
+    """Whoever took the step can take it back; a search would hold up the loop for a second."""
+    simulator = Simulator(load_robot_file("article").robot, reduced=False)
+    gravity, wound = [0.0, 0.0, -G], np.array([5.0, 0.0, 0.0, 0.0, 0.0, 0.0]) * 1e-3
+    held = simulator.solve(gravity, wound)
+    assert held.is_equilibrium
+    searches = []
+    monkeypatch.setattr(simulator.solver, "solve", lambda *a: searches.append(1) or simulator.solver.state)
+    monkeypatch.setattr(simulator.solver, "track", lambda *a: dataclasses.replace(simulator.solver.state, converged=False))
+    lost = [simulator.step(gravity, wound + 1e-4) for _ in range(45)]
+    assert not searches and not any(shape.is_equilibrium for shape in lost)
+    assert lost[-1].tip_position == pytest.approx(held.tip_position)
+    for _ in range(10):
+        simulator.step(gravity, wound + 1e-4)
+    assert len(searches) == 1
+    simulator.reset()
+    simulator.step(gravity, wound)
+    assert len(searches) == 2  # from the straight robot it is a jump
+
+
+def test_an_iterate_that_is_no_number_is_not_the_end():
+    """Under the whole load at once Newton's method crushes an element; in parts it comes through."""
+    robot = load_robot_file("article").robot.with_material(law="neo_hookean")
+    shape = Simulator(robot, reduced=False).step([0.0, 0.0, -G], np.array([20.0, 0.0, 0.0, 20.0, 0.0, 20.0]) * 1e-3)
+    assert shape.status == ShapeStatus.OK and shape.residual < 1e-6
+
+
 def test_a_payload_is_carried(simulator):
     robot = dataclasses.replace(simulator.robot, payload=Payload(0.002))
     loaded = Simulator(robot, reduced=False)

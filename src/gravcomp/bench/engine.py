@@ -35,6 +35,7 @@ def run(progress: Progress, *, every: int = 1) -> dict:
         **full_step(progress),
         **engine_control.reduced_model(progress, every),
         **engine_control.compensation(progress, every),
+        **engine_control.extreme_targets(progress, every),
         **tet4_step(progress, every),
         **scaling(progress, every),
         **dynamics(progress),

@@ -1,12 +1,13 @@
 """The reduced model and the inverse problem: cost of a closed-loop step, error against the full model, what
 compensation leaves."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 
 from gravcomp.description import Robot, load_robot_file
-from gravcomp.inverse import Command, InverseController, Target, straight_target
+from gravcomp.inverse import Command, InverseController, Target, bend_target, straight_target
 from gravcomp.reduction import build, load
 from gravcomp.reduction.motion import ReducedDynamicSolver
 from gravcomp.simulation import RobotModel, Shape, Simulator
@@ -85,19 +86,40 @@ def compensation(progress: Progress, every: int = 1) -> dict:
     }
 
 
-def closed_loop(simulator: Simulator, gravities, target: Target):
-    """Yields shape and command of each step of the loop, from the released robot."""
+def extreme_targets(progress: Progress, every: int = 1) -> dict:
+    """Targets that no shape has, or that only a robot bent right round has, each for 6 s, then the straight one for 6 s more:
+    `extreme_step_ms`, the longest step of the model; `extreme_back_mm`: worst distance of the tip from where it was when the robot was
+    held straight from the start."""
+    robot = load_robot_file("article").robot
+    simulator, straight = Simulator(robot), straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
+    targets = [bend_target(robot.length, angle, 0.7 * k) for k, angle in enumerate((2.6, 3.5, 4.5, 5.5, 6.2))]
+    targets += [Target(robot.length * np.array(tip)) for tip in ([0.0, 0.0, 0.0], [0.0, 0.2, -0.5], [0.9, 0.0, 0.0], [0.0, 0.0, 1.4])]
+    longest, distances, steps = 0.0, [], int(6 * _RATE)
+    for number, target in list(enumerate(targets))[::every]:
+        for gravity in _GRAVITY * np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]):
+            progress(f"extreme targets, {number + 1} of {len(targets)}")
+            *_, (held, _) = closed_loop(simulator, [gravity] * steps, straight)
+            loop = list(closed_loop(simulator, [gravity] * (2 * steps), [target] * steps + [straight] * steps))
+            longest = max(longest, max(shape.solve_time for shape, _ in loop))
+            distances.append(np.linalg.norm(loop[-1][0].tip_position - held.tip_position))
+    return {"extreme_step_ms": round(1e3 * longest, 1), "extreme_back_mm": round(1e3 * float(max(distances)), 3)}
+
+
+def closed_loop(simulator: Simulator, gravities, target: "Target | list[Target]"):
+    """Yields shape and command of each step of the loop, from the released robot; one target, or one a step."""
+    targets = itertools.repeat(target) if isinstance(target, Target) else target
     controller = InverseController(simulator.robot)
     simulator.reset()
     displacement = None
-    for gravity in gravities:
+    for gravity, wanted in zip(gravities, targets):
         shape = simulator.step(gravity, displacement)
         command = controller.step(
             shape.response,
-            target,
+            wanted,
             backbone_station=shape.backbone_station,
             tension=shape.cable_tension,
             interval=1.0 / _RATE,
+            followed=shape.is_equilibrium,
         )
         displacement = command.displacement
         yield shape, command

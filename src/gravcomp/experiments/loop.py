@@ -187,6 +187,7 @@ class ClosedLoop:
             backbone_station=shape.backbone_station,
             tension=shape.cable_tension,
             interval=SAMPLE_PERIOD,
+            followed=shape.is_equilibrium,
         )
         return command.displacement, command.tension
 

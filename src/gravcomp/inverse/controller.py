@@ -3,7 +3,7 @@
 Each step is one Gauss-Newton iteration of the inverse problem around the state that the model has reached under the
 last command: build the programme, solve it, turn its tensions into displacements, hold those to the limits and judge
 the result. The model takes the displacements with the next sample of gravity, so the iteration runs in the closed loop
-itself.
+itself. Where it does not lead on, see `retreat`.
 """
 
 import time
@@ -18,6 +18,7 @@ from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.limits import held_within, limits_met, within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, judge
@@ -42,6 +43,7 @@ class InverseController:
         self.options = options
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
+        self._retreat = Retreat(robot.length)
         self.reset()
 
     def reset(self, displacement: np.ndarray | None = None) -> None:
@@ -49,6 +51,8 @@ class InverseController:
         the next step."""
         self._solver.reset()
         self._damping = StepDamping()
+        self._retreat.reset()
+        self._followed: np.ndarray | None = None  # the last command that the model followed
         self._displacement = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
 
@@ -60,11 +64,13 @@ class InverseController:
         backbone_station: np.ndarray,
         tension: np.ndarray | None = None,
         interval: float = 0.01,
+        followed: bool = True,
     ) -> Command:
         """The command that brings the modelled robot nearest to the target.
 
         backbone_station (n,): stations of the response's backbone rows; tension (m,) N: present tensions of the model
-        (None: those of the last command); interval (s): since the last step. Never raises for a hard problem: see the
+        (None: those of the last command); interval (s): since the last step; followed: whether the model's shape is its equilibrium under
+        the last command, False where it found none and stayed. Never raises for a hard problem: see the
         command's code.
         """
         started = time.perf_counter()
@@ -74,6 +80,12 @@ class InverseController:
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
+        move = self._retreat.move(followed, target, _tip(response, tension), tension)
+        if followed:
+            self._followed = self._displacement
+            interval *= self._retreat.stride
+        if move != Move.ONWARD:
+            return self._retreated(move, followed, response, target, previous, tension, interval, started)
         try:
             programme = build_programme(
                 response,
@@ -111,6 +123,9 @@ class InverseController:
             target.direction_or_zeros,
         )
         self._damping.observe(along, lengths)
+        self._retreat.observe(displacement - previous, interval)
+        if self._retreat.stride < 1.0:
+            met[0] = False  # it is not the motors that hold it back
         missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
         code, message = judge(
             target=target, points_missed=missed, tilt=errors.tilt, met=met if any_met else None, names=self._names, options=options
@@ -128,15 +143,55 @@ class InverseController:
             solve_time=time.perf_counter() - started,
         )
 
+    def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
+        """Displacements (m,) on the way from `previous` (m,) to those (m,) of cables that carry nothing."""
+        return within_limits(free - self.options.slack, previous, self.robot.limits, interval)
+
+    def _retreated(
+        self,
+        move: Move,
+        followed: bool,
+        response: "Response",
+        target: Target,
+        previous: np.ndarray,
+        tension: np.ndarray,
+        interval: float,
+        started: float,
+    ) -> Command:
+        """The command of a move that does not lead to the target."""
+        if move == Move.BACK and self._followed is not None:
+            displacement = within_limits(self._followed, previous, self.robot.limits, interval)
+            code, message = ControllerCode.UNREACHABLE, "the model finds no equilibrium on the way to the target: the last shape is kept"
+        else:
+            # Where the equilibria end, the linear answer tells little of where the cables would be free; on the straight robot they are at 0.
+            free = response.displacement_free if followed else np.minimum(response.displacement_free, 0.0)
+            displacement = self._paid_out(free, previous, interval)
+            code = ControllerCode.RELAXING
+            if followed:
+                message = "no way leads on to the target: paying the cables out, to try it from a shape nearer to rest"
+            else:
+                message = "the model finds no equilibrium: paying the cables out"
+        self._displacement, self._tension = displacement, tension
+        self._damping = StepDamping()  # of steps from elsewhere
+        effector = response.compliance_ea @ tension + response.effector_free
+        return Command(
+            displacement,
+            tension,
+            code,
+            message,
+            time.perf_counter() - started,
+            *tip_errors(effector, target.tip_position, target.direction_or_zeros),
+        )
+
     def relax(self, response: "Response", *, interval: float = 0.01) -> Command:
         """Pay the cables out, at the rates allowed, until none of them carries any tension."""
         started = time.perf_counter()
-        free = response.displacement_free - self.options.slack
-        previous = free if self._displacement is None else self._displacement
+        free = response.displacement_free
+        previous = free - self.options.slack if self._displacement is None else self._displacement
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
-        displacement = within_limits(free, previous, self.robot.limits, interval)
+        displacement = self._paid_out(free, previous, interval)
         self.reset(displacement)
-        relaxed = bool(np.all(displacement <= free + 1e-6))
+        relaxed = bool(np.all(displacement <= free - self.options.slack + 1e-6))
         return Command(
             displacement=displacement,
             tension=np.zeros(free.size),
@@ -144,6 +199,11 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
+
+
+def _tip(response: "Response", tension: np.ndarray) -> np.ndarray:
+    """(3,) position of the tip under the tensions (m,)."""
+    return response.compliance_ea[:3] @ tension + response.effector_free[:3]
 
 
 @njit(cache=True)

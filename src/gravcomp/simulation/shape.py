@@ -51,6 +51,11 @@ class Shape:
     message: str = ""
 
     @property
+    def is_equilibrium(self) -> bool:
+        """False where none was found for the load: this is the last one then."""
+        return self.status in (ShapeStatus.OK, ShapeStatus.FALLBACK)
+
+    @property
     def tip_direction(self) -> np.ndarray:
         """(3,) unit vector along the robot at its tip."""
         x, y, z, w = self.tip_orientation

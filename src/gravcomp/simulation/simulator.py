@@ -11,6 +11,7 @@ from gravcomp.description import Robot
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation.model import RobotModel
 from gravcomp.simulation.observation import observe
+from gravcomp.simulation.search_pace import SearchPace
 from gravcomp.simulation.shape import Response, Shape, ShapeStatus
 from gravcomp.simulation.statics import CableInput, Equilibrium, StaticSolver
 
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
 
 # Green's strain in compression from which on St. Venant-Kirchhoff's stress falls.
 _SOFTENING = -1.0 / 3.0
-# Steps from one vain search for an equilibrium to the next, the first and the longest pause; in between the last shape is kept. A search
-# takes a second, in which a controller would hear nothing that leads away from where there is no equilibrium.
-_FIRST_PAUSE, _LONGEST_PAUSE = 50, 3200
 
 
 class Simulator:
@@ -35,7 +33,7 @@ class Simulator:
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
-        self._pause = self._until_search = 0
+        self._pace = SearchPace(self.model.length)
         reduction = load(self.model) if reduced else None
         self._serving = reduction and ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
 
@@ -54,7 +52,7 @@ class Simulator:
     def reset(self) -> None:
         """Back to the straight robot."""
         self.solver.reset()
-        self._pause = self._until_search = 0
+        self._pace.reset()
         if self._serving:
             self._serving.reset()
 
@@ -62,7 +60,7 @@ class Simulator:
         self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None
     ) -> Shape:
         """Follow the equilibrium, starting from the last shape: for small changes, a control step apart. Where it is lost it is
-        searched for from the straight robot, in vain less and less often: else the last shape is returned, NOT_CONVERGED.
+        searched for from the straight robot, now and then (see `SearchPace`): else the last shape is returned, NOT_CONVERGED.
 
         gravity (3,) in m/s^2; displacement (m,) in m, pulled in is positive, NaN for a released cable; or tension (m,) in
         N; neither: all cables released. Raises ValueError for wrong lengths and numbers that are not finite.
@@ -71,16 +69,17 @@ class Simulator:
         gravity, cables = self.checked(gravity, displacement, tension)
         shape = self._serving.step(gravity, cables) if self._serving else None
         if shape is not None:
+            self._pace.found(gravity, cables)
             return shape
         before = self.solver.state
         state = self.solver.track(gravity, cables)
         if not state.converged:
-            if self._may_search():
+            if self._pace.may_search(gravity, cables):
                 state = self.solver.solve(gravity, cables)
             else:
                 state = dataclasses.replace(before, residual=state.residual, converged=False, carried=1.0)
         if state.converged:
-            self._pause = self._until_search = 0
+            self._pace.found(gravity, cables)
         else:
             self.solver.state = before
         shape = self._shape(state, gravity, started)
@@ -100,17 +99,12 @@ class Simulator:
         gravity, cables = self.checked(gravity, displacement, tension)
         self.solver.reset()
         state = self.solver.solve(gravity, cables)
+        self._pace.reset()
+        if state.converged:
+            self._pace.found(gravity, cables)
         if self._serving:
             self._serving.follow(state, gravity, cables)
         return self._shape(state, gravity, started)
-
-    def _may_search(self) -> bool:
-        """Whether it is time to search for an equilibrium that is lost."""
-        self._until_search -= 1
-        if self._until_search > 0:
-            return False
-        self._pause = self._until_search = min(max(2 * self._pause, _FIRST_PAUSE), _LONGEST_PAUSE)
-        return True
 
     def checked(
         self, gravity: np.ndarray, displacement: np.ndarray | None, tension: np.ndarray | None

@@ -16,6 +16,7 @@ resists less and less from a stretch of 1 / sqrt(3) down (E = -1/3), so that a r
 """
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -186,6 +187,8 @@ class StaticSolver:
         y, state.answer = solved[:, 0], solved[:, 1:]
         state.compliance = jacobian @ state.answer + np.diag(model.tendons.axial_compliance)
         free = state.tendons.displacement + jacobian @ y
+        if not math.isfinite(state.compliance.sum() + free.sum()):
+            return None
         tension = cables.tensions(state.compliance, free, state.tension > 0.0)
         step, change = y + state.answer @ tension, tension - state.tension
         size = np.abs(step).max()

@@ -53,10 +53,15 @@ def _reached(simulator, gravity: np.ndarray, target, direction):
     before = shape.tip_position
     for _ in range(2000):
         command = controller.step(
-            shape.response, wanted, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02
+            shape.response,
+            wanted,
+            backbone_station=shape.backbone_station,
+            tension=shape.cable_tension,
+            interval=0.02,
+            followed=shape.is_equilibrium,
         )
         shape = simulator.step(gravity, command.displacement)
-        if np.linalg.norm(shape.tip_position - before) < 1e-8:
+        if shape.is_equilibrium and np.linalg.norm(shape.tip_position - before) < 1e-8:
             break
         before = shape.tip_position
     return shape, command
