@@ -6,7 +6,7 @@ the corner may end at a distance that is the least nearby without being small.
 - A command that the model could not follow is taken back. The next strides are shorter, as in a trust-region method, and grow with each
   command that is followed: the robot comes to rest where the equilibria end.
 - Where the model does not follow that either, its cables are paid out, which takes load from it.
-- Where strides have become short, or nothing moves any more, far from a target that the straight robot is nearer to, the cables are paid
+- Where the model was lost several times, or nothing moves any more, far from a target that the straight robot is nearer to, the cables are paid
   out until half of the tension is gone, and the target is tried from there: another way may lead to it. Then a quarter, then all;
   a target that is new is tried anew.
 """
@@ -18,7 +18,8 @@ import numpy as np
 from gravcomp.inverse.target import Target
 
 _SHORTER, _LONGER = 0.25, 1.05
-_LEAST_STRIDE, _SHORT_STRIDE = 1.0 / 256.0, 1.0 / 64.0
+_LEAST_STRIDE = 1.0 / 256.0
+_LOST_TIMES = 3
 # Nothing moves: no cable is faster than this for so many steps.
 _SLOW = 2e-3  # m/s
 _STILL_STEPS = 20
@@ -45,7 +46,7 @@ class Retreat:
     def reset(self) -> None:
         """Forget the past."""
         self.stride = 1.0
-        self._lost = self._still = self._tries = 0
+        self._lost = self._lost_times = self._still = self._tries = 0
         self._until: float | None = None  # N, of the largest tension, while cables are paid out for another try
         self._target: Target | None = None
 
@@ -53,11 +54,12 @@ class Retreat:
         """The next move. followed: whether the model reached an equilibrium under the last command; tip (3,) m and tension (m,) N of
         its present shape."""
         if not _same(target, self._target):
-            self._target, self._tries, self._still, self._until = target, 0, 0, None
+            self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
         if not followed:
             self._lost += 1
+            self._lost_times += self._lost == 1
             self.stride = max(_SHORTER * self.stride, _LEAST_STRIDE)
-            if self.stride <= _SHORT_STRIDE:
+            if self._lost_times >= _LOST_TIMES:
                 self._try_again(tip, tension)
             return Move.BACK if self._lost == 1 else Move.PAY_OUT
         self._lost = 0
@@ -84,6 +86,7 @@ class Retreat:
         if self._until is None and self._tries < len(_SHARES) and asked and nearer_straight and missed > _FAR * self._length:
             self._until = max(_SHARES[self._tries] * tension.max(), _NO_TENSION)
             self._tries += 1
+            self._lost_times = 0
 
 
 def _same(target: Target, other: Target | None) -> bool:
