@@ -153,7 +153,7 @@ def test_an_equilibrium_lost_by_a_small_step_is_not_searched_for_at_once(monkeyp
     assert held.is_equilibrium
     searches = []
     monkeypatch.setattr(simulator.solver, "solve", lambda *a: searches.append(1) or simulator.solver.state)
-    monkeypatch.setattr(simulator.solver, "track", lambda *a: dataclasses.replace(simulator.solver.state, converged=False))
+    monkeypatch.setattr(simulator.solver, "track", lambda *a, **k: dataclasses.replace(simulator.solver.state, converged=False))
     lost = [simulator.step(gravity, wound + 1e-4) for _ in range(45)]
     assert not searches and not any(shape.is_equilibrium for shape in lost)
     assert lost[-1].tip_position == pytest.approx(held.tip_position)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # Green's strain in compression from which on St. Venant-Kirchhoff's stress falls.
 _SOFTENING = -1.0 / 3.0
+_MORE_ITERATIONS = 12
 
 
 class Simulator:
@@ -73,6 +74,9 @@ class Simulator:
             return shape
         before = self.solver.state
         state = self.solver.track(gravity, cables)
+        if not state.converged:
+            # More steps settle what is near; where the stiffness does not carry, nothing is.
+            state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True)
         if not state.converged:
             if self._pace.may_search(gravity, cables):
                 state = self.solver.solve(gravity, cables)

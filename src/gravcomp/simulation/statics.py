@@ -29,6 +29,8 @@ from gravcomp.simulation.model import RobotModel
 _CRUSHED = 0.1
 # Steps below this part of the tolerance are what arithmetic leaves, and do not shrink any more.
 _ROUNDING = 1e-3
+# A step below this part of it is the last, whatever the next ones would be: they may sum up to ten times as much.
+_SHORT = 0.1
 # A factor serves again up to this displacement from where it was made, as a fraction of the length, and while each correction is at
 # most this part of the one before.
 _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
@@ -102,10 +104,13 @@ class StaticSolver:
             u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons
         )
 
-    def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, exact: bool = False) -> Equilibrium:
+    def track(
+        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, exact: bool = False, stable: bool = False
+    ) -> Equilibrium:
         """Follow the equilibrium from the current state; `converged` tells whether it was reached.
 
-        `exact` asks for a thousandth of the tolerance and for factors of this shape's own, for shapes and answers to compare with.
+        `exact` asks for a thousandth of the tolerance and for factors of this shape's own, for shapes and answers to compare with. `stable`
+        gives up where the tangent is not positive definite.
         """
         previous = self.state
         if exact:
@@ -115,7 +120,7 @@ class StaticSolver:
         weight = self.model.weight(gravity)
         origin, finer = None, 1e-3 if exact else 1.0
         while not state.converged and state.iterations < iterations:
-            origin = self._newton(state, weight, cables, origin, finer * self.tolerance)
+            origin = self._newton(state, weight, cables, origin, finer * self.tolerance, stable)
             if origin is None:
                 self._measure(state, weight)
                 break
@@ -161,7 +166,7 @@ class StaticSolver:
         self._pulling = np.where(np.abs(change) > 1e-9, np.sign(change), self._pulling)
 
     def _newton(
-        self, state: Equilibrium, weight: np.ndarray, cables: CableInput, origin: np.ndarray | None, tolerance: float
+        self, state: Equilibrium, weight: np.ndarray, cables: CableInput, origin: np.ndarray | None, tolerance: float, stable: bool
     ) -> np.ndarray | None:
         """One damped Newton step of `state` with the corrections its factor allows.
 
@@ -174,7 +179,7 @@ class StaticSolver:
             again, force, exact = True, model.elements.internal_force(state.u), True
         else:
             try:
-                factor, force, exact = self._factor(state, origin)
+                factor, force, exact = self._factor(state, origin, stable)
             except NotPositiveDefinite:
                 return None
             again = False
@@ -229,6 +234,8 @@ class StaticSolver:
                 state.converged = True
                 break
             size, corrected = length, True
+        # A tangent that is not quite that of the forces (corotational elements) gives steps that shrink slowly; these are short enough.
+        state.converged |= exact and damping == 1.0 and size < _SHORT * tolerance
         return start
 
     def _kept_factor(self, state: Equilibrium) -> BlockCholesky | None:
@@ -251,14 +258,15 @@ class StaticSolver:
         tension = cables.tensions(state.compliance, free - shift, state.tension > 0.0)
         return y + state.answer @ (tension - state.tension), tension
 
-    def _factor(self, state: Equilibrium, origin: np.ndarray | None) -> tuple[BlockCholesky, np.ndarray, bool]:
+    def _factor(self, state: Equilibrium, origin: np.ndarray | None, stable: bool) -> tuple[BlockCholesky, np.ndarray, bool]:
         """The factorised tangent, the internal forces, and whether the tangent is exact.
 
-        Where it is not positive definite, a multiple of the identity is added: the step goes downhill still, but its
+        Where it is not positive definite, a multiple of the identity is added unless `stable`: the step goes downhill still, but its
         length no longer tells how far the equilibrium is.
         """
         self._kept = None  # its place is taken
-        for shift in (0.0, *(self._stiffness * 10.0**power for power in range(-6, 1))):
+        shifts = () if stable else (self._stiffness * 10.0**power for power in range(-6, 1))
+        for shift in (0.0, *shifts):
             self._matrix.values[:] = 0.0
             force = self.model.elements.assemble(state.u, self._matrix, origin=origin)
             if state.tension.any():
