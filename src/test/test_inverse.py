@@ -22,6 +22,7 @@ from gravcomp.inverse import (
 )
 from gravcomp.inverse.limits import StepBounds
 from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.inverse.scaling import Programme, scaled, unscaled
 from gravcomp.inverse.solver import ProgrammeSolver
 from gravcomp.simulation import ShapeStatus, Simulator
@@ -181,6 +182,32 @@ def test_cables_are_paid_out_where_the_model_does_not_follow_back_either():
     assert lost[-1].code == ControllerCode.RELAXING and "no equilibrium" in lost[-1].message
     taut = robot.tension > 0.1
     assert (lost[-1].displacement < lost[0].displacement - 1e-3)[taut].all()
+
+
+def moves_at_a_dead_end(sag, missed, steps=400):
+    """Moves of a robot that hangs by `sag` (m) without tension, and then stays `missed` (m) beside the straight target under 4 N; paying out
+    takes 0.1 N a step from the tension, steps onward bring it back at once."""
+    retreat, target, tension = Retreat(LENGTH), straight_target(LENGTH), np.full(6, 4.0)
+    retreat.move(True, target, np.array([-sag, 0.0, LENGTH]), np.zeros(6))
+    moves = []
+    for _ in range(steps):
+        moves.append(retreat.move(True, target, np.array([missed, 0.0, LENGTH]), tension))
+        if moves[-1] == Move.PAY_OUT:
+            tension = np.maximum(tension - 0.1, 0.0)
+        else:
+            tension = np.full(6, 4.0)
+            retreat.observe(np.zeros(6), 0.01)
+    return moves
+
+
+def test_a_target_at_a_dead_end_is_tried_again_three_times_from_nearer_to_rest_each():
+    moves = moves_at_a_dead_end(sag=0.3 * LENGTH, missed=LENGTH)
+    paid_out = [len(run) for run in "".join("P" if move == Move.PAY_OUT else " " for move in moves).split()]
+    assert paid_out == [20, 30, 40]
+
+
+def test_a_load_that_is_too_heavy_is_held_and_not_dropped():
+    assert set(moves_at_a_dead_end(sag=0.6 * LENGTH, missed=0.5 * LENGTH)) == {Move.ONWARD}
 
 
 def test_backbone_weight_straightens_the_middle():

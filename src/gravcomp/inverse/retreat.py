@@ -6,9 +6,9 @@ the corner may end at a distance that is the least nearby without being small.
 - A command that the model could not follow is taken back. The next strides are shorter, as in a trust-region method, and grow with each
   command that is followed: the robot comes to rest where the equilibria end.
 - Where the model does not follow that either, its cables are paid out, which takes load from it.
-- Where the model was lost several times, or nothing moves any more, far from a target that the straight robot is nearer to, the cables are paid
-  out until half of the tension is gone, and the target is tried from there: another way may lead to it. Then a quarter, then all;
-  a target that is new is tried anew.
+- Where the model was lost several times, or nothing moves any more, far from a target that the robot at rest is nearer to, the cables are
+  paid out until half of the tension is gone, and the target is tried from there: another way may lead to it. Then until a quarter is left,
+  then nothing; a target that is new is tried anew.
 """
 
 import enum
@@ -25,7 +25,7 @@ _SLOW = 2e-3  # m/s
 _STILL_STEPS = 20
 _FAR = 0.3  # robot's lengths
 _SHARES = (0.5, 0.25, 0.0)  # of the tension, at which a target is tried again
-_NO_TENSION = 0.02  # N
+_NO_TENSION, _LITTLE_TENSION = 0.02, 0.1  # N
 
 
 class Move(enum.Enum):
@@ -41,6 +41,7 @@ class Retreat:
 
     def __init__(self, length: float):
         self._length = length
+        self._tip_at_rest = np.array([0.0, 0.0, length])  # until it is seen: how far it sags, not where to, is what matters
         self.reset()
 
     def reset(self) -> None:
@@ -55,6 +56,8 @@ class Retreat:
         its present shape."""
         if not _same(target, self._target):
             self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
+        if followed and tension.max() <= _LITTLE_TENSION:
+            self._tip_at_rest = tip
         if not followed:
             self._lost += 1
             self._lost_times += self._lost == 1
@@ -81,9 +84,9 @@ class Retreat:
         """Let the cables be paid out where that may lead nearer to the target."""
         wanted = self._target.tip_position
         missed = np.linalg.norm(tip - wanted)
-        nearer_straight = np.linalg.norm(wanted - np.array([0.0, 0.0, self._length])) < missed
+        nearer_at_rest = np.linalg.norm(self._tip_at_rest - wanted) < missed
         asked = self._target.tip_position_weight > 0.0
-        if self._until is None and self._tries < len(_SHARES) and asked and nearer_straight and missed > _FAR * self._length:
+        if self._until is None and self._tries < len(_SHARES) and asked and nearer_at_rest and missed > _FAR * self._length:
             self._until = max(_SHARES[self._tries] * tension.max(), _NO_TENSION)
             self._tries += 1
             self._lost_times = 0

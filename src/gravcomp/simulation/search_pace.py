@@ -25,12 +25,12 @@ class SearchPace:
     def reset(self) -> None:
         """Forget the past: the next search may be at once."""
         self._pause = self._remaining = 0
-        self._found: tuple[np.ndarray, CableInput] | None = None
+        self._found: tuple[np.ndarray, np.ndarray | None] | None = None
 
     def found(self, gravity: np.ndarray, cables: CableInput) -> None:
         """An equilibrium was found for this load."""
         self._pause = 0
-        self._found = gravity, cables
+        self._found = gravity.copy(), None if cables.wound is None else cables.wound.copy()
 
     def may_search(self, gravity: np.ndarray, cables: CableInput) -> bool:
         """Whether to search now; asked at every step without equilibrium."""
@@ -47,7 +47,7 @@ class SearchPace:
     def _has_jumped(self, gravity: np.ndarray, cables: CableInput) -> bool:
         if self._found is None:
             return True
-        before, wound = self._found[0], self._found[1].wound
+        before, wound = self._found
         if wound is None or cables.wound is None or np.linalg.norm(gravity - before) > _GRAVITY_JUMP * np.linalg.norm(gravity):
             return True
         moved = np.abs(cables.wound - wound)
