@@ -133,9 +133,13 @@ class Viewer(ManagedNode):
             rate=self._rate,
             delays=self._delays(),
             recording=self._bag if self._recorder else "",
-            virtual=self._base.get_subscription_count() > 0,
+            virtual=self._sees_virtual_robot(),
             **shown,
         )
+
+    def _sees_virtual_robot(self) -> bool:
+        """Recorders listen to its topics as well, and a tracker may tell the true tip; but nobody else does this and knows the true gravity."""
+        return self._base.get_subscription_count() > 0 and self.count_publishers("truth/gravity") > 0
 
     def _current(self, name: str) -> Received | None:
         received = self._streams[name].last

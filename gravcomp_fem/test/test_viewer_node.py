@@ -9,7 +9,7 @@ import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 import rclpy  # noqa: E402
 import yaml  # noqa: E402
-from geometry_msgs.msg import QuaternionStamped  # noqa: E402
+from geometry_msgs.msg import QuaternionStamped, Vector3Stamped  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
@@ -83,6 +83,14 @@ def test_a_bend_becomes_a_target(stand):
     (message,) = stand.heard["target/shape"]
     assert message.bend and (message.bend_angle, message.bend_plane) == (0.7, -1.2)
     assert message.header.frame_id == "soft_base" and message.tip_position_weight == 1.0
+
+
+def test_who_only_listens_is_no_virtual_robot(stand):
+    """A recorder subscribes to every topic: on hardware the page must not offer to tilt a base for that."""
+    assert stand.viewer._base.get_subscription_count() > 0
+    assert not stand.viewer._snapshot().virtual
+    stand.other.create_publisher(Vector3Stamped, "truth/gravity", 10)
+    stand.until(lambda: stand.viewer._snapshot().virtual, "the virtual robot is not seen")
 
 
 def test_the_last_of_many_tilts_turns_the_base(stand):
