@@ -4,8 +4,7 @@ At every quadrature point, with F = I + du/dX, E = (F^T F - I) / 2 and S the sec
 
     f = sum w B^T S,      K = sum w (B^T D B + grad N . S grad N),      D = dS/dE,   B = dE/dq.
 
-Materials: St. Venant-Kirchhoff, S = lambda tr(E) I + 2 mu E; neo-Hookean in the form of CalculiX and Abaqus,
-U = mu/2 (J^(-2/3) tr C - 3) + kappa/2 (J - 1)^2. Damping and creep add C : (a E - b) with C of linear elasticity and a and b from
+S and D are those of `material_laws`. Damping and creep add C : (a E - b) with C of linear elasticity and a and b from
 the strains of the steps before (see `simulation.viscosity`): they see strain alone, so a rotating body is not braked, and the
 tangent stays symmetric and exact.
 """
@@ -16,37 +15,9 @@ import numpy as np
 from numba import njit
 
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
+from gravcomp.mechanics.material_laws import FAST, Lame, add_linear_tangent, inverse_cauchy_green, linear_stress, stress
 from gravcomp.mesh.elements import mass_quadrature, shape_gradients, shape_values, stiffness_quadrature
 from gravcomp.mesh import Mesh, MeshError
-
-LAWS = {"svk": 0, "neo_hookean": 1}
-# Reassociation lets the compiler use vector instructions; NaN keeps its meaning.
-_FAST = {"reassoc", "contract", "nsz", "arcp"}
-# Tensor indices of the six components.
-_PAIRS = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)])
-
-
-@dataclasses.dataclass(frozen=True)
-class Lame:
-    """Material constants of every element: law (k,), lambda and mu (k,) in Pa, density (k,)."""
-
-    law: np.ndarray
-    first: np.ndarray
-    shear: np.ndarray
-    density: np.ndarray
-
-    @staticmethod
-    def of(mesh: Mesh) -> "Lame":
-        """The constants that the mesh's materials give its elements."""
-        young = np.array([m.youngs_modulus for m in mesh.materials])
-        nu = np.array([m.poissons_ratio for m in mesh.materials])
-        values = (
-            np.array([LAWS[m.law] for m in mesh.materials], dtype=np.int64),
-            young * nu / ((1 + nu) * (1 - 2 * nu)),
-            young / (2 * (1 + nu)),
-            np.array([m.density for m in mesh.materials]),
-        )
-        return Lame(*(v[mesh.region] for v in values))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,7 +138,7 @@ def _scatter_positions(elements: np.ndarray, pattern: BlockPattern, n_free: int)
     return position.astype(np.int32)
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _kinematics(u, nodes, gradient, f):
     """Add sum u grad N of one point to f (3, 3)."""
     for a in range(nodes.shape[0]):
@@ -177,7 +148,7 @@ def _kinematics(u, nodes, gradient, f):
                 f[i, j] += value * gradient[j, a]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _strain(f, e):
     """Green's strain (6) in the order 11 22 33 12 23 13, shear doubled."""
     for k in range(3):
@@ -187,7 +158,7 @@ def _strain(f, e):
     e[5] = f[0, 0] * f[0, 2] + f[1, 0] * f[1, 2] + f[2, 0] * f[2, 2]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _strain_rate(f, g, e):
     """Rate of Green's strain (6) for the rate g (3, 3) of the deformation gradient f."""
     for k in range(3):
@@ -198,89 +169,7 @@ def _strain_rate(f, g, e):
             e[k] += f[m, i] * g[m, j] + g[m, i] * f[m, j]
 
 
-@njit(cache=True, fastmath=_FAST)
-def _linear_stress(first, shear, e, s):
-    """Add the stress of linear isotropy for the strain e (6) to s (6)."""
-    pressure = first * (e[0] + e[1] + e[2])
-    for k in range(3):
-        s[k] += pressure + 2.0 * shear * e[k]
-        s[3 + k] += shear * e[3 + k]
-
-
-@njit(cache=True, fastmath=_FAST)
-def _inverse_cauchy_green(e, c, ci):
-    """C (6) and its inverse (6) from Green's strain; returns det F."""
-    for k in range(3):
-        c[k] = 2.0 * e[k] + 1.0
-        c[3 + k] = e[3 + k]
-    ci[0] = c[1] * c[2] - c[4] * c[4]
-    ci[1] = c[0] * c[2] - c[5] * c[5]
-    ci[2] = c[0] * c[1] - c[3] * c[3]
-    ci[3] = c[4] * c[5] - c[3] * c[2]
-    ci[4] = c[3] * c[5] - c[0] * c[4]
-    ci[5] = c[3] * c[4] - c[1] * c[5]
-    det = c[0] * ci[0] + c[3] * ci[3] + c[5] * ci[5]
-    for k in range(6):
-        ci[k] /= det
-    return np.sqrt(det)
-
-
-@njit(cache=True, fastmath=_FAST)
-def _stress(law, first, shear, e, s, d, tangent):
-    """Second Piola-Kirchhoff stress s (6), and dS/dE into d (6, 6) when `tangent`."""
-    if law == 0:
-        for k in range(6):
-            s[k] = 0.0
-        _linear_stress(first, shear, e, s)
-        if tangent:
-            _add_linear_tangent(first, shear, 1.0, d, True)
-        return
-    c = np.empty(6)
-    ci = np.empty(6)
-    bulk = first + 2.0 / 3.0 * shear
-    j = _inverse_cauchy_green(e, c, ci)
-    trace = c[0] + c[1] + c[2]
-    g = shear * j ** (-2.0 / 3.0)
-    pressure = bulk * j * (j - 1.0)
-    for k in range(6):
-        unit = 1.0 if k < 3 else 0.0
-        s[k] = g * (unit - trace / 3.0 * ci[k]) + pressure * ci[k]
-    if tangent:
-        outer = 2.0 / 9.0 * g * trace + bulk * j * (2.0 * j - 1.0)
-        product = 2.0 / 3.0 * g * trace - 2.0 * pressure
-        for m in range(6):
-            mi, mj = _PAIRS[m]
-            um = 1.0 if m < 3 else 0.0
-            for n in range(6):
-                ni, nj = _PAIRS[n]
-                un = 1.0 if n < 3 else 0.0
-                mixed = _at(ci, mi, ni) * _at(ci, mj, nj) + _at(ci, mi, nj) * _at(ci, mj, ni)
-                d[m, n] = outer * ci[m] * ci[n] + 0.5 * product * mixed - 2.0 / 3.0 * g * (um * ci[n] + un * ci[m])
-
-
-@njit(cache=True)
-def _at(c, i, j):
-    """Entry (i, j) of the symmetric tensor c (6)."""
-    if i == j:
-        return c[i]
-    if i + j == 1:
-        return c[3]
-    return c[4] if i + j == 3 else c[5]
-
-
-@njit(cache=True, fastmath=_FAST)
-def _add_linear_tangent(first, shear, factor, d, clear):
-    """Add factor x linear isotropy to d (6, 6), cleared before when `clear`."""
-    if clear:
-        d[:, :] = 0.0
-    for m in range(3):
-        for n in range(3):
-            d[m, n] += factor * first
-        d[m, m] += factor * 2.0 * shear
-        d[3 + m, 3 + m] += factor * shear
-
-
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _strain_matrix(f, gradient, b):
     """dE/dq into b (6, 3 c), unknowns component by component."""
     c = gradient.shape[1]
@@ -297,16 +186,16 @@ def _strain_matrix(f, gradient, b):
             b[5, column] = f0 * g2 + f2 * g0
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _viscous_stress(factor, past, first, shear, e, s):
     """Add the stress of damping and creep for the strain e (6) to s (6)."""
     viscous = np.empty(6)
     for m in range(6):
         viscous[m] = factor * e[m] - past[m]
-    _linear_stress(first, shear, viscous, s)
+    linear_stress(first, shear, viscous, s)
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _point(u, moving, factor, past, nodes, gradient, law, first, shear, f, e, s, d, tangent):
     """Deformation gradient f, strain e and stress s (with damping) at one point; elastic dS/dE in d when `tangent`."""
     f[:, :] = 0.0
@@ -314,12 +203,12 @@ def _point(u, moving, factor, past, nodes, gradient, law, first, shear, f, e, s,
         f[i, i] = 1.0
     _kinematics(u, nodes, gradient, f)
     _strain(f, e)
-    _stress(law, first, shear, e, s, d, tangent)
+    stress(law, first, shear, e, s, d, tangent)
     if moving:
         _viscous_stress(factor, past, first, shear, e, s)
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _strains(u, connectivity, gradients, strain):
     f = np.empty((3, 3))
     for k in range(connectivity.shape[0]):
@@ -331,7 +220,7 @@ def _strains(u, connectivity, gradients, strain):
             _strain(f, strain[k, p])
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _foreseen_stress(u, origin, nodes, gradient, law, first, shear, f, e, s, d):
     """Stress s (6) for the strain that is linear in the step from `origin` to u, where f (3, 3) is reached."""
     start = np.eye(3)
@@ -345,10 +234,10 @@ def _foreseen_stress(u, origin, nodes, gradient, law, first, shear, f, e, s, d):
     _strain_rate(start, step, rate)
     for m in range(6):
         e[m] += rate[m]
-    _stress(law, first, shear, e, s, d, False)
+    stress(law, first, shear, e, s, d, False)
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _internal_force(u, moving, factor, past, connectivity, gradients, weights, law, first, shear, force):
     c = connectivity.shape[1]
     f = np.empty((3, 3))
@@ -375,7 +264,7 @@ def _internal_force(u, moving, factor, past, connectivity, gradients, weights, l
                 force[nodes[a], i] += local[i, a]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _assemble(
     u, moving, factor, past, origin, foreseen, connectivity, gradients, weights, law, first, shear, force, position, values,
 ):  # fmt: skip
@@ -401,7 +290,7 @@ def _assemble(
             w = weights[k, p]
             _point(u, moving, factor[k], past[k, p], nodes, gradient, law[k], first[k], shear[k], f, e, s, d, True)
             if moving:
-                _add_linear_tangent(first[k], shear[k], factor[k], d, False)
+                add_linear_tangent(first[k], shear[k], factor[k], d, False)
             _strain_matrix(f, gradient, b)
             for m in range(6):
                 ws = w * s[m]
@@ -479,7 +368,7 @@ def _smallest_volume_ratio(u, connectivity, gradients):
     return least
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, fastmath=FAST)
 def _energy(u, connectivity, gradients, weights, law, first, shear):
     total = 0.0
     f = np.empty((3, 3))
@@ -498,7 +387,7 @@ def _energy(u, connectivity, gradients, weights, law, first, shear):
                 square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + 0.5 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
                 density = 0.5 * first[k] * trace * trace + shear[k] * square
             else:
-                j = _inverse_cauchy_green(e, c, ci)
+                j = inverse_cauchy_green(e, c, ci)
                 bulk = first[k] + 2.0 / 3.0 * shear[k]
                 density = 0.5 * shear[k] * (j ** (-2.0 / 3.0) * (c[0] + c[1] + c[2]) - 3.0) + 0.5 * bulk * (j - 1.0) ** 2
             total += weights[k, p] * density
