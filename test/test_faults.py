@@ -8,7 +8,7 @@ import pytest
 
 from gravcomp.bench.faults import CASES, Campaign, Case
 from gravcomp.bench.running_graph import RunningGraph
-from gravcomp.motors.bridge import State
+from gravcomp.motors.state import State
 
 
 @pytest.fixture(scope="module")

@@ -22,9 +22,9 @@ from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
-from gravcomp.motors.bridge import CableSnapshot, State
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard import GuardError
+from gravcomp.motors.state import CableSnapshot, State
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN

@@ -8,7 +8,7 @@ import pytest
 from motor_bench import HARDWARE, STEP, Bench
 
 from gravcomp.canbus import codec
-from gravcomp.motors.bridge import DRIVING, State
+from gravcomp.motors.state import DRIVING, State
 
 GOAL = [0.001, -0.002, 0.003, -0.004, 0.0015, 0.0]
 

@@ -10,8 +10,8 @@ from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.multicast import private_channel
 from gravcomp.description.hardware import CanInterface, Hardware
-from gravcomp.motors.bridge import CableSnapshot, State
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
+from gravcomp.motors.state import CableSnapshot, State
 
 STATUS = dict(protocol=1, firmware_major=1, firmware_minor=0, accelerometer_range=1, gyroscope_range=0, heater_duty=0, flags=0)
 

@@ -22,8 +22,8 @@ from gravcomp.motors.guard import ANSWER_TIMEOUT, GuardClient, GuardError, Guard
 BRIDGE = """
 import sys, time
 from gravcomp.description.hardware import CanInterface, Hardware, Motor
-from gravcomp.motors.bridge import RotorRecord
 from gravcomp.motors.guard import GuardClient
+from gravcomp.motors.state import RotorRecord
 can = CanInterface(channel=sys.argv[1])
 def record():
     now = time.monotonic()

@@ -19,8 +19,8 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
-from gravcomp.motors.bridge import State
 from gravcomp.motors.driver import RECEIVED_FRAMES
+from gravcomp.motors.state import State
 
 _SAFE_TIMEOUT = 2.0  # s to wait for a safe state
 _RECOVERY = 5.0  # s, from the restart of a process to the first command that is followed

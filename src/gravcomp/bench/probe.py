@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from gravcomp.bench.running_graph import RunningGraph
 from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink
-from gravcomp.motors.bridge import State
+from gravcomp.motors.state import State
 
 _CURRENT_IDS = (0x200, 0x1FF)
 

@@ -23,7 +23,8 @@ from gravcomp.experiments.metrics import direction_of
 from gravcomp.experiments.setup import Setup
 from gravcomp.inverse import InverseController, Target
 from gravcomp.inverse.limits import within_limits
-from gravcomp.motors.bridge import DRIVING, Bridge
+from gravcomp.motors.bridge import Bridge
+from gravcomp.motors.state import DRIVING
 from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import Shape, Simulator

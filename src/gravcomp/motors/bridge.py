@@ -10,8 +10,6 @@ returns the frames to be sent. The table of states and causes is in gravcomp_hw/
     any --stop--> STOPPED;  --release--> cables paid out, then STOPPED;  --home--> HOMING --> HOLDING
 """
 
-import dataclasses
-import enum
 import math
 from collections.abc import Sequence
 
@@ -24,22 +22,7 @@ from gravcomp.motors.homing import HomingProcedure, Phase
 from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.output import CurrentOutput
-
-
-class State(enum.IntEnum):
-    """As in gravcomp_msgs/msg/CableState."""
-
-    UNCONFIGURED = 0
-    INACTIVE = 1
-    HOMING = 2
-    ACTIVE = 3
-    HOLDING = 4
-    STOPPED = 5
-    FAULT = 6
-
-
-DRIVING = frozenset({State.HOMING, State.ACTIVE, State.HOLDING})
-"""The states in which motors get current."""
+from gravcomp.motors.state import DRIVING, CableSnapshot, RotorRecord, State, ZeroRecord
 
 ZERO_POLICIES = ("start", "home", "home_at_start")
 """Where zero is when nobody knows: where the cables are ('start'); unknown until ~/home; found by homing at once."""
@@ -54,36 +37,6 @@ _LONGEST_STEP = 0.02  # s; after a longer pause the loops go on as if only this 
 _LONGEST_PAUSE = 0.1  # s between two ticks; the guard takes over then, and where the cables went meanwhile is to be seen first
 _WAY_BACK = "; ~/resume or ~/home goes on"
 _MARGIN = 5e-5  # m beyond a displacement limit that is rounding, not a mistake
-
-
-@dataclasses.dataclass(frozen=True)
-class CableSnapshot:
-    """What the cables are doing; one entry a cable. SI: m, m/s, A, N. `stamp` is that of the followed command, or None."""
-
-    state: State
-    message: str
-    command: list[float]
-    displacement: list[float]
-    velocity: list[float]
-    current: list[float]
-    tension: list[float]
-    stamp: object | None
-
-
-@dataclasses.dataclass(frozen=True)
-class RotorRecord:
-    """What another process or a later run needs to go on counting a rotor: its count and zero (counts), its speed (rpm) at `time`
-    (s, monotonic: the same in all processes of a host), and whether its whole turns are certain."""
-
-    count: int
-    zero: int
-    speed: float
-    time: float
-    certain: bool = True
-
-
-ZeroRecord = dict[int, RotorRecord]
-"""By CAN id."""
 
 
 class Bridge:

@@ -21,8 +21,9 @@ from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.link import CanLink, lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import MOTOR_IDS, Hardware
-from gravcomp.motors.bridge import Bridge, CableSnapshot, State, ZeroRecord
+from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.guard import GuardClient
+from gravcomp.motors.state import CableSnapshot, State, ZeroRecord
 
 RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
 """Ids that the bridge takes from the bus."""

@@ -32,9 +32,9 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink, lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import CanInterface, Hardware
-from gravcomp.motors.bridge import RotorRecord, ZeroRecord
 from gravcomp.motors.encoder import Encoder
 from gravcomp.motors.output import CurrentOutput
+from gravcomp.motors.state import RotorRecord, ZeroRecord
 
 PERIOD = 0.01
 """s between zeros."""
