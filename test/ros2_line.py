@@ -69,6 +69,15 @@ class Ros2:
     def state_of(self, node: str) -> str:
         return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
 
+    def listen(self, kind: type, topic: str, latched: bool = False) -> list:
+        """Messages of a topic, as they come while this spins; in another list each time."""
+        heard: list = []
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        reliability = ReliabilityPolicy.RELIABLE if latched else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=1 if latched else 100, durability=durability, reliability=reliability)
+        self._node.create_subscription(kind, topic, heard.append, qos)
+        return heard
+
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)
         answer = self.ask(service, name, _filled(service.Request(), content))
@@ -91,7 +100,8 @@ class Ros2:
         publisher = self._node.create_publisher(type(message), name, 10)
         self.until(lambda: publisher.get_subscription_count() > 0, f"nobody listens to {name}")
         publisher.publish(message)
-        assert publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=PATIENCE))
+        # In small pieces: others of this node are heard meanwhile.
+        self.until(lambda: publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=0.01)), f"{name} is not acknowledged")
         self._node.destroy_publisher(publisher)
         return f"publishing #1: {message}"
 

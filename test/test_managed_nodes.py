@@ -9,7 +9,6 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="it starts nodes: ./gravcomp test")
 
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from ros2_line import Ros2  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
@@ -18,11 +17,9 @@ from gravcomp_msgs.msg import ControllerStatus, ImuStatus  # noqa: E402
 
 pytestmark = pytest.mark.timeout(300)
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
 
 class Observer(Ros2):
-    """Also hears diagnostics and statuses."""
+    """Also hears diagnostics."""
 
     def __init__(self):
         super().__init__()
@@ -32,13 +29,6 @@ class Observer(Ros2):
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.diagnostics[status.name.lstrip("/")] = (status.level, status.message)
-
-    def listen(self, kind: type, topic: str) -> list:
-        """Messages of a latched topic, as they come; in another list each time."""
-        heard: list = []
-        self._node.create_subscription(kind, topic, heard.append, LATCHED)
-        return heard
-
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +75,7 @@ def test_diagnostics_tell_that_a_node_does_not_work(start, observer):
 def test_whoever_comes_late_hears_that_the_estimator_is_not_active(start, observer):
     start("gravcomp_estimation", "imu_estimator")
     observer.run("ros2 lifecycle set /imu_estimator deactivate")
-    heard = observer.listen(ImuStatus, "imu/status")
+    heard = observer.listen(ImuStatus, "imu/status", latched=True)
     observer.until(lambda: heard, "no latched status")
     assert heard[-1].code == ImuStatus.NO_DATA and heard[-1].message == "not active"
 
@@ -103,7 +93,7 @@ def test_a_controller_that_is_not_active_promises_nothing(start, observer):
 def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tmp_path):
     """Also while there is no deformation to follow, which the controller says several times a second."""
     start("gravcomp_fem", "inverse_controller")
-    heard = observer.listen(ControllerStatus, "controller/status")
+    heard = observer.listen(ControllerStatus, "controller/status", latched=True)
     observer.until(lambda: heard and heard[-1].code == ControllerStatus.STALE, "it does not say that nothing comes")
     observer.run("ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'")
     begin = time.monotonic()

@@ -52,7 +52,6 @@ class InverseController:
         self._solver.reset()
         self._damping = StepDamping()
         self._retreat.reset()
-        self._followed: np.ndarray | None = None  # the last command that the model followed
         self._displacement = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
 
@@ -82,7 +81,6 @@ class InverseController:
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
-            self._followed = self._displacement
             interval *= self._retreat.stride
         if move != Move.ONWARD:
             return self._retreated(move, followed, response, target, previous, tension, interval, started)
@@ -159,8 +157,11 @@ class InverseController:
         started: float,
     ) -> Command:
         """The command of a move that does not lead to the target."""
-        if move == Move.BACK and self._followed is not None:
-            displacement = within_limits(self._followed, previous, self.robot.limits, interval)
+        if move == Move.BACK:
+            # To the shape that stands, whichever command it was of: the model may be a sample behind.
+            path = response.compliance_aa @ tension + response.displacement_free
+            shape = np.where(tension > 0.0, path, path - self.options.slack)
+            displacement = within_limits(shape, previous, self.robot.limits, interval)
             code, message = ControllerCode.UNREACHABLE, "the model finds no equilibrium on the way to the target: the last shape is kept"
         else:
             # Where the equilibria end, the linear answer tells little of where the cables would be free; on the straight robot they are at 0.

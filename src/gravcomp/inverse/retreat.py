@@ -3,7 +3,7 @@
 Not every command has an equilibrium near the last one (see `simulation.statics`), and Gauss-Newton's steps toward a target far around
 the corner may end at a distance that is the least nearby without being small.
 
-- A command that the model could not follow is taken back. The next strides are shorter, as in a trust-region method, and grow with each
+- A command that the model could not follow is taken back, to the shape that stands. The next strides are shorter, as in a trust-region method, and grow with each
   command that is followed: the robot comes to rest where the equilibria end.
 - Where the model does not follow that either, its cables are paid out, which takes load from it.
 - Where the model was lost several times, or nothing moves any more, far from a target that the robot at rest is nearer to, the cables are
@@ -20,6 +20,7 @@ from gravcomp.inverse.target import Target
 _SHORTER, _LONGER = 0.25, 1.05
 _LEAST_STRIDE = 1.0 / 256.0
 _LOST_TIMES = 3
+_BACK_STEPS = 2  # the model may be a sample behind the commands
 # Nothing moves: no cable is faster than this for so many steps.
 _SLOW = 2e-3  # m/s
 _STILL_STEPS = 20
@@ -29,7 +30,7 @@ _NO_TENSION, _LITTLE_TENSION = 0.02, 0.1  # N
 
 
 class Move(enum.Enum):
-    """What the next command shall be: a step to the target, the last command that was followed, or one with longer cables."""
+    """What the next command shall be: a step to the target, the shape as it is, or longer cables."""
 
     ONWARD = 0
     BACK = 1
@@ -60,11 +61,12 @@ class Retreat:
             self._tip_at_rest = tip
         if not followed:
             self._lost += 1
-            self._lost_times += self._lost == 1
-            self.stride = max(_SHORTER * self.stride, _LEAST_STRIDE)
+            if self._lost == 1:
+                self._lost_times += 1
+                self.stride = max(_SHORTER * self.stride, _LEAST_STRIDE)
             if self._lost_times >= _LOST_TIMES:
                 self._try_again(tip, tension)
-            return Move.BACK if self._lost == 1 else Move.PAY_OUT
+            return Move.BACK if self._lost <= _BACK_STEPS else Move.PAY_OUT
         self._lost = 0
         self.stride = min(_LONGER * self.stride, 1.0)
         if self._still >= _STILL_STEPS:

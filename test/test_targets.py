@@ -1,0 +1,44 @@
+"""Targets that no shape has, in the running graph: commands go on meanwhile, and the next target is reached."""
+
+import itertools
+
+import pytest
+
+pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
+
+from ros2_line import Ros2  # noqa: E402
+
+from gravcomp.bench.running_graph import RunningGraph  # noqa: E402
+from gravcomp_msgs.msg import CableCommand, ControllerStatus  # noqa: E402
+
+pytestmark = pytest.mark.timeout(600)
+
+
+@pytest.fixture(scope="module")
+def graph():
+    with RunningGraph({"virtual_robot": {"feedback_rate": 125}}) as graph:
+        graph.wait_for_commands()
+        yield graph
+
+
+@pytest.fixture(scope="module")
+def ros2(graph):
+    ros2 = Ros2()
+    yield ros2
+    ros2.close()
+
+
+@pytest.mark.parametrize("angle, plane", [(4.5, 0.0), (5.5, 1.0)])
+def test_a_target_that_no_shape_has_holds_nothing_up(graph, ros2, angle, plane):
+    """The robot goes where the model's equilibria end. A search for one would hold all commands up for seconds."""
+    commands = ros2.listen(CableCommand, f"{graph.namespace}/cable/command")
+    statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
+    pub = f"ros2 topic pub --once {graph.namespace}/target/shape gravcomp_msgs/msg/ShapeTarget"
+    ros2.run(f"{pub} '{{bend: true, bend_angle: {angle}, bend_plane: {plane}, tip_position_weight: 1.0}}'")
+    ros2.until(lambda: commands and statuses and commands[-1].header.stamp.sec > commands[0].header.stamp.sec + 6, "no commands")
+    assert statuses[-1].code in (ControllerStatus.UNREACHABLE, ControllerStatus.RELAXING, ControllerStatus.AT_LIMIT)
+    times = [command.header.stamp.sec + 1e-9 * command.header.stamp.nanosec for command in commands]
+    assert max(later - earlier for earlier, later in itertools.pairwise(times)) < 0.8
+    ros2.run(f"{pub} '{{bend: true, bend_angle: 0.0, tip_position_weight: 1.0, tip_direction_weight: 0.001}}'")
+    ros2.until(lambda: statuses[-1].code == ControllerStatus.OK and statuses[-1].distance < 3e-3, "the straight target is not reached")
+    graph.check()
