@@ -37,7 +37,7 @@ ROWS = {
         Row("inverse_lateral_with_direction_mm.worst", "lateral error with it, worst", "mm"),
         Row("inverse_shortening_mm.worst", "shortening by the cables, worst", "mm"),
         Row("extreme_step_ms", "targets that no shape has, then the straight one again: longest step of the model", "ms"),
-        Row("extreme_back_mm", "the same: where the tip is afterwards, from where it would be without, worst", "mm"),
+        Row("extreme_back_mm", "the same: how far the tip is 6 s later from where it would be without, worst", "mm"),
         Row("inverse_us.median", "inverse problem, median", "us", 100.0),
         Row("inverse_us.p99", "inverse problem, 99th percentile", "us", 300.0),
         Row("dynamics_error_mm", "free fall at steps of 10 ms against 0.5 ms, reduced model, worst tip", "mm", 1.0),
