@@ -36,7 +36,7 @@ def test_a_target_that_no_shape_has_holds_nothing_up(graph, ros2, angle, plane):
     pub = f"ros2 topic pub --once {graph.namespace}/target/shape gravcomp_msgs/msg/ShapeTarget"
     ros2.run(f"{pub} '{{bend: true, bend_angle: {angle}, bend_plane: {plane}, tip_position_weight: 1.0}}'")
     ros2.until(lambda: commands and statuses and commands[-1].header.stamp.sec > commands[0].header.stamp.sec + 6, "no commands")
-    assert statuses[-1].code in (ControllerStatus.UNREACHABLE, ControllerStatus.RELAXING, ControllerStatus.AT_LIMIT)
+    assert statuses[-1].code != ControllerStatus.OK
     times = [command.header.stamp.sec + 1e-9 * command.header.stamp.nanosec for command in commands]
     assert max(later - earlier for earlier, later in itertools.pairwise(times)) < 0.8
     ros2.run(f"{pub} '{{bend: true, bend_angle: 0.0, tip_position_weight: 1.0, tip_direction_weight: 0.001}}'")

@@ -98,6 +98,7 @@ class InverseController:
             )
             solution = self._solver.solve(programme)
         except SolverFailed as error:
+            self._retreat.observe(np.zeros(len(previous)), interval)  # nothing moves
             return Command(
                 displacement=previous,
                 tension=tension,
