@@ -3,8 +3,8 @@
 Not every command has an equilibrium near the last one (see `simulation.statics`), and Gauss-Newton's steps toward a target far around
 the corner may end at a distance that is the least nearby without being small.
 
-- A command that the model could not follow is taken back, to the shape that stands. The next strides are shorter, as in a trust-region method, and grow with each
-  command that is followed: the robot comes to rest where the equilibria end.
+- A command that the model could not follow is taken back, to the shape that stands. The next strides are shorter, as in a trust-region
+  method, and grow with each command that is followed: the robot comes to rest where the equilibria end.
 - Where the model does not follow that either, its cables are paid out, which takes load from it.
 - Where the model was lost several times, or nothing moves any more, far from a target that the robot at rest is nearer to, the cables are
   paid out until half of the tension is gone, and the target is tried from there: another way may lead to it. Then until a quarter is left,
