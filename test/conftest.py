@@ -31,7 +31,11 @@ def gravcomp():
 
     def call(*arguments: str, timeout: float = 240.0, **environment: str) -> Answer:
         done = subprocess.run(
-            [str(ROOT / "gravcomp"), *arguments], capture_output=True, text=True, timeout=timeout, env={**os.environ, **environment}
+            [str(ROOT / "gravcomp"), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=timeout,
+            env={**os.environ, **environment},
         )
         return Answer(done.returncode, done.stdout, done.stderr)
 
@@ -75,4 +79,3 @@ def broad():
         if sorted(folder.glob("*.npz")):
             return folder
     pytest.skip("no BROAD recordings: set GRAVCOMP_DATA to their folder")
-

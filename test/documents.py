@@ -5,7 +5,7 @@ import shlex
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("gravcomp_hw", "gravcomp_estimation", "gravcomp_fem", "gravcomp_msgs")
+PACKAGES = ("gravcomp_hw", "gravcomp_estimation", "gravcomp_fem", "gravcomp_node", "gravcomp_msgs")
 FOLDERS = ("src", *PACKAGES)
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.md"))])
 NAMES = [str(path.relative_to(ROOT)) for path in DOCUMENTS]

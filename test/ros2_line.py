@@ -59,7 +59,11 @@ class Ros2:
             case ["param", "set", node, name, value]:
                 return self._set(node, name, yaml.safe_load(value))
             case ["param", "describe", node, name]:
-                return str(self.ask(DescribeParameters, f"{node}/describe_parameters", DescribeParameters.Request(names=[name])).descriptors[0])
+                return str(
+                    self.ask(
+                        DescribeParameters, f"{node}/describe_parameters", DescribeParameters.Request(names=[name])
+                    ).descriptors[0]
+                )
             case ["lifecycle", "get", node]:
                 return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
             case ["lifecycle", "set", node, transition]:

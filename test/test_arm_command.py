@@ -1,7 +1,6 @@
 """The worked example for larger arms: the arm turns the robot's base through five poses, and the robot keeps its shape."""
 
 import pytest
-
 from documents import documented
 
 

@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-
 from documents import documented
+
 from gravcomp.view.browser import find_chromium
 
 LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]

@@ -140,7 +140,11 @@ def test_every_node_takes_gives_and_serves_what_the_table_says(robot, observer, 
 
         def fits() -> bool:
             takes, gives, services = interface(observer, executable)
-            return agrees(takes, entry.takes, executable) and agrees(gives, entry.gives, executable) and agrees(services, entry.services, executable)
+            return (
+                agrees(takes, entry.takes, executable)
+                and agrees(gives, entry.gives, executable)
+                and agrees(services, entry.services, executable)
+            )
 
         until(lambda: is_there(observer, executable), f"no {executable}", processes)
         try:

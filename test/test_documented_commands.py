@@ -15,12 +15,11 @@ import time
 from pathlib import Path
 
 import pytest
-
 from documents import ROOT, TYPED, documented
 
 pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
 
-from ros2_line import Ros2, run_node  # noqa: E402
+from ros2_line import Ros2, run_node
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -78,7 +77,7 @@ def type_in(folder):
 @pytest.fixture(scope="module")
 def recording():
     """An IMU stream with ground truth: BROAD's where there is one; the bag in the repository has none."""
-    from gravcomp.recordings.broad_folder import WHERE, broad_files
+    from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
     files = broad_files()
     if not files:
@@ -126,12 +125,16 @@ def test_gravity_is_estimated_offline(type_in, folder, line):
 
 
 def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
-    from gravcomp.simulation import Simulator
     from gravcomp.description import load_robot_file
+    from gravcomp.simulation import Simulator
 
     robot = load_robot_file("article").robot.with_material(youngs_modulus=330e3)
     simulator = Simulator(robot)
-    rows = ["trial,time_s,gravity_x,gravity_y,gravity_z," + ",".join(f"{name}_mm" for name in robot.cable_names) + ",tip_x_mm,tip_y_mm,tip_z_mm"]
+    rows = [
+        "trial,time_s,gravity_x,gravity_y,gravity_z,"
+        + ",".join(f"{name}_mm" for name in robot.cable_names)
+        + ",tip_x_mm,tip_y_mm,tip_z_mm"
+    ]
     for trial, gravity in enumerate(([-9.81, 0.0, 0.0], [0.0, -9.81, 0.0], [-6.9, 0.0, -6.9], [0.0, 6.9, -6.9])):
         tip = 1e3 * simulator.solve(gravity).tip_position
         rows += [",".join(map(str, [trial, 0.05 * k, *gravity, *[""] * len(robot.cables), *tip.round(4)])) for k in range(30)]
@@ -161,7 +164,9 @@ def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
 )
 def test_figures_are_made(made, line, about):
     """Briefly: whole, they take from minutes to half an hour. What --write does with a document is test_figures_table's."""
-    code, output = made(tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md")))
+    code, output = made(
+        tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
+    )
     # 1: a figure was missed, as brief ones may be.
     assert code in (0, 1) and about in output, output
 
@@ -276,7 +281,9 @@ def ros2(domain):
     ros2.close()
 
 
-SAID_ONCE = "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, tip_position_weight: 1.0}'"
+SAID_ONCE = (
+    "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, tip_position_weight: 1.0}'"
+)
 
 # In this order: what one line ends, the next must not need. What each has to say.
 ROS2_LINES = {
@@ -310,7 +317,9 @@ def test_the_live_graph_is_recorded_and_judged(live, ros2, type_in, folder):
     from gravcomp.commands.record import describe
 
     words = [*documented("./gravcomp record --out my_bag --duration 60"), "--duration", "10"]
-    recorder = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    recorder = subprocess.Popen(
+        words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     time.sleep(5.0)
     ros2.run(SAID_ONCE)
     output, _ = recorder.communicate(timeout=60.0)

@@ -8,8 +8,8 @@ import re
 import shlex
 
 import pytest
-
 from documents import COMMAND_LINES, NAMES, PACKAGES, ROOT, code_of, inline_of
+
 from gravcomp.commands import COMMANDS
 from gravcomp.config import load_yaml
 from gravcomp.config.parameters import declared_parameters
@@ -134,7 +134,13 @@ def check_ros2(words: list[str]) -> None:
         case ["lifecycle", "get", name]:
             assert parameters_of(name.lstrip("/"))
         case ["lifecycle", "set", name, transition]:
-            assert parameters_of(name.lstrip("/")) and transition in ("configure", "activate", "deactivate", "cleanup", "shutdown")
+            assert parameters_of(name.lstrip("/")) and transition in (
+                "configure",
+                "activate",
+                "deactivate",
+                "cleanup",
+                "shutdown",
+            )
         case ["topic", "hz", name]:
             assert name.lstrip("/") in ports("gives")
         case ["topic", "echo", name, "--field", field]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gravcomp.bench.faults import CASES, Campaign, Case
-from gravcomp.bench.running_graph import RunningGraph
+from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.motors.state import State
 
 
@@ -31,7 +31,9 @@ def driving(campaign):
     assert campaign.crashes == [] and campaign.monitor.violations == 0
 
 
-@pytest.mark.parametrize("name", ["imu silent", "feedback of a motor lost", "bus-off", "command nan", "controller hangs", "bridge hangs"])
+@pytest.mark.parametrize(
+    "name", ["imu silent", "feedback of a motor lost", "bus-off", "command nan", "controller hangs", "bridge hangs"]
+)
 def test_a_fault_leads_to_zero_current_or_holding(campaign, name):
     case = next(case for case in CASES if case.name == name)
     assert campaign.time_to_safe(case) is not None
@@ -39,7 +41,9 @@ def test_a_fault_leads_to_zero_current_or_holding(campaign, name):
 
 @pytest.mark.parametrize("executable", ["can_bridge", "virtual_robot", "inverse_controller"])
 def test_a_killed_process_may_be_started_again(campaign, executable):
-    case = Case(executable, lambda c: c.graph.process(executable).send_signal(signal.SIGKILL), zero=executable != "inverse_controller")
+    case = Case(
+        executable, lambda c: c.graph.process(executable).send_signal(signal.SIGKILL), zero=executable != "inverse_controller"
+    )
     assert campaign.time_to_safe(case) is not None
     campaign.graph.restart(executable)
     assert campaign.make_active()

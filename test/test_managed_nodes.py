@@ -68,7 +68,9 @@ def test_diagnostics_tell_that_a_node_does_not_work(start, observer):
     start("gravcomp_estimation", "imu_estimator")
     for transition, said in (("deactivate", "not active"), ("cleanup", "not configured")):
         observer.run(f"ros2 lifecycle set /imu_estimator {transition}")
-        observer.until(lambda said=said: observer.diagnostics.get("imu_estimator", (b"", ""))[1] == said, f"it is not said: {said}")
+        observer.until(
+            lambda said=said: observer.diagnostics.get("imu_estimator", (b"", ""))[1] == said, f"it is not said: {said}"
+        )
         assert observer.diagnostics["imu_estimator"][0] == b"\x01"
 
 
@@ -95,7 +97,9 @@ def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tm
     start("gravcomp_fem", "inverse_controller")
     heard = observer.listen(ControllerStatus, "controller/status", latched=True)
     observer.until(lambda: heard and heard[-1].code == ControllerStatus.STALE, "it does not say that nothing comes")
-    observer.run("ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'")
+    observer.run(
+        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'"
+    )
     begin = time.monotonic()
     observer.until(lambda: "at most a full turn" in heard[-1].message, "it is not refused")
     observer.until(lambda: time.monotonic() > begin + 2.0, "")

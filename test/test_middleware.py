@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+
 from gravcomp.environment.middleware import middleware, reach
 
 DOMAIN = str(100 + os.getpid() % 100)
@@ -40,11 +41,16 @@ LOOPBACK = "0100007F"
 def start(name, other, environment):
     bare = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_AUTOMATIC", "FASTRTPS_", "FASTDDS_", "ROS_STATIC"))}
     return subprocess.Popen(
-        [sys.executable, "-c", NODE, name, other], env={**bare, "ROS_DOMAIN_ID": DOMAIN, **environment}, stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", NODE, name, other],
+        env={**bare, "ROS_DOMAIN_ID": DOMAIN, **environment},
+        stdout=subprocess.PIPE,
+        text=True,
     )
 
 
-@pytest.mark.parametrize("peer", [{}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, middleware({})], ids=["any", "localhost", "ours"])
+@pytest.mark.parametrize(
+    "peer", [{}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, middleware({})], ids=["any", "localhost", "ours"]
+)
 def test_a_node_listens_on_loopback_alone_and_is_heard_by_nodes_of_every_range_of_this_host(peer):
     ours, theirs = start("ours", "theirs", middleware({})), start("theirs", "ours", peer)
     said, answer = ours.communicate(timeout=60)[0].strip(), theirs.communicate(timeout=60)[0].strip()

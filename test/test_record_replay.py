@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gravcomp.arm.chain import angle_between
-from gravcomp.bags.recovery import readable
 from gravcomp.description import load_robot_file
 from gravcomp.orientation import GravityEstimator, estimate_recording, quaternion
-from gravcomp.recordings import read_recording
+from gravcomp.recordings.bags.recovery import readable
+from gravcomp.recordings.imu import read_recording
 
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 

@@ -5,13 +5,12 @@ import time
 
 import pytest
 import rclpy
+from gravcomp_node.executor import StreamExecutor
+from gravcomp_node.polled import Polled
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
-
-from gravcomp_node.executor import StreamExecutor
-from gravcomp_node.polled import Polled
 
 QOS = QoSProfile(depth=50)
 PATIENCE = 10.0  # s

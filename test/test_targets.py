@@ -4,10 +4,10 @@ import pytest
 
 pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
 
-from ros2_line import Ros2  # noqa: E402
+from ros2_line import Ros2
 
-from gravcomp.bench.running_graph import RunningGraph  # noqa: E402
-from gravcomp_msgs.msg import CableCommand, ControllerStatus  # noqa: E402
+from gravcomp.launcher.virtual_graph import RunningGraph
+from gravcomp_msgs.msg import CableCommand, ControllerStatus
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -36,5 +36,7 @@ def test_a_target_that_no_shape_has_is_left_again(graph, ros2, angle, plane):
     ros2.until(lambda: commands and statuses and commands[-1].header.stamp.sec > commands[0].header.stamp.sec + 6, "no commands")
     assert statuses[-1].code != ControllerStatus.OK
     ros2.run(f"{pub} '{{bend: true, bend_angle: 0.0, tip_position_weight: 1.0, tip_direction_weight: 0.001}}'")
-    ros2.until(lambda: statuses[-1].code == ControllerStatus.OK and statuses[-1].distance < 3e-3, "the straight target is not reached")
+    ros2.until(
+        lambda: statuses[-1].code == ControllerStatus.OK and statuses[-1].distance < 3e-3, "the straight target is not reached"
+    )
     graph.check()

@@ -11,7 +11,9 @@ import pytest
 
 from gravcomp.view.browser import Browser, find_chromium
 
-rclpy = pytest.importorskip("rclpy", reason="the viewer's test publishes gravity: it runs inside the environment, by ./gravcomp test")
+rclpy = pytest.importorskip(
+    "rclpy", reason="the viewer's test publishes gravity: it runs inside the environment, by ./gravcomp test"
+)
 
 # Drawing by the processor alone on a busy machine.
 PATIENCE = 240.0
@@ -27,7 +29,6 @@ class Robot:
 
     def __init__(self):
         from geometry_msgs.msg import PoseStamped, Vector3Stamped
-
         from rclpy.executors import SingleThreadedExecutor
 
         from gravcomp_node import SENSOR
@@ -123,7 +124,9 @@ def test_the_robot_is_drawn(browser):
 
 def test_every_curve_has_a_range(page):
     """Also those that have one without values: this robot has no truth."""
-    ranges = page.evaluate("Object.values(window.__viserTestpoints.uplots).map(u => [u.chart.scales.y.min, u.chart.scales.y.max])")
+    ranges = page.evaluate(
+        "Object.values(window.__viserTestpoints.uplots).map(u => [u.chart.scales.y.min, u.chart.scales.y.max])"
+    )
     assert len(ranges) == 4 and all(low is not None and high > low for low, high in ranges), ranges
 
 

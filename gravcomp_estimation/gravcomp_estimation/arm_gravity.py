@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped
-from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -19,6 +18,7 @@ from gravcomp.arm.chain import Chain, angle_between, gravity_in
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_gravity import ArmGravityParameters
 from gravcomp.virtual.motion import rotation_from_quaternion
+from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 
 _LOOK = 0.1  # s between two looks at arm and IMU, in a check
 _KEPT = 50  # messages of joint_states between two looks
@@ -100,7 +100,9 @@ class ArmGravity(ManagedNode):
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError as error:
-            raise ConfigError("arm_gravity: source is 'tf' and tf2_msgs is not installed; use a ROS installation or joint_states") from error
+            raise ConfigError(
+                "arm_gravity: source is 'tf' and tf2_msgs is not installed; use a ROS installation or joint_states"
+            ) from error
         latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         return [
             self.create_subscription(TFMessage, "/tf", self._on_tf, QoSProfile(depth=100)),
@@ -146,7 +148,11 @@ class ArmGravity(ManagedNode):
         self._look()
         now = time.monotonic()
         if self._arm is None or now - self._arm[0] > STALE:
-            missing = "no URDF has come" if self.parameters.source == "joint_states" and self._chain is None else "no pose of the arm comes"
+            missing = (
+                "no URDF has come"
+                if self.parameters.source == "joint_states" and self._chain is None
+                else "no pose of the arm comes"
+            )
             self.report(WARN, missing)
         elif self.parameters.use == "publish":
             self.report(OK, "gravity from the arm")
@@ -163,7 +169,9 @@ class ArmGravity(ManagedNode):
         if now - self._agreed <= self.parameters.patience:
             self.report(OK, "arm and IMU agree on gravity", angle_deg=degrees)
             return
-        sentence = f"arm and IMU disagree on gravity by {degrees:g} deg: is the IMU's mount, the URDF or one of the sensors wrong?"
+        sentence = (
+            f"arm and IMU disagree on gravity by {degrees:g} deg: is the IMU's mount, the URDF or one of the sensors wrong?"
+        )
         self.get_logger().error(sentence, throttle_duration_sec=5.0)
         self.report(ERROR, sentence, angle_deg=degrees)
 

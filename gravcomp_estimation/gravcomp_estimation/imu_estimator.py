@@ -10,10 +10,8 @@ import time
 from copy import copy
 from pathlib import Path
 
-from gravcomp_msgs.msg import ImuStatus
-from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
-from gravcomp_node.managed_node import ERROR, OK, WARN
 from geometry_msgs.msg import Vector3Stamped
+from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.clock import Clock, ClockType
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, Temperature
@@ -27,6 +25,8 @@ from gravcomp.thermal import HeaterControl
 from gravcomp_estimation import messages
 from gravcomp_estimation.status import Situation, judge
 from gravcomp_estimation.stream import SensorStream
+from gravcomp_msgs.msg import ImuStatus
+from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
 STATUS_PERIOD = 0.1  # s, also of imu/heater: the board switches off when it hears nothing
 FOLLOW_PERIOD = 0.5  # s

@@ -6,7 +6,6 @@ waited for when it is slower.
 
 import time
 
-from gravcomp_node import ManagedNode, run
 from gravcomp_node.managed_node import OK
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -18,9 +17,10 @@ from sensor_msgs.msg import Imu, Temperature
 
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.imu_replay import ImuReplayParameters
-from gravcomp.recordings import RecordingError, read_recording
+from gravcomp.recordings.imu import RecordingError, read_recording
 from gravcomp_estimation import messages
 from gravcomp_estimation.stream import LOSSLESS
+from gravcomp_node import ManagedNode, run
 
 TICK = 0.002  # s
 LONGEST_TICK = 0.05  # s of publishing before signals and services get their turn
@@ -40,7 +40,9 @@ class ImuReplay(ManagedNode):
     def configure(self) -> None:
         parameters = self.parameters
         if not parameters.file:
-            raise ConfigError("imu_replay: the parameter file is empty; a rosbag2 folder or an .npz file in BROAD's layout is needed")
+            raise ConfigError(
+                "imu_replay: the parameter file is empty; a rosbag2 folder or an .npz file in BROAD's layout is needed"
+            )
         try:
             recording = read_recording(parameters.file, parameters.topic or None)
         except RecordingError as error:

@@ -3,10 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from gravcomp_msgs.msg import ImuStatus
-
 from gravcomp.orientation import GravityEstimate, Problem
 from gravcomp.thermal import HeaterFault, HeaterState
+from gravcomp_msgs.msg import ImuStatus
 
 CONVERGED = math.radians(2.0)  # of inclination, standard deviation
 PROBLEM_LASTS = 0.5  # s: so long a bad sample is spoken of

@@ -10,8 +10,8 @@ rclpy = pytest.importorskip("rclpy")
 pytest.importorskip("gravcomp_msgs.msg", reason="the workspace is not built or not sourced")
 
 from geometry_msgs.msg import Vector3Stamped
-from gravcomp_msgs.msg import ImuStatus
-from gravcomp_node import LATCHED, SENSOR
+from gravcomp_estimation.imu_estimator import ImuEstimator
+from gravcomp_estimation.imu_replay import ImuReplay
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
@@ -20,10 +20,10 @@ from std_srvs.srv import Trigger
 from gravcomp.description import load_robot_file
 from gravcomp.orientation import GravityEstimator, estimate_recording
 from gravcomp.orientation import quaternion as quat
-from gravcomp.recordings import read_recording
+from gravcomp.recordings.imu import read_recording
 from gravcomp_estimation import messages
-from gravcomp_estimation.imu_estimator import ImuEstimator
-from gravcomp_estimation.imu_replay import ImuReplay
+from gravcomp_msgs.msg import ImuStatus
+from gravcomp_node import LATCHED, SENSOR
 
 EVERYTHING = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=5000)
 SURELY = [
@@ -74,15 +74,15 @@ class Graph:
 
 def write_trial(path, count=300):
     random = np.random.default_rng(1)
-    np.savez(path, gyr=random.normal(0, 0.3, (count, 3)), acc=np.array([0, 0, 9.81]) + random.normal(0, 0.5, (count, 3)), rate=100.0)
+    np.savez(
+        path, gyr=random.normal(0, 0.3, (count, 3)), acc=np.array([0, 0, 9.81]) + random.normal(0, 0.5, (count, 3)), rate=100.0
+    )
     return path
 
 
 def test_the_replayed_recording_gives_what_the_offline_estimator_gives(graph, tmp_path):
     trial = write_trial(tmp_path / "trial.npz")
-    graph.open(
-        *("-p", f"imu_replay:file:={trial}", "-p", "imu_replay:rate:=0.0", "-p", "imu_replay:exit_at_end:=false"), *SURELY
-    )
+    graph.open(*("-p", f"imu_replay:file:={trial}", "-p", "imu_replay:rate:=0.0", "-p", "imu_replay:exit_at_end:=false"), *SURELY)
     orientation, gravity = [], []
     estimator = graph.start(ImuEstimator)
     graph.observer.create_subscription(Imu, "imu/data", orientation.append, EVERYTHING)

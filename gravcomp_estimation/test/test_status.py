@@ -6,11 +6,11 @@ import pytest
 
 pytest.importorskip("gravcomp_msgs.msg", reason="the workspace is not built or not sourced")
 
-from gravcomp_msgs.msg import ImuStatus
+from gravcomp_estimation.status import Situation, judge
 
 from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.thermal import HeaterFault, HeaterState
-from gravcomp_estimation.status import Situation, judge
+from gravcomp_msgs.msg import ImuStatus
 
 HEATER = HeaterState(duty=0.3, target=35.0, temperature=35.0, ready=True, fault=HeaterFault.NONE)
 

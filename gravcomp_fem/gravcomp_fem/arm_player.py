@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, QuaternionStamped
+from gravcomp_node.managed_node import OK
+from gravcomp_node.polled import Polled
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -24,8 +26,6 @@ from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
 from gravcomp.virtual.motion import quaternion
 from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
-from gravcomp_node.managed_node import OK
-from gravcomp_node.polled import Polled
 
 _RATE = 50.0  # Hz, of the joints
 _PASSES = ("released", "compensated")
@@ -46,7 +46,9 @@ class ArmPlayer(ManagedNode):
         self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, self.parameters.urdf)
         poses = np.array(list(FIVE_POSES.values()))
         if len(self._chain.moving) != poses.shape[1]:
-            raise ConfigError(f"{self.parameters.urdf}: {len(self._chain.moving)} joints move '{self._chain.tip}'; the tour is for {poses.shape[1]}")
+            raise ConfigError(
+                f"{self.parameters.urdf}: {len(self._chain.moving)} joints move '{self._chain.tip}'; the tour is for {poses.shape[1]}"
+            )
         self._tour = Tour(poses, self.parameters.travel, self.parameters.hold)
         self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
         self._base = self.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
@@ -102,7 +104,12 @@ class ArmPlayer(ManagedNode):
 
     def _prepare(self, now: float) -> None:
         """Begin the pass as soon as everything is there, has rested for a while, and agrees."""
-        there = self._tip is not None and self._bridge is not None and self._relax.service_is_ready() and self._enable.service_is_ready()
+        there = (
+            self._tip is not None
+            and self._bridge is not None
+            and self._relax.service_is_ready()
+            and self._enable.service_is_ready()
+        )
         if not there:
             self._tell("waiting for the truth")
             return

@@ -34,7 +34,8 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
 
 def response_of(message: Deformation) -> Response:
     """The linear answer in a message. Raises ValueError when its arrays do not fit one another, are not finite, or tell of a cable
-    that yields nothing to a tension."""
+    that yields nothing to a tension.
+    """
     cables, points = len(message.cable_tension), len(message.backbone_station)
     rows = 6 + 3 * points
     response = Response(
@@ -45,7 +46,9 @@ def response_of(message: Deformation) -> Response:
     )
     _matrix(message.cable_tension, 1, cables, "cable_tension")
     if not (np.diagonal(response.compliance_aa) > 0.0).all():
-        raise ValueError(f"the diagonal of compliance_aa is {np.diagonal(response.compliance_aa)}; positive numbers (m/N) are needed")
+        raise ValueError(
+            f"the diagonal of compliance_aa is {np.diagonal(response.compliance_aa)}; positive numbers (m/N) are needed"
+        )
     return response
 
 
@@ -72,7 +75,9 @@ def backbone_of_poses(message: PoseArray) -> Backbone | None:
 
 def bend_message(angle: float, plane: float, tip_direction_weight: float, frame: str) -> ShapeTarget:
     """A target of constant curvature, `angle` into the plane at `plane` (rad)."""
-    message = ShapeTarget(bend=True, bend_angle=angle, bend_plane=plane, tip_position_weight=1.0, tip_direction_weight=tip_direction_weight)
+    message = ShapeTarget(
+        bend=True, bend_angle=angle, bend_plane=plane, tip_position_weight=1.0, tip_direction_weight=tip_direction_weight
+    )
     message.header.frame_id = frame
     return message
 

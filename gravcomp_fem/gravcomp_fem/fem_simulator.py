@@ -9,6 +9,8 @@ import sys
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.polled import Polled
 from rclpy.time import Time
 from visualization_msgs.msg import MarkerArray
 
@@ -20,8 +22,6 @@ from gravcomp_fem.markers import markers_of
 from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
-from gravcomp_node.managed_node import ERROR, OK, WARN
-from gravcomp_node.polled import Polled
 
 # No robot is shaken harder than this; more is a broken message.
 _GRAVITY_LIMIT = 100.0  # m/s^2

@@ -5,15 +5,16 @@ import sys
 import time
 
 from geometry_msgs.msg import PoseStamped
+from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.time import Time
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
-from gravcomp.inverse import Command, ControllerCode, InverseController as InverseProblem, Target, TargetError, straight_target, warm_up
+from gravcomp.inverse import Command, ControllerCode, Target, TargetError, straight_target, warm_up
+from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
-from gravcomp_node.managed_node import ERROR, OK, WARN
 
 # People read the status; the loop does not. A change of the code is told at once.
 _STATUS_PERIOD = 0.1  # s
@@ -119,9 +120,7 @@ class InverseController(ManagedNode):
             self._say(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header)
             return
         self._command.publish(
-            CableCommand(
-                header=message.header, displacement=doubles(command.displacement), tension=doubles(command.tension)
-            )
+            CableCommand(header=message.header, displacement=doubles(command.displacement), tension=doubles(command.tension))
         )
         self._publish_status(command, message.header)
 
@@ -150,7 +149,9 @@ class InverseController(ManagedNode):
 
     def _take_target(self, header, make) -> None:
         if header.frame_id not in ("", self.parameters.frame):
-            self._refuse(f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept")
+            self._refuse(
+                f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept"
+            )
             return
         try:
             target = make()

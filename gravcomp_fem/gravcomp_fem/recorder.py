@@ -9,17 +9,17 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rosbags.interfaces import Connection
 
-from gravcomp.bags import BagError
-from gravcomp.bags.qos import offered_qos
-from gravcomp.bags.writing import BagWriter
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.recorder import RecorderParameters
+from gravcomp.recordings.bags import BagError
+from gravcomp.recordings.bags.qos import offered_qos
+from gravcomp.recordings.bags.writing import BagWriter
 from gravcomp_node import ManagedNode, run
-from gravcomp_node.managed_node import OK, WARN
 
 _LOOK_INTERVAL = 0.25  # s, between looks for new topics
 _DEPTH = 1000

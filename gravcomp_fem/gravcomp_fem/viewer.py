@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped, QuaternionStamped
+from gravcomp_node.managed_node import OK
+from gravcomp_node.polled import Polled, Received
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from std_msgs.msg import String
@@ -26,10 +28,8 @@ from gravcomp.view.page import Page
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.virtual.motion import base_orientation, quaternion
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, bend_message, pose_target, shape_target
-from gravcomp_node.polled import Polled, Received
 from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, ManagedNode, run
-from gravcomp_node.managed_node import OK
 
 _STREAM = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
 _LEVELS = {
@@ -39,7 +39,8 @@ _LEVELS = {
     ControllerStatus.SOLVER_FAILED: "error",
 }
 _MOTOR_STATES = {
-    getattr(CableState, name): name.lower() for name in ("UNCONFIGURED", "INACTIVE", "HOMING", "ACTIVE", "HOLDING", "STOPPED", "FAULT")
+    getattr(CableState, name): name.lower()
+    for name in ("UNCONFIGURED", "INACTIVE", "HOMING", "ACTIVE", "HOLDING", "STOPPED", "FAULT")
 }
 # Silent for longer, a stream is not shown any more.
 _STALE = 1.0  # s
@@ -60,7 +61,13 @@ class Viewer(ManagedNode):
         self._fault = self.create_publisher(String, "virtual/fault", QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20))
         self._remote = {
             name: self.create_client(SetBool if name.endswith("enable") else Trigger, name)
-            for name in ("inverse_controller/enable", "inverse_controller/relax", "can_bridge/home", "can_bridge/stop", "can_bridge/release")
+            for name in (
+                "inverse_controller/enable",
+                "inverse_controller/relax",
+                "can_bridge/home",
+                "can_bridge/stop",
+                "can_bridge/release",
+            )
         }
         self.get_logger().info(f"the page is at {self._page.address}")
 
@@ -153,7 +160,7 @@ class Viewer(ManagedNode):
         delays = {}
         for stage, name in (("model", "deformation"), ("command", "command"), ("motors", "motors")):
             received = self._current(name)
-            if received is None or stage == "motors" and received.message.state != CableState.ACTIVE:
+            if received is None or (stage == "motors" and received.message.state != CableState.ACTIVE):
                 continue
             delay = (received.sent - Time.from_msg(received.message.header.stamp).nanoseconds) * 1e-9
             if 0.0 <= delay < _CLOCK_TOLERANCE:

@@ -1,17 +1,17 @@
 """Shapes and targets survive their messages; messages that do not fit are refused."""
 
+import dataclasses
 import subprocess
 import sys
-import dataclasses
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import Pose
+from gravcomp_fem.conversion import deformation_message, pose_target, response_of, shape_target
 from std_msgs.msg import Header
 
 from gravcomp.inverse import TargetError
 from gravcomp.simulation import Response, Shape, ShapeStatus
-from gravcomp_fem.conversion import deformation_message, pose_target, response_of, shape_target
 from gravcomp_msgs.msg import ShapeTarget
 
 

@@ -5,22 +5,22 @@ import time
 
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 
-import numpy as np  # noqa: E402
-import pytest  # noqa: E402
-import rclpy  # noqa: E402
-import yaml  # noqa: E402
-from geometry_msgs.msg import QuaternionStamped, Vector3Stamped  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
+import numpy as np
+import pytest
+import rclpy
+import yaml
+from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
+from gravcomp_fem.viewer import Viewer
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
 
-from gravcomp.commands.record import describe  # noqa: E402
-from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase  # noqa: E402
-from gravcomp.virtual.faults import Fault  # noqa: E402
-from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion  # noqa: E402
-from gravcomp_fem.viewer import Viewer  # noqa: E402
-from gravcomp_msgs.msg import ShapeTarget  # noqa: E402
-from gravcomp_node import COMMAND  # noqa: E402
+from gravcomp.commands.record import describe
+from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
+from gravcomp.virtual.faults import Fault
+from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion
+from gravcomp_msgs.msg import ShapeTarget
+from gravcomp_node import COMMAND
 
 
 class Stand:
@@ -34,11 +34,17 @@ class Stand:
         self.heard: dict[str, list] = {}
         self.told: list[tuple] = []
         if whole:
-            for kind, topic in ((ShapeTarget, "target/shape"), (QuaternionStamped, "virtual/base_orientation"), (String, "virtual/fault")):
+            for kind, topic in (
+                (ShapeTarget, "target/shape"),
+                (QuaternionStamped, "virtual/base_orientation"),
+                (String, "virtual/fault"),
+            ):
                 self.other.create_subscription(kind, topic, lambda m, t=topic: self.heard.setdefault(t, []).append(m), COMMAND)
             for name in ("inverse_controller/relax", "can_bridge/home", "can_bridge/stop"):
                 self.other.create_service(Trigger, name, lambda q, a, n=name: self._serve(n, None, a))
-            self.other.create_service(SetBool, "inverse_controller/enable", lambda q, a: self._serve("inverse_controller/enable", q.data, a))
+            self.other.create_service(
+                SetBool, "inverse_controller/enable", lambda q, a: self._serve("inverse_controller/enable", q.data, a)
+            )
         for node in (self.viewer, self.other):
             self.executor.add_node(node)
         self.viewer.start()
@@ -72,7 +78,9 @@ def stand(tmp_path):
     stand = Stand(tmp_path)
     publishers = (stand.viewer._shape_target, stand.viewer._base, stand.viewer._fault)
     stand.until(lambda: all(p.get_subscription_count() for p in publishers), "nobody listens to the viewer")
-    stand.until(lambda: all(c.service_is_ready() for n, c in stand.viewer._remote.items() if n != "can_bridge/release"), "no services")
+    stand.until(
+        lambda: all(c.service_is_ready() for n, c in stand.viewer._remote.items() if n != "can_bridge/release"), "no services"
+    )
     yield stand
     stand.close()
 

@@ -12,6 +12,7 @@ import threading
 import time
 
 from builtin_interfaces.msg import Time
+from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState, Temperature
 from std_msgs.msg import Float32
@@ -27,7 +28,6 @@ from gravcomp.motors.guard import GuardError
 from gravcomp.motors.state import CableSnapshot, State
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
-from gravcomp_node.managed_node import ERROR, OK, WARN
 
 _TEMPERATURE_EVERY = 10  # samples; the chip renews it every 1.28 s
 _LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}

@@ -98,7 +98,8 @@ class FaultProbe(ManagedNode):
 
     def _set_enabled(self, on: bool) -> None:
         """Asked until it is answered: a controller that was started anew does not hear at once, though the dead one's service still is
-        on the list."""
+        on the list.
+        """
         end, done = time.monotonic() + _MATCH_TIMEOUT, False
         while not done and time.monotonic() < end:
             if self._enable.wait_for_service(1.0):
@@ -144,7 +145,8 @@ class FaultProbe(ManagedNode):
 
     def _match(self) -> None:
         """A message before the middleware has matched publisher and subscriber goes nowhere, and neither does a state before this node
-        has found a bridge that was started anew."""
+        has found a bridge that was started anew.
+        """
         begin = time.monotonic()
         needed = [self._outputs[topic] for topic in ("virtual/fault", "cable/command")]
         matched = False

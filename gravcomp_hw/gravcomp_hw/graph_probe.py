@@ -51,7 +51,9 @@ class GraphProbe:
             return Finding("missing", port.name, "nothing is published", "./gravcomp up")
         rate = len(ages) / _LISTEN
         level = "ok" if abs(rate - port.rate) <= _TOLERANCE * port.rate else "optional"
-        return Finding(level, port.name, f"{rate:.0f} Hz of {port.rate:.0f}, {1e3 * ages[len(ages) // 2]:.1f} ms behind its IMU sample")
+        return Finding(
+            level, port.name, f"{rate:.0f} Hz of {port.rate:.0f}, {1e3 * ages[len(ages) // 2]:.1f} ms behind its IMU sample"
+        )
 
     def _quality(self) -> list[Finding]:
         findings = []

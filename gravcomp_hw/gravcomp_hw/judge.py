@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from gravcomp_node.polled import Polled
 from lifecycle_msgs.srv import GetState
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
@@ -17,14 +18,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.evaluation import run_figures as figures
+from gravcomp.evaluation.bus_delay import DelayListener
+from gravcomp.evaluation.released import released_tip_error
+from gravcomp.evaluation.track import Track
 from gravcomp.graph.parameters.judge import JudgeParameters
-from gravcomp.judging import figures
-from gravcomp.judging.bus_delay import DelayListener
-from gravcomp.judging.released import released_tip_error
-from gravcomp.judging.track import Track
 from gravcomp_msgs.msg import CableCommand
 from gravcomp_node import ManagedNode, run
-from gravcomp_node.polled import Polled
 
 # Messages that the middleware keeps between two looks, a tenth of a second apart.
 _KEPT = 100

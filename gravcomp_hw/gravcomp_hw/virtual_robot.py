@@ -10,7 +10,6 @@ import sys
 import numpy as np
 import yaml
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3Stamped
-from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -20,13 +19,14 @@ from gravcomp.canbus.bus import BusError
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description.hardware import parse_hardware
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
-from gravcomp.recordings import RecordingError
+from gravcomp.recordings.imu import RecordingError
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.realtime import RealtimeRobot
 from gravcomp.virtual.robot import Truth, VirtualRobot
+from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 # Faults come one after the other and each counts.
 _FAULTS = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)

@@ -9,18 +9,18 @@ import time
 
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 
-import pytest  # noqa: E402
-import rclpy  # noqa: E402
-from sensor_msgs.msg import Imu, JointState, Temperature  # noqa: E402
-from std_msgs.msg import Float32  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
+import pytest
+import rclpy
+from sensor_msgs.msg import Imu, JointState, Temperature
+from std_msgs.msg import Float32
+from std_srvs.srv import Trigger
 
-from gravcomp.canbus import codec  # noqa: E402
-from gravcomp.canbus.link import CanLink  # noqa: E402
-from gravcomp.canbus.multicast import private_channel  # noqa: E402
-from gravcomp.description.hardware import CanInterface  # noqa: E402
-from gravcomp_msgs.msg import CableCommand, CableState  # noqa: E402
-from gravcomp_node import COMMAND, SENSOR  # noqa: E402
+from gravcomp.canbus import codec
+from gravcomp.canbus.link import CanLink
+from gravcomp.canbus.multicast import private_channel
+from gravcomp.description.hardware import CanInterface
+from gravcomp_msgs.msg import CableCommand, CableState
+from gravcomp_node import COMMAND, SENSOR
 
 # Children of a run under nohup would ignore it.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -43,12 +43,14 @@ class Board:
         begin, k = time.monotonic(), 0
         while not self._end.is_set():
             self.link.send(codec.encode(f"MotorFeedback{i}", angle=100 * i, speed=0, current=0.05) for i in range(1, 7))
-            self.link.send([
-                codec.encode("BoardStatus", **STATUS),
-                codec.encode("ImuAccelerometer", x=0, y=k % 5, z=5460, sequence=k % 256),
-                codec.encode("ImuGyroscope", x=0, y=0, z=k % 3, sequence=k % 256),
-                codec.encode("ImuTime", time=int(1e6 * (time.monotonic() - begin)), temperature=40.0, sequence=k % 256),
-            ])
+            self.link.send(
+                [
+                    codec.encode("BoardStatus", **STATUS),
+                    codec.encode("ImuAccelerometer", x=0, y=k % 5, z=5460, sequence=k % 256),
+                    codec.encode("ImuGyroscope", x=0, y=0, z=k % 3, sequence=k % 256),
+                    codec.encode("ImuTime", time=int(1e6 * (time.monotonic() - begin)), temperature=40.0, sequence=k % 256),
+                ]
+            )
             k += 1
             for frame in self.link.receive(0.01):
                 if frame.arbitration_id == 0x320:
@@ -137,7 +139,9 @@ def test_samples_states_and_services_are_those_of_the_table(bench):
     answer = bench.call("stop")
     assert answer.success and "resume" in answer.message
     bench.until(lambda: bench.state() == CableState.STOPPED, "not stopped", bench.drive)
-    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "current is left")  # the board's thread may yet have to read it
+    bench.until(
+        lambda: set(bench.board.currents.values()) == {ZERO}, "current is left"
+    )  # the board's thread may yet have to read it
     assert bench.call("resume").success
     bench.follow()
 

@@ -5,16 +5,16 @@ import time
 
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 
-import numpy as np  # noqa: E402
-import pytest  # noqa: E402
-import rclpy  # noqa: E402
-from geometry_msgs.msg import PoseArray, PoseStamped, QuaternionStamped, Vector3Stamped  # noqa: E402
-from gravcomp_hw.virtual_robot import VirtualRobotNode  # noqa: E402
-from gravcomp_node import COMMAND, SENSOR  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import PoseArray, PoseStamped, QuaternionStamped, Vector3Stamped
+from gravcomp_hw.virtual_robot import VirtualRobotNode
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
 
-from gravcomp.config import ConfigError  # noqa: E402
+from gravcomp.config import ConfigError
+from gravcomp_node import COMMAND, SENSOR
 
 
 class Graph:

@@ -1,8 +1,8 @@
 """Where gravity points, from a recorded IMU stream: an error-state Kalman filter over stamps (gravcomp.orientation).
 
-    gravity in soft_base = R_mount R(q)^T (0, 0, -g)
+gravity in soft_base = R_mount R(q)^T (0, 0, -g)
 
-    python gravity_from_recording.py [FILE]     FILE: .npz in BROAD's layout or a rosbag2 folder; without: a made-up turn
+python gravity_from_recording.py [FILE]     FILE: .npz in BROAD's layout or a rosbag2 folder; without: a made-up turn
 """
 
 import sys
@@ -13,7 +13,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.orientation.estimator import GravityEstimator
 from gravcomp.orientation.offline import estimate_recording
 from gravcomp.orientation.quaternion import from_roll_pitch_yaw
-from gravcomp.recordings import Recording, read_recording
+from gravcomp.recordings.imu import Recording, read_recording
 
 
 def turning_sensor() -> tuple[Recording, np.ndarray]:

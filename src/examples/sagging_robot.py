@@ -1,6 +1,6 @@
 """How far a soft robot sags: its static equilibrium under gravity, with released cables and with a pulled one.
 
-    f_int(u) = f_weight(g) + H(u)^T lambda,    lambda >= 0        (gravcomp.simulation.statics)
+f_int(u) = f_weight(g) + H(u)^T lambda,    lambda >= 0        (gravcomp.full_model.statics)
 """
 
 import numpy as np

@@ -22,9 +22,7 @@ ANGLES = np.radians([0, 120, 240, 60, 180, 300])
 STATIONS = np.linspace(0.0, 1.0, 9)
 _POINTS_A_SEGMENT = 16
 
-LIMITS = Limits(
-    tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, tension_rate=1e3, displacement_rate=0.05
-)
+LIMITS = Limits(tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, tension_rate=1e3, displacement_rate=0.05)
 
 
 def description(limits: Limits = LIMITS) -> Robot:

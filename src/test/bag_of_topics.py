@@ -36,7 +36,9 @@ class TopicBag:
         self._write(topic, "geometry_msgs/msg/Vector3Stamped", time, vector=self._types["Vector3"](*map(float, value)))
 
     def pose(self, topic: str, time: float, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
-        pose = self._types["Pose"](self._types["Point"](*map(float, position)), self._types["Quaternion"](*map(float, orientation)))
+        pose = self._types["Pose"](
+            self._types["Point"](*map(float, position)), self._types["Quaternion"](*map(float, orientation))
+        )
         self._write(topic, "geometry_msgs/msg/PoseStamped", time, pose=pose)
 
     def state(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
@@ -45,10 +47,23 @@ class TopicBag:
                     velocity=none, current=none, tension=none)  # fmt: skip
 
     def command(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
-        self._write(topic, "gravcomp_msgs/msg/CableCommand", time, late, displacement=np.asarray(displacement, float), tension=np.zeros(0))
+        self._write(
+            topic, "gravcomp_msgs/msg/CableCommand", time, late, displacement=np.asarray(displacement, float), tension=np.zeros(0)
+        )
 
     def status(self, topic: str, time: float, code: int) -> None:
-        self._write(topic, "gravcomp_msgs/msg/ControllerStatus", time, code=code, message="", distance=0.0, lateral=0.0, axial=0.0, tilt=0.0, solve_time=0.0)
+        self._write(
+            topic,
+            "gravcomp_msgs/msg/ControllerStatus",
+            time,
+            code=code,
+            message="",
+            distance=0.0,
+            lateral=0.0,
+            axial=0.0,
+            tilt=0.0,
+            solve_time=0.0,
+        )
 
     def bend(self, topic: str, time: float, angle: float, plane: float) -> None:
         point, vector, none = self._types["Point"](0.0, 0.0, 0.0), self._types["Vector3"](0.0, 0.0, 0.0), np.zeros(0)

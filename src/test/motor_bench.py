@@ -30,7 +30,7 @@ class SpringMotor:
         tension = max(0.0, self.stiffness * (self.displacement - self.taut))
         torque = drive.torque_constant * self.current - self.motor.direction * tension * drive.capstan_radius - 2e-3 * self.speed
         friction = self.friction * drive.torque_constant
-        if self.blocked or self.speed == 0.0 and abs(torque) < 1.2 * friction:
+        if self.blocked or (self.speed == 0.0 and abs(torque) < 1.2 * friction):
             self.speed = 0.0
             return
         sense = math.copysign(1.0, self.speed or torque)
@@ -41,7 +41,9 @@ class SpringMotor:
     def feedback(self):
         counts = self.angle * self.drive.gear_ratio / (2 * math.pi) * COUNTS_PER_TURN
         rpm = round(self.speed * self.drive.gear_ratio * 60 / (2 * math.pi))
-        return codec.encode(f"MotorFeedback{self.sent_id}", angle=math.floor(counts) % COUNTS_PER_TURN, speed=rpm, current=self.current)
+        return codec.encode(
+            f"MotorFeedback{self.sent_id}", angle=math.floor(counts) % COUNTS_PER_TURN, speed=rpm, current=self.current
+        )
 
 
 class Bench:

@@ -11,12 +11,12 @@ import pytest
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from gravcomp.bags import BagError
-from gravcomp.bags.definitions import Definitions
-from gravcomp.bags.qos import offered_qos
-from gravcomp.bags.recovery import readable
-from gravcomp.bags.writing import BagWriter
-from gravcomp.recordings import read_recording
+from gravcomp.recordings.bags import BagError
+from gravcomp.recordings.bags.definitions import Definitions
+from gravcomp.recordings.bags.qos import offered_qos
+from gravcomp.recordings.bags.recovery import readable
+from gravcomp.recordings.bags.writing import BagWriter
+from gravcomp.recordings.imu import read_recording
 
 IMU = "sensor_msgs/msg/Imu"
 SENSOR = offered_qos("RELIABLE", "VOLATILE", "KEEP_LAST", 5)
@@ -86,7 +86,10 @@ def test_a_type_that_is_not_installed_is_named(tmp_path):
 
 
 def test_definitions_come_from_the_installed_files(tmp_path, store):
-    for name, text in (("a_msgs/msg/Outer", "b_msgs/Inner[] many\nb_msgs/Inner[2] two\nfloat64 x\n"), ("b_msgs/msg/Inner", "int32 i\n")):
+    for name, text in (
+        ("a_msgs/msg/Outer", "b_msgs/Inner[] many\nb_msgs/Inner[2] two\nfloat64 x\n"),
+        ("b_msgs/msg/Inner", "int32 i\n"),
+    ):
         package, _, message = name.split("/")
         folder = tmp_path / "share" / package / "msg"
         folder.mkdir(parents=True)

@@ -59,13 +59,25 @@ CAUSES = {
     "outside": (lambda b: b.run(0.1, lambda t: [0.031] * 6), State.HOLDING, 0.05, "allowed: -30 to 30 mm"),
     "jump": (lambda b: b.run(0.012, lambda t: [0.02] * 6), State.HOLDING, 0.05, "jumps by"),
     "old": (lambda b: (b.bridge.command(GOAL, [], b.now, age=0.4), b.run(0.01)), State.HOLDING, 0.05, "older than 200 ms"),
-    "from the future": (lambda b: (b.bridge.command(GOAL, [], b.now, age=-3.0), b.run(0.01)), State.HOLDING, 0.05, "of the future"),
-    "one motor silent": (lambda b: (setattr(b.motors[4], "silent", True), b.run(0.3, lambda t: GOAL)), State.FAULT, 0.15, "motor 5 (c5)"),
+    "from the future": (
+        lambda b: (b.bridge.command(GOAL, [], b.now, age=-3.0), b.run(0.01)),
+        State.HOLDING,
+        0.05,
+        "of the future",
+    ),
+    "one motor silent": (
+        lambda b: (setattr(b.motors[4], "silent", True), b.run(0.3, lambda t: GOAL)),
+        State.FAULT,
+        0.15,
+        "motor 5 (c5)",
+    ),
     "bus lost": (lambda b: (b.bridge.bus_lost("unplugged"), b.run(0.01)), State.FAULT, 0.02, "unplugged"),
     "stop": (lambda b: (b.bridge.stop(), b.run(0.01)), State.STOPPED, 0.01, "stop"),
     "stall": (
         lambda b: (setattr(b.motors[1], "blocked", True), b.run(0.6, lambda t: [x + 0.002 * min(1, 10 * t) for x in GOAL])),
-        State.FAULT, 0.55, "motor 2 (c2) stalled",
+        State.FAULT,
+        0.55,
+        "motor 2 (c2) stalled",
     ),
     "foreign motor": (lambda b: (setattr(b.motors[0], "sent_id", 8), b.run(0.3)), State.FAULT, 0.25, ""),
 }
@@ -93,7 +105,9 @@ def test_commands_that_come_late_out_of_a_queue_do_not_keep_the_bridge_going():
     assert 0.19 <= bench.since(begin, State.HOLDING) <= 0.21
 
 
-@pytest.mark.parametrize("cause", ["stale command", "nan", "infinite", "too few", "outside", "jump", "old", "from the future", "bus lost"])
+@pytest.mark.parametrize(
+    "cause", ["stale command", "nan", "infinite", "too few", "outside", "jump", "old", "from the future", "bus lost"]
+)
 def test_after_what_passes_good_commands_suffice(cause):
     bench = following()
     CAUSES[cause][0](bench)
@@ -341,6 +355,8 @@ def test_hostile_frames_and_commands_never_raise_nor_exceed_the_limit():
             bench.now,
             age=random.choice([0.0, math.nan, -1e9, 1e9]),
         )
-        random.choice([bench.bridge.stop, lambda: bench.bridge.resume(bench.now), lambda: bench.bridge.home(bench.now)] + [lambda: None] * 9)()
+        random.choice(
+            [bench.bridge.stop, lambda: bench.bridge.resume(bench.now), lambda: bench.bridge.home(bench.now)] + [lambda: None] * 9
+        )()
         bench.run(0.01, lambda t: GOAL)
     assert bench.largest_current <= HARDWARE.drive.current_limit

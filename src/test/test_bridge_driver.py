@@ -30,12 +30,14 @@ class Board:
             self.link.send(codec.encode(f"MotorFeedback{i}", angle=100 * i, speed=0, current=0) for i in range(1, 7))
             k = self.samples
             self.samples += 1
-            self.link.send([
-                codec.encode("BoardStatus", **STATUS),
-                codec.encode("ImuAccelerometer", x=5460, y=k % 7, z=0, sequence=k % 256),
-                codec.encode("ImuGyroscope", x=0, y=0, z=0, sequence=k % 256),
-                codec.encode("ImuTime", time=int(1e6 * (time.monotonic() - self.begin)), temperature=30, sequence=k % 256),
-            ])
+            self.link.send(
+                [
+                    codec.encode("BoardStatus", **STATUS),
+                    codec.encode("ImuAccelerometer", x=5460, y=k % 7, z=0, sequence=k % 256),
+                    codec.encode("ImuGyroscope", x=0, y=0, z=0, sequence=k % 256),
+                    codec.encode("ImuTime", time=int(1e6 * (time.monotonic() - self.begin)), temperature=30, sequence=k % 256),
+                ]
+            )
             each()
             self.heard += self.link.receive(0.005)
             time.sleep(0.005)

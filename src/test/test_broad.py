@@ -10,8 +10,8 @@ import pytest
 
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.inclination import inclination_error, inclination_rmse
-from gravcomp.recordings import read_recording
-from gravcomp.recordings.broad_folder import WHERE, broad_files
+from gravcomp.recordings.imu import read_recording
+from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
 VQF_DEG = {
     "02_undisturbed_slow_rotation_B": 0.454,

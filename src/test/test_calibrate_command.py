@@ -5,17 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from bag_of_topics import TopicBag
+
 from gravcomp.calibration.files import write_csv
 from gravcomp.calibration.measured import Measured, StillWindows
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
-from gravcomp.experiments.free_fall import free_fall
-from gravcomp.experiments.known_robot import DAMPING_TIME, known_setup, known_windows
-from gravcomp.experiments.measuring import joined
-from gravcomp.experiments.setup import Setup
+from gravcomp.trials.calibration_run import joined
+from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.known_robot import DAMPING_TIME, known_setup, known_windows
 
 MODULUS = 0.6e6  # Pa
 LOOSE = -0.03  # m
@@ -34,11 +34,16 @@ def windows(setup):
 def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
     """A trial of 0.6 s a window, sampled at 20 Hz."""
     trials = []
-    for number, (gravity, command, tip) in enumerate(zip(windows.gravity, windows.displacement, windows.tip_position), start=first):
+    for number, (gravity, command, tip) in enumerate(
+        zip(windows.gravity, windows.displacement, windows.tip_position), start=first
+    ):
         rows = 13
         trials.append(
             Measured(
-                "here", np.full(rows, number), 0.05 * np.arange(rows), *(np.tile(value, (rows, 1)) for value in (gravity, command, tip, [0.0, 0.0, 1.0]))
+                "here",
+                np.full(rows, number),
+                0.05 * np.arange(rows),
+                *(np.tile(value, (rows, 1)) for value in (gravity, command, tip, [0.0, 0.0, 1.0])),
             )
         )
     return trials
@@ -107,7 +112,10 @@ def test_what_the_data_cannot_tell_is_said(here, capsys, windows):
     assert "s1c2, s1c3, s2c1, s2c2, s2c3: never taut in these data" in notes
     assert "no trial holds fast motion" in notes
     assert result["data"]["damping_time_ms"] is None
-    assert load_robot_file("mine.yaml").robot.segments[0].material.damping_time == load_robot_file("article").robot.segments[0].material.damping_time
+    assert (
+        load_robot_file("mine.yaml").robot.segments[0].material.damping_time
+        == load_robot_file("article").robot.segments[0].material.damping_time
+    )
 
 
 def test_unusable_data_end_in_a_sentence(here, capsys):
@@ -121,7 +129,9 @@ def write_bag(path: Path, measured: Measured) -> None:
     with TopicBag(path) as bag:
         start = 0.0
         for trial in measured.trials():
-            for time, gravity, wound, tip in zip(start + trial.time - trial.time[0], trial.gravity, trial.displacement, trial.tip_position):
+            for time, gravity, wound, tip in zip(
+                start + trial.time - trial.time[0], trial.gravity, trial.displacement, trial.tip_position
+            ):
                 bag.vector("/gravity", time, gravity)
                 bag.vector("/truth/gravity", time, gravity)
                 bag.state("/cable/state", time, np.nan_to_num(wound, nan=LOOSE))

@@ -11,7 +11,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.orientation import BiasTemperatureModel, GravityEstimator, estimate_recording
 from gravcomp.orientation import quaternion as quat
-from gravcomp.recordings import Recording, read_recording
+from gravcomp.recordings.imu import Recording, read_recording
 
 SCALE, OFFSET = np.array([1.02, 0.99, 1.01]), np.array([0.15, -0.1, 0.2])  # m/s^2
 GYRO_OFFSET = np.radians([0.8, -0.5, 0.3])
@@ -26,7 +26,10 @@ def lying_in(base_up, seconds=8.0, rate=100.0):
     gyro, accel = [], []
     for up in base_up @ quat.matrix(quat.from_roll_pitch_yaw(*MOUNT)):
         gyro += [GYRO_OFFSET + random.normal(0, 0.002, (count, 3)), random.normal(0, 1.0, (turning, 3))]
-        accel += [9.81 * up / SCALE + OFFSET + random.normal(0, 0.02, (count, 3)), 9.81 * up + random.normal(0, 3.0, (turning, 3))]
+        accel += [
+            9.81 * up / SCALE + OFFSET + random.normal(0, 0.02, (count, 3)),
+            9.81 * up + random.normal(0, 3.0, (turning, 3)),
+        ]
     return {"gyr": np.vstack(gyro), "acc": np.vstack(accel), "rate": rate}
 
 

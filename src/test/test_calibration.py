@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
-from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.files import read_measured, write_csv
+from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.motion import predict_course
 from gravcomp.calibration.statics import StaticParameters, StaticPredictor
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
-from gravcomp.experiments.known_robot import OFFSETS, known_setup, known_windows
-from gravcomp.experiments.setup import Setup
 from gravcomp.simulation import Simulator
+from gravcomp.trials.known_robot import OFFSETS, known_setup, known_windows
 
 GRAVITY = np.array([-9.81, 0.0, 0.0])
 
@@ -46,7 +46,10 @@ def test_derivatives_of_tips_are_those_of_finite_differences(robot):
     for cable in (0, 3):
         unit = np.eye(6)[cable]
         for name, step, slope in (("offset", 2e-6, here.by_offset), ("compliance", 5e-6, here.by_compliance)):
-            tips = [predictor.predict(dataclasses.replace(base, **{name: getattr(base, name) + sign * step * unit})).tip[0] for sign in (1, -1)]
+            tips = [
+                predictor.predict(dataclasses.replace(base, **{name: getattr(base, name) + sign * step * unit})).tip[0]
+                for sign in (1, -1)
+            ]
             difference = (tips[0] - tips[1]) / (2 * step)
             # The linear answer leaves out how the stiffness changes with tension: a few per cent.
             np.testing.assert_allclose(slope[0, :, cable], difference, atol=0.06 * np.abs(difference).max())
@@ -80,7 +83,9 @@ def course(count: int = 60) -> Measured:
     time = 0.05 * np.arange(count)
     tip = np.array([0.0, 0.0, 0.1]) + 5e-3 * np.outer(np.where(time < 1.0, np.sin(20 * time), 0.0), [1.0, 0.0, 0.0])
     displacement = np.where(np.arange(6) < 3, 1e-3, np.nan) * np.ones((count, 1))
-    return Measured("here", np.zeros(count, int), time, np.tile(GRAVITY, (count, 1)), displacement, tip, np.tile([0.0, 0.0, 1.0], (count, 1)))
+    return Measured(
+        "here", np.zeros(count, int), time, np.tile(GRAVITY, (count, 1)), displacement, tip, np.tile([0.0, 0.0, 1.0], (count, 1))
+    )
 
 
 def test_only_the_last_still_window_of_a_stretch_counts():
@@ -136,7 +141,12 @@ def test_calibrated_values_are_written_and_comments_stay(tmp_path, robot):
 def test_a_robot_at_rest_is_predicted_to_stay(robot):
     shape = Simulator(robot, reduced=False).solve(GRAVITY)
     still = Measured(
-        "here", np.zeros(6, int), 0.02 * np.arange(6), np.tile(GRAVITY, (6, 1)), np.full((6, 6), np.nan), np.tile(shape.tip_position, (6, 1))
+        "here",
+        np.zeros(6, int),
+        0.02 * np.arange(6),
+        np.tile(GRAVITY, (6, 1)),
+        np.full((6, 6), np.nan),
+        np.tile(shape.tip_position, (6, 1)),
     )
     tip, direction = predict_course(robot, still)
     np.testing.assert_allclose(tip, still.tip_position, atol=2e-6)

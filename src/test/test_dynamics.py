@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Elements, load_robot_file
-from gravcomp.simulation import DynamicsOptions, DynamicSimulator, RobotModel, ShapeStatus, Simulator
-from gravcomp.simulation.dynamics import DynamicSolver
-from gravcomp.simulation.statics import CableInput
+from gravcomp.full_model.dynamics import DynamicSolver
+from gravcomp.full_model.statics import CableInput
+from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 
 GRAVITY = np.array([-9.81, 0.0, 0.0])
 

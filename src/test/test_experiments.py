@@ -8,20 +8,22 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
-from gravcomp.experiments import EXPERIMENTS, calculix, experiment, metrics
-from gravcomp.experiments.beams import Tube, elastica, euler_bernoulli
-from gravcomp.experiments.cases import Case, target_of
+from gravcomp.evaluation import metrics
+from gravcomp.experiments import EXPERIMENTS, experiment
 from gravcomp.experiments.deflection import tube_robot
-from gravcomp.experiments.free_fall import free_fall
-from gravcomp.experiments.loop import ClosedLoop
-from gravcomp.experiments.lumen import Lumen
-from gravcomp.experiments.report import write_index, write_report
-from gravcomp.experiments.result import Figure, Plot, Result, Table, number
-from gravcomp.experiments.setup import Setup
-from gravcomp.experiments.sweep import Sweep
 from gravcomp.mesh.tube import tube_mesh
+from gravcomp.references import calculix
+from gravcomp.references.beams import Tube, elastica, euler_bernoulli
+from gravcomp.report.page import write_index, write_report
+from gravcomp.report.result import Figure, Plot, Result, Table, number
+from gravcomp.sweep import Sweep
+from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.holding import Case, target_of
+from gravcomp.trials.lumen import Lumen
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 
@@ -71,7 +73,11 @@ def test_elastica_becomes_euler_bernoulli_for_a_stiff_tube():
 
 
 def test_elastica_hangs_where_calculix_says_and_euler_bernoulli_does_not():
-    row = next(r for r in calculix.stored_rows() if (r.law, r.youngs_modulus, r.inclination, r.poissons_ratio) == ("svk", 0.8e6, 0.0, 0.45))
+    row = next(
+        r
+        for r in calculix.stored_rows()
+        if (r.law, r.youngs_modulus, r.inclination, r.poissons_ratio) == ("svk", 0.8e6, 0.0, 0.45)
+    )
     tube = Tube(**{k: v for k, v in calculix.REFERENCE.items()}, youngs_modulus=0.8e6)
     # What the elastica lacks is shear and the stiffer clamp: tenths of a millimetre.
     assert np.linalg.norm(elastica(tube, 0.0) - row.tip) < 0.3e-3
@@ -102,7 +108,11 @@ def test_a_page_is_self_contained_and_says_reached_and_missed_beside_the_figures
         title="A <sample>",
         question="?",
         ground="virtual robot",
-        figures=[Figure("good", 0.9995, "", "> 0.99", 0.999, True), Figure("bad", 3.0, "mm", "", 2.0), Figure("lost", np.nan, "ms", "", 1.0)],
+        figures=[
+            Figure("good", 0.9995, "", "> 0.99", 0.999, True),
+            Figure("bad", 3.0, "mm", "", 2.0),
+            Figure("lost", np.nan, "ms", "", 1.0),
+        ],
         parts=[Table("T", ("a", "b"), [("x", 1.23456)]), Plot("P", "<svg></svg>")],
         parameters={"array": np.arange(2)},
     )
@@ -116,7 +126,9 @@ def test_a_page_is_self_contained_and_says_reached_and_missed_beside_the_figures
     assert "1 of 3 figures" in write_index([result], tmp_path).read_text()
 
 
-@pytest.mark.parametrize(("value", "text"), [(0.0012345, "0.00123"), (12345.6, "12346"), (1e-7, "1.00e-07"), (float("nan"), "–"), (True, "yes")])
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0012345, "0.00123"), (12345.6, "12346"), (1e-7, "1.00e-07"), (float("nan"), "–"), (True, "yes")]
+)
 def test_numbers_are_written_for_people(value, text):
     assert number(value) == text
 

@@ -2,27 +2,29 @@
 
 import pytest
 
-from gravcomp.bench import reach
+from gravcomp.bench import limits
 from gravcomp.commands.bench import BENCHMARKS
 from gravcomp.config import ConfigError
-from gravcomp.experiments.figures_table import check_place, markdown_table, renew
-from gravcomp.experiments.result import Figure
+from gravcomp.report.figures_table import check_place, markdown_table, renew
+from gravcomp.report.result import Figure
 
 DOCUMENT = "before\n<!-- figures bench engine -->\nold\n<!-- end -->\nbetween\n<!-- figures bench graph -->\nkept\n<!-- end -->\n"
 
 
 def test_every_benchmark_has_its_figures():
-    assert set(reach.ROWS) == set(BENCHMARKS)
+    assert set(limits.ROWS) == set(BENCHMARKS)
 
 
 def test_a_figure_is_found_below_its_key_and_a_list_counts():
-    figures = reach.figures("faults", {"crashes": 2, "safe_ms": {"stop": 12.5}, "not_safe": ["stall", "bus-off"]})
+    figures = limits.figures("faults", {"crashes": 2, "safe_ms": {"stop": 12.5}, "not_safe": ["stall", "bus-off"]})
     assert {f.name: f.value for f in figures} == {"crashes": 2, "stop to zero current": 12.5, "faults without a safe answer": 2}
     assert [f.reached for f in figures] == [False, False, True]
 
 
 def test_a_missed_limit_is_said():
-    text = markdown_table([Figure("error", 0.3, "mm", limit=0.2), Figure("rate", 5.0, "Hz", limit=5.0, at_least=True), Figure("length", 1.0, "m")])
+    text = markdown_table(
+        [Figure("error", 0.3, "mm", limit=0.2), Figure("rate", 5.0, "Hz", limit=5.0, at_least=True), Figure("length", 1.0, "m")]
+    )
     assert "| error | 0.300 mm | ≤ 0.2 mm | **missed** |" in text
     assert "| rate | 5.00 Hz | ≥ 5 Hz | reached |" in text
     assert "| length | 1.00 m |  |  |" in text

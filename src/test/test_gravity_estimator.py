@@ -18,7 +18,7 @@ from gravcomp.orientation import (
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.options import SensorOptions
 from gravcomp.orientation.prediction import PredictionOptions
-from gravcomp.recordings import Recording
+from gravcomp.recordings.imu import Recording
 
 DEG = math.radians(1.0)
 STEP = 10_000_000  # ns: 100 Hz
@@ -92,7 +92,11 @@ def test_calibration_is_applied_before_the_filter():
 
 def warming(model, *, rotating, seconds=60):
     """A chip that warms from 20 to 35 degC with 0.015 deg/s/K about z; yaw error at the end, rad, and the estimator."""
-    estimator, random, true_yaw = GravityEstimator(EstimatorOptions(filter=WITHOUT_DELAY), bias_model=model), np.random.default_rng(3), 0.0
+    estimator, random, true_yaw = (
+        GravityEstimator(EstimatorOptions(filter=WITHOUT_DELAY), bias_model=model),
+        np.random.default_rng(3),
+        0.0,
+    )
     for k in range(seconds * 100):
         time = k * 0.01
         temperature = 35.0 - 15.0 * math.exp(-time / 30.0)
@@ -125,7 +129,9 @@ def test_the_bias_model_of_another_board_is_dropped_at_the_first_rest():
     estimator.add_temperature(0, 25.0)
     own = np.radians([-0.2, 0.3, 0.1])
     for k in range(1000):
-        estimate = estimator.update(k * STEP, own + random.normal(0, 0.1 * DEG, 3), np.array([0, 0, 9.81]) + random.normal(0, 0.02, 3))
+        estimate = estimator.update(
+            k * STEP, own + random.normal(0, 0.1 * DEG, 3), np.array([0, 0, 9.81]) + random.normal(0, 0.02, 3)
+        )
     assert estimate.imu.rest
     assert estimate.bias == pytest.approx(own, abs=0.05 * DEG)
 

@@ -109,10 +109,12 @@ def turn_on(hardware, rpm):
     motors, begin = CanLink(hardware.can), time.monotonic()
     while (elapsed := time.monotonic() - begin) < 0.5:
         count = 10_000 + round(rpm * 8192 / 60 * elapsed)
-        motors.send([
-            codec.encode("MotorFeedback1", angle=count % 8192, speed=rpm, current=0),
-            codec.encode("MotorFeedback5", angle=20, speed=0, current=0),
-        ])
+        motors.send(
+            [
+                codec.encode("MotorFeedback1", angle=count % 8192, speed=rpm, current=0),
+                codec.encode("MotorFeedback5", angle=20, speed=0, current=0),
+            ]
+        )
         time.sleep(0.002)
     motors.close()
     return count
@@ -276,7 +278,10 @@ def test_a_guard_that_was_killed_or_hung_is_replaced_and_the_new_one_does_the_sa
     drain_now(bus)
     assert zeros(bus, 0.5) == {0x200, 0x1FF}
     client = GuardClient.connect(hardware.can, hardware)
-    assert {can_id: (rotor.count - rotor.zero, rotor.certain) for can_id, rotor in client.record.items()} == {1: (0, True), 5: (0, True)}
+    assert {can_id: (rotor.count - rotor.zero, rotor.certain) for can_id, rotor in client.record.items()} == {
+        1: (0, True),
+        5: (0, True),
+    }
     client.close()
 
 

@@ -14,7 +14,7 @@ from gravcomp.orientation.calibration import (
     fit_mount,
     resting_poses,
 )
-from gravcomp.recordings import Recording
+from gravcomp.recordings.imu import Recording
 
 SIX = np.vstack([np.eye(3), -np.eye(3)])
 SCALE, OFFSET = np.array([1.01, 0.98, 1.005]), np.array([0.1, -0.05, 0.2])
@@ -69,7 +69,9 @@ def test_rests_are_found_in_a_recording_and_the_same_pose_is_taken_once():
 
 def test_a_recording_without_rest_is_refused():
     random = np.random.default_rng(3)
-    recording = Recording("hand.npz", np.arange(500) * 10_000_000, random.normal(0, 1.0, (500, 3)), random.normal(0, 5.0, (500, 3)))
+    recording = Recording(
+        "hand.npz", np.arange(500) * 10_000_000, random.normal(0, 1.0, (500, 3)), random.normal(0, 5.0, (500, 3))
+    )
     with pytest.raises(CalibrationError, match="hand.npz: the sensor never rests for 1.5 s"):
         resting_poses(recording)
 

@@ -92,7 +92,11 @@ def test_bent_shape_is_reached_and_kept_while_gravity_turns():
 def test_a_bend_far_from_the_sagging_robot_is_reached(angle, plane):
     """Against gravity and by more than a right angle: the way there is along the target's direction, not away from it."""
     robot = load_robot_file("article").robot
-    simulator, control, target = Simulator(robot, reduced=False), InverseController(robot), bend_target(robot.length, angle, plane)
+    simulator, control, target = (
+        Simulator(robot, reduced=False),
+        InverseController(robot),
+        bend_target(robot.length, angle, plane),
+    )
     displacement = None
     for _ in range(250):
         shape = simulator.step([-GRAVITY, 0.0, 0.0], displacement)
@@ -338,12 +342,18 @@ def test_bounds_that_cannot_be_kept_together_are_missed_by_the_least():
     compliance = 1e-3 * np.array([[2.0, 0.5], [0.5, 2.0]])
     hessian, gradient = 2e-6 * np.eye(2), np.array([-1e-7, -1e-7])
     bounds = StepBounds(np.array([3e-3, -9e-3]), np.full(2, 9e-3), np.zeros(2), np.full(2, 1.0))
-    kept = solved(solver, Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))))
+    kept = solved(
+        solver,
+        Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))),
+    )
     assert kept == pytest.approx([0.05, 0.05], abs=1e-5)
     for _ in range(2):
         missed = solved(solver, Programme(hessian, gradient, compliance, np.zeros(2), bounds))
         assert missed == pytest.approx([1.0, 1.0], abs=1e-3)  # 2.5 mm of the 3 mm asked for
-    again = solved(solver, Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))))
+    again = solved(
+        solver,
+        Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))),
+    )
     assert again == pytest.approx(kept, abs=1e-5)
 
 
@@ -355,7 +365,15 @@ def test_weights_are_the_squares_of_the_rows():
     options = InverseOptions(energy_weight=1e-6, proximal_weight=0.0, axial_weight=0.25)
     zeros = np.zeros(6)
     programme = build_programme(
-        response, target, Limits(), tension=zeros, displacement=zeros, backbone_station=STATIONS, interval=0.01, damping=1.0, options=options
+        response,
+        target,
+        Limits(),
+        tension=zeros,
+        displacement=zeros,
+        backbone_station=STATIONS,
+        interval=0.01,
+        damping=1.0,
+        options=options,
     )
 
     def cost(tension):
@@ -411,7 +429,10 @@ def test_unusable_target_is_refused_with_a_reason(arguments, said):
     "arguments, said",
     [
         (dict(tip_position=[0, 0, 100.0]), "tip_position is 100 m from the base"),  # millimetres
-        (dict(tip_position=[0, 0, 0.1], backbone_station=[0.5], backbone_position=[[0, 1, 0]], backbone_weight=[1]), "backbone_position 0 is 1 m"),
+        (
+            dict(tip_position=[0, 0, 0.1], backbone_station=[0.5], backbone_position=[[0, 1, 0]], backbone_weight=[1]),
+            "backbone_position 0 is 1 m",
+        ),
     ],
 )
 def test_points_out_of_any_reach_are_refused(arguments, said):

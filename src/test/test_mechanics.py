@@ -151,9 +151,7 @@ def smooth_energy(kind: str, n: int) -> float:
     elements = SolidElements(mesh.renumbered(order), pattern)
     x, y, z = elements.mesh.nodes.T
     k = np.pi / 0.04
-    return elements.energy(
-        1e-3 * np.column_stack([1 - np.cos(k * z), np.sin(k * z) * x / 4e-3, np.sin(k * z) * (1 + y / 4e-3)])
-    )
+    return elements.energy(1e-3 * np.column_stack([1 - np.cos(k * z), np.sin(k * z) * x / 4e-3, np.sin(k * z) * (1 + y / 4e-3)]))
 
 
 def test_mass_is_consistent():

@@ -71,7 +71,9 @@ def test_late_frames_are_no_jumps_and_cost_no_turn_silently(rpm, pause):
         assert encoder.count == pytest.approx(count, abs=1 + abs(rpm) / RPM * 0.002 * JUMPS)
 
 
-@pytest.mark.parametrize(("rpm", "pause"), [(0, 0.5), (100, 0.1), (-300, 0.1), (700, 0.1), (-1720, 0.1), (2750, 0.08), (5000, 0.06)])
+@pytest.mark.parametrize(
+    ("rpm", "pause"), [(0, 0.5), (100, 0.1), (-300, 0.1), (700, 0.1), (-1720, 0.1), (2750, 0.08), (5000, 0.06)]
+)
 def test_turns_of_frames_that_come_late_and_all_at_once_are_counted(rpm, pause):
     """700 rpm are 10 mm/s of cable, 1720 are 25 mm/s."""
     encoder, count = starved(rpm, pause)
@@ -169,7 +171,9 @@ def test_impossible_feedback_is_rejected(angle, speed):
     assert not Encoder().update(angle, speed, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(("current", "velocity", "complaint"), [(1.0, 0.0, "stalled"), (-1.0, 0.03, "against"), (0.1, 0.1, "runs away")])
+@pytest.mark.parametrize(
+    ("current", "velocity", "complaint"), [(1.0, 0.0, "stalled"), (-1.0, 0.03, "against"), (0.1, 0.1, "runs away")]
+)
 def test_a_fault_of_a_motor_must_last_in_what_was_seen_of_it(current, velocity, complaint):
     """A control that is held up sees two feedbacks half a second apart; that is no half second of the fault."""
     monitor = MotorMonitor(Drive(), Watchdog())

@@ -4,14 +4,14 @@ import json
 
 import numpy as np
 import pytest
-
 from bag_of_topics import TopicBag
+
 from gravcomp.calibration.motion import predict_course
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
-from gravcomp.experiments.free_fall import free_fall
-from gravcomp.experiments.setup import Setup
 from gravcomp.inverse import ControllerCode, bend_target
+from gravcomp.trials.free_fall import free_fall
 
 LENGTH = 0.1  # m
 HORIZONTAL = np.array([-9.81, 0.0, 0.0])

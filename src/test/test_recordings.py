@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gravcomp.recordings import Recording, RecordingError, read_recording
+from gravcomp.recordings.imu import Recording, RecordingError, read_recording
 
 
 def write_npz(path, **changes):
@@ -57,7 +57,12 @@ def test_files_of_other_kinds_are_refused(tmp_path):
     (tmp_path / "text.npz").write_text("hello")
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.csv").write_text("1,2")
-    for name, words in (("text.npz", "is not an .npz"), ("folder", "is not a bag"), ("a.csv", "neither"), ("none", "does not exist")):
+    for name, words in (
+        ("text.npz", "is not an .npz"),
+        ("folder", "is not a bag"),
+        ("a.csv", "neither"),
+        ("none", "does not exist"),
+    ):
         with pytest.raises(RecordingError, match=words):
             read_recording(tmp_path / name)
 

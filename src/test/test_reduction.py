@@ -9,11 +9,12 @@ from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Elements
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError
-from gravcomp.reduction import BuildOptions, ReducedServing, TrainingOptions, build, load, path_of, why_not
+from gravcomp.reduction import ReducedServing, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.strain_polynomials import strain_polynomials
-from gravcomp.simulation import DynamicsOptions, DynamicSimulator, RobotModel, ShapeStatus, Simulator
+from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
+from gravcomp.training import BuildOptions, TrainingOptions, build
 
 # Little training for a coarse mesh: enough to keep this robot straight.
 SMALL = BuildOptions(
@@ -105,14 +106,12 @@ def test_reduced_model_follows_the_full_one_in_the_closed_loop(built):
     reduced, full = Simulator(model), Simulator(RobotModel(model.robot), reduced=False)
     controller, target = InverseController(model.robot), straight_target(model.length, tip_direction_weight=1e-3)
     angles = np.radians(0.9) * np.arange(70)  # 90 deg/s
-    served = 0
+    served, displacement = 0, None
     for angle in angles:
         gravity = 9.81 * np.array([-np.cos(angle), 0.6 * np.sin(angle), -0.8 * np.sin(angle)])
-        shape = reduced.step(gravity) if angle == 0.0 else reduced.step(gravity, command.displacement)
-        exact = full.step(gravity) if angle == 0.0 else full.step(gravity, command.displacement)
-        command = controller.step(
-            shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension
-        )
+        shape, exact = reduced.step(gravity, displacement), full.step(gravity, displacement)
+        command = controller.step(shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension)
+        displacement = command.displacement
         assert np.linalg.norm(shape.tip_position - exact.tip_position) < 0.1e-3  # what it may serve with; trained little
         served += shape.model == "reduced"
     assert served > 60

@@ -84,7 +84,11 @@ def test_a_cable_runs_at_its_angle_to_the_end_of_its_segment(robot):
     for cable in robot.cables:
         vertices = cable_skin(robot, cable).on(straight_backbone(robot.length))
         middle = vertices.reshape(-1, 8, 3).mean(axis=1)
-        np.testing.assert_allclose(middle[:, :2], np.tile(0.00315 * np.array([math.cos(cable.angle), math.sin(cable.angle)]), (len(middle), 1)), atol=1e-7)
+        np.testing.assert_allclose(
+            middle[:, :2],
+            np.tile(0.00315 * np.array([math.cos(cable.angle), math.sin(cable.angle)]), (len(middle), 1)),
+            atol=1e-7,
+        )
         assert middle[-1, 2] == pytest.approx(robot.cable_end(cable))
 
 
@@ -127,7 +131,9 @@ def test_quaternions_give_the_rotation_back():
         q = random.normal(size=4)
         q /= np.linalg.norm(q) * np.sign(q[0])
         w, x, y, z = q
-        rotation = Backbone(np.array([0.0, 1.0]), np.array([[0, 0, 0], [0, 0, 1.0]]), np.array([[x, y, z, w]] * 2)).at(np.array([0.0]))[1][0]
+        rotation = Backbone(np.array([0.0, 1.0]), np.array([[0, 0, 0], [0, 0, 1.0]]), np.array([[x, y, z, w]] * 2)).at(
+            np.array([0.0])
+        )[1][0]
         np.testing.assert_allclose(quaternion_wxyz(rotation), q, atol=1e-7)
 
 
@@ -174,9 +180,15 @@ def test_words_from_the_graph_cannot_become_markup(robot):
 
 
 def test_what_the_motors_do_stands_beside_what_the_model_says():
-    stopped = status_html(Snapshot(time=0.0, status="the target is kept", status_level="ok", motors_state="stopped", motors_message="no current <b>"))
+    stopped = status_html(
+        Snapshot(
+            time=0.0, status="the target is kept", status_level="ok", motors_state="stopped", motors_message="no current <b>"
+        )
+    )
     assert "the target is kept" in stopped and "motors stopped: no current &lt;b&gt;" in stopped and "#ef4444" in stopped
-    assert "motors homing: winding in" in status_html(Snapshot(time=0.0, motors_state="homing", motors_message="homing: winding in"))
+    assert "motors homing: winding in" in status_html(
+        Snapshot(time=0.0, motors_state="homing", motors_message="homing: winding in")
+    )
     assert "motors" not in status_html(Snapshot(time=0.0, status="the target is kept"))
 
 
@@ -245,7 +257,9 @@ def test_a_dragged_handle_asks_for_the_arc_through_it(clicks, robot):
     for callback in gizmo._impl_aux.update_cb:
         callback(types.SimpleNamespace(client=object(), target=gizmo))
     (request,) = clicks.page.requests()
-    assert math.degrees(request.angle) == pytest.approx(50.0, abs=0.01) and math.degrees(request.plane) == pytest.approx(-30.0, abs=0.01)
+    assert math.degrees(request.angle) == pytest.approx(50.0, abs=0.01) and math.degrees(request.plane) == pytest.approx(
+        -30.0, abs=0.01
+    )
     # The sliders follow the hand.
     assert clicks.handle("bend °").value == pytest.approx(50.0, abs=0.1)
 
@@ -287,7 +301,9 @@ def test_looking_back_holds_what_was_while_the_robot_goes_on(clicks, robot):
 
     def frame(i):
         bent = arc_backbone(robot.length, angle(i), 0.0)
-        clicks.page.show(Snapshot(time=0.05 * i, status=f"frame {i}", backbone=bent, tension=np.zeros(6), displacement=np.zeros(6)))
+        clicks.page.show(
+            Snapshot(time=0.05 * i, status=f"frame {i}", backbone=bent, tension=np.zeros(6), displacement=np.zeros(6))
+        )
 
     for i in range(200):  # 10 s
         frame(i)

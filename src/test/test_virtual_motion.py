@@ -7,7 +7,7 @@ import pytest
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.graph.parameters.virtual_robot import MOTIONS, VirtualRobotNodeParameters
-from gravcomp.recordings import Recording, RecordingError
+from gravcomp.recordings.imu import Recording, RecordingError
 from gravcomp.virtual.motion import (
     FollowedMotion,
     WaypointMotion,

@@ -89,7 +89,9 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> float:
 def _joint(element: xml.Element, source: str) -> Joint:
     name, kind = element.get("name"), element.get("type")
     if kind not in (*_MOVING, "fixed"):
-        raise ConfigError(f"{source}: joint '{name}' is of type '{kind}'; allowed on the way to the robot: {', '.join((*_MOVING, 'fixed'))}")
+        raise ConfigError(
+            f"{source}: joint '{name}' is of type '{kind}'; allowed on the way to the robot: {', '.join((*_MOVING, 'fixed'))}"
+        )
     origin = np.eye(4)
     given = element.find("origin")
     if given is not None:

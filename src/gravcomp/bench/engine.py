@@ -12,13 +12,13 @@ import numpy as np
 
 from gravcomp.bench import engine_control
 from gravcomp.description import Robot, load_robot_file
-from gravcomp.experiments.calculix import REFERENCE, Row, stored_rows
+from gravcomp.full_model.dynamics import DynamicSolver
+from gravcomp.full_model.statics import CableInput
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion
+from gravcomp.references.calculix import REFERENCE, Row, stored_rows
 from gravcomp.simulation import RobotModel, Simulator
-from gravcomp.simulation.dynamics import DynamicSolver
-from gravcomp.simulation.statics import CableInput
 
 Progress = Callable[[str], None]
 
@@ -62,7 +62,8 @@ def full_step(progress: Progress) -> dict:
 
 def tet4_step(progress: Progress, every: int = 1) -> dict:
     """`tet4_step_ms`, the same loop on the article's kind of mesh, `speedup_over_tet4` of the full model over it in the same run,
-    and the tips of both hanging horizontally, released: `tet4_sag_mm`, `full_sag_mm`."""
+    and the tips of both hanging horizontally, released: `tet4_sag_mm`, `full_sag_mm`.
+    """
     progress("linear tetrahedra, the article's kind of mesh")
     robot = _article()
     baseline = Simulator(RobotModel(robot, tube_mesh(robot, "tet4", **_TET4)), reduced=False)
@@ -88,9 +89,7 @@ def scaling(progress: Progress, every: int = 1) -> dict:
     cables = {}
     for count in (3, 6, 12, 24)[: max(2, 4 // every)]:
         progress(f"scaling, {count} cables")
-        around = [
-            dataclasses.replace(robot.cables[3], name=f"c{i}", angle=2.0 * np.pi * i / count) for i in range(count)
-        ]
+        around = [dataclasses.replace(robot.cables[3], name=f"c{i}", angle=2.0 * np.pi * i / count) for i in range(count)]
         cables[count] = _model_step(dataclasses.replace(robot, cables=tuple(around)))
     return {
         "scaling": {
@@ -104,7 +103,8 @@ def scaling(progress: Progress, every: int = 1) -> dict:
 
 def dynamics(progress: Progress) -> dict:
     """The robot let go straight and horizontal, 0.6 s, worst tip against the full model at steps of 0.5 ms: `dynamics_error_mm` of
-    the reduced model at 10 ms, `dynamics_full_error_mm` of the full one; `dynamics_step_ms` and `dynamics_full_step_ms`: one step."""
+    the reduced model at 10 ms, `dynamics_full_error_mm` of the full one; `dynamics_step_ms` and `dynamics_full_step_ms`: one step.
+    """
     model = RobotModel(_article())
     progress("dynamics, reference")
     reference, _ = _fall(DynamicSolver(model), model, 0.5e-3)
@@ -156,7 +156,9 @@ def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: fl
         times.append(time.perf_counter() - begin)
         if not motion.converged:
             raise ArithmeticError(f"a step of {1e3 * h:g} ms did not converge")
-        tips.append(solver.model.tip(motion.q) if isinstance(motion, ReducedMotion) else model.effectors.sections(nodes + motion.u)[-1, 0])
+        tips.append(
+            solver.model.tip(motion.q) if isinstance(motion, ReducedMotion) else model.effectors.sections(nodes + motion.u)[-1, 0]
+        )
     return np.array(tips), np.array(times)
 
 

@@ -1,5 +1,6 @@
 """The reduced model and the inverse problem: cost of a closed-loop step, error against the full model, what
-compensation leaves."""
+compensation leaves.
+"""
 
 import itertools
 from collections.abc import Callable
@@ -8,9 +9,10 @@ import numpy as np
 
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.inverse import Command, InverseController, Target, bend_target, straight_target
-from gravcomp.reduction import build, load
+from gravcomp.reduction import load
 from gravcomp.reduction.motion import ReducedDynamicSolver
 from gravcomp.simulation import RobotModel, Shape, Simulator
+from gravcomp.training import build
 
 Progress = Callable[[str], None]
 
@@ -24,7 +26,8 @@ def reduced_model(progress: Progress, every: int = 1) -> dict:
     """`reduction_build_s` (0: was built before); `reduced_step_ms`: one closed-loop step, model and inverse problem,
     and `inverse_us`: the inverse problem alone, both while gravity turns at random at 10 deg/s; `reduced_error_mm`:
     worst tip distance from the full model under the same commands at 10 and 90 deg/s; `reduced_share`: of the steps
-    that the reduced model served."""
+    that the reduced model served.
+    """
     robot = load_robot_file("article").robot
     model = RobotModel(robot)
     seconds = _build_if_needed(model, progress)
@@ -62,7 +65,8 @@ def compensation(progress: Progress, every: int = 1) -> dict:
     """What the full model says of the displacements found, over random directions of gravity: `inverse_lateral_mm`
     (position alone is kept), and with a weight on the tip's direction `inverse_tilt_deg` and
     `inverse_lateral_with_direction_mm`; `inverse_shortening_mm`: the axial error left; `inverse_least_tension_n`:
-    largest, over directions, of the least tension in a segment: cables that pull against each other."""
+    largest, over directions, of the least tension in a segment: cables that pull against each other.
+    """
     robot = load_robot_file("article").robot
     simulator, full = Simulator(robot), Simulator(robot, reduced=False)
     lateral, lateral_tilted, tilt, shortening, least = [], [], [], [], []
@@ -89,11 +93,14 @@ def compensation(progress: Progress, every: int = 1) -> dict:
 def extreme_targets(progress: Progress, every: int = 1) -> dict:
     """Targets that no shape has, or that only a robot bent right round has, each for 6 s, then the straight one for 6 s more:
     `extreme_step_ms`, the longest step of the model; `extreme_back_mm`: worst distance of the tip from where it was when the robot was
-    held straight from the start."""
+    held straight from the start.
+    """
     robot = load_robot_file("article").robot
     simulator, straight = Simulator(robot), straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
     targets = [bend_target(robot.length, angle, 0.7 * k) for k, angle in enumerate((2.6, 3.5, 4.5, 5.5, 6.2))]
-    targets += [Target(robot.length * np.array(tip)) for tip in ([0.0, 0.0, 0.0], [0.0, 0.2, -0.5], [0.9, 0.0, 0.0], [0.0, 0.0, 1.4])]
+    targets += [
+        Target(robot.length * np.array(tip)) for tip in ([0.0, 0.0, 0.0], [0.0, 0.2, -0.5], [0.9, 0.0, 0.0], [0.0, 0.0, 1.4])
+    ]
     longest, distances, steps = 0.0, [], int(6 * _RATE)
     for number, target in list(enumerate(targets))[::every]:
         for gravity in _GRAVITY * np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]):

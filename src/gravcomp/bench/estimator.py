@@ -11,15 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gravcomp.bench.imu_ablation import DURATION, ablation, board_samples
 from gravcomp.bench.orientation_peers import run_peers
 from gravcomp.orientation import EstimatorOptions, FilterOptions, GravityEstimator, estimate_recording
 from gravcomp.orientation.inclination import inclination_rmse
 from gravcomp.orientation.options import SensorOptions
 from gravcomp.orientation.prediction import PredictionOptions
-from gravcomp.recordings import Recording, read_recording
-from gravcomp.recordings.broad_folder import WHERE, broad_files
+from gravcomp.recordings.imu import Recording, read_recording
+from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 from gravcomp.thermal import HeaterOptions
+from gravcomp.trials.yaw_drift import DURATION, ablation, board_samples
 from gravcomp.virtual.parameters import Board
 
 BIAS = math.radians(1.0) * np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)  # rad/s, added

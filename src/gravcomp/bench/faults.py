@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import can
 
 from gravcomp.bench.probe import CurrentMonitor, Probe
-from gravcomp.bench.running_graph import NODES, RunningGraph
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
+from gravcomp.launcher.virtual_graph import NODES, RunningGraph
 from gravcomp.motors.driver import RECEIVED_FRAMES
 from gravcomp.motors.state import State
 
@@ -117,7 +117,7 @@ class Campaign:
             last = self.probe.states[-1] if self.probe.states else None
             if followed and last and last.state is State.ACTIVE and time.time() - last.time > _SETTLED and self.probe.match():
                 return True
-            if last and (last.state is State.STOPPED or last.state is State.FAULT and "resume" in last.message):
+            if last and (last.state is State.STOPPED or (last.state is State.FAULT and "resume" in last.message)):
                 self.probe.call("can_bridge/resume")
         return False
 
@@ -250,9 +250,12 @@ def _stop(campaign: Campaign) -> float | None:
     return None if zero is None else 1e3 * (zero - answer["sent"])
 
 
-def _kills(campaign: Campaign, kills: int, progress: Callable[[str], None]) -> tuple[list[tuple[str, float | None]], dict, list[str]]:
+def _kills(
+    campaign: Campaign, kills: int, progress: Callable[[str], None]
+) -> tuple[list[tuple[str, float | None]], dict, list[str]]:
     """Process and recovery time (s) of each kill, None for none; the worst time to safe (ms) by process; what the bridge said
-    when a recovery took too long."""
+    when a recovery took too long.
+    """
     order = [name for name in NODES for _ in range(kills)]
     campaign.random.shuffle(order)
     recovery, worst, late = [], {}, []

@@ -1,6 +1,6 @@
 """The running graph: delay from IMU frame to current frame, and what each process costs.
 
-The delay is read from the bus (see gravcomp.judging.bus_delay): from the last frame of an IMU sample to the first current
+The delay is read from the bus (see gravcomp.evaluation.bus_delay): from the last frame of an IMU sample to the first current
 frame that it caused, through bridge, estimator, simulator and controller, with six motors feeding back at 500 Hz.
 """
 
@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.bench.running_graph import NODES, RunningGraph
 from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink
-from gravcomp.judging.bus_delay import delays_of
+from gravcomp.evaluation.bus_delay import delays_of
+from gravcomp.launcher.virtual_graph import NODES, RunningGraph
 
 _WARM_UP, _LISTEN, _COST = 5.0, 10.0, 15.0  # s
 _LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's
@@ -20,7 +20,8 @@ _LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's
 
 def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST) -> dict:
     """`delay_ms` {median, p99, samples}, `bridge_cpu` (share of a core), `cpu` and `memory_mb` by process; `two_robots_hz`: commands
-    followed a second by each of two robots beside one another."""
+    followed a second by each of two robots beside one another.
+    """
     with RunningGraph() as graph:
         progress("starting the graph")
         graph.wait_for_commands()

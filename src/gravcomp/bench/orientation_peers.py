@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gravcomp.orientation.inclination import inclination_rmse
-from gravcomp.recordings import Recording
+from gravcomp.recordings.imu import Recording
 
 
 def run_peers(recordings: dict[str, Recording], progress: Callable[[str], None]) -> dict:
@@ -31,7 +31,9 @@ def run_peers(recordings: dict[str, Recording], progress: Callable[[str], None])
 def _vqf(recording: Recording) -> np.ndarray:
     from vqf import VQF
 
-    return VQF(1.0 / recording.rate).updateBatch(np.ascontiguousarray(recording.gyro), np.ascontiguousarray(recording.accel))["quat6D"]
+    return VQF(1.0 / recording.rate).updateBatch(np.ascontiguousarray(recording.gyro), np.ascontiguousarray(recording.accel))[
+        "quat6D"
+    ]
 
 
 def _madgwick(recording: Recording) -> np.ndarray:

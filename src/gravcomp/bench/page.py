@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.bench.running_graph import RunningGraph
-from gravcomp.judging.bus_delay import DelayListener
+from gravcomp.evaluation.bus_delay import DelayListener
+from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.view.browser import Browser, find_chromium
 from gravcomp.view.graphics import chosen
 
@@ -20,7 +20,8 @@ _FRAMES = "window.gravcompFrames = 0; (function count() { window.gravcompFrames+
 
 def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
     """`drawn_s`: from the start of all nodes until the page is drawn in a browser that is open already; `updates_hz`: what the page is sent a second; `animation_hz`: what the
-    browser draws at most; `delay_ms` of the loop, median and p99, `without` a viewer, `served` but looked at by nobody, `looked_at`."""
+    browser draws at most; `delay_ms` of the loop, median and p99, `without` a viewer, `served` but looked at by nobody, `looked_at`.
+    """
     if find_chromium() is None:
         return {"page": "no Chromium on this machine: apt-get install chromium"}
     delays = {}

@@ -7,9 +7,9 @@ import threading
 import time
 from dataclasses import dataclass
 
-from gravcomp.bench.running_graph import RunningGraph
 from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink
+from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.motors.state import State
 
 _CURRENT_IDS = (0x200, 0x1FF)

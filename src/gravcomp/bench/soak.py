@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 
 from gravcomp.bench.probe import CurrentMonitor, Probe
-from gravcomp.bench.running_graph import NODES, START_TIMEOUT, RunningGraph
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
+from gravcomp.launcher.virtual_graph import NODES, START_TIMEOUT, RunningGraph
 
 _WARM_UP = 60.0  # s, at most a fifth of the run
 _SAMPLE = 2.0  # s between looks at the memory

@@ -14,9 +14,7 @@ from numba import njit
 _SMALL = 1e-12  # m, of slack that is rounding
 
 
-def taut_tensions(
-    compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, taut: np.ndarray | None = None
-) -> np.ndarray:
+def taut_tensions(compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, taut: np.ndarray | None = None) -> np.ndarray:
     """Tensions (m,) in N of cables wound in by `wound` (m,) in m; NaN there means released.
 
     compliance (m, m) in m/N; free (m,) displacements without tension in m; taut (m,) the guess of which are taut.

@@ -24,7 +24,8 @@ from gravcomp.mesh.embedding import Embedding
 class TendonState:
     """At one shape: displacement (m,) in m; jacobian (m, n) of it by the unknowns; force_jacobian (m, n), whose transpose
     times the tensions is the cables' force (the same array without friction); tangent (s, 3) and length (s,) of every
-    piece; share (s,) of the cable's tension in it."""
+    piece; share (s,) of the cable's tension in it.
+    """
 
     displacement: np.ndarray
     jacobian: np.ndarray
@@ -60,7 +61,8 @@ class Tendons:
 
     def state(self, x: np.ndarray, pulling: np.ndarray | None = None) -> TendonState:
         """Lengths and Jacobians at node positions x (n, 3); `pulling` (m,) is 1 for cables pulled in, -1 for let out, 0 for
-        no friction."""
+        no friction.
+        """
         count = len(self._cable)
         length, tangent = np.empty(count), np.empty((count, 3))
         jacobian = np.zeros((self.count, 3 * self._n_free))

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gravcomp.bags import BagError
-from gravcomp.bags.streams import CABLE_STATE, POSE, VECTOR, Wanted, read_streams
 from gravcomp.calibration.measured import Measured, MeasurementError
+from gravcomp.recordings.bags import BagError
+from gravcomp.recordings.bags.streams import CABLE_STATE, POSE, VECTOR, Wanted, read_streams
 
 TIP_TOPICS = ("measured/tip", "truth/tip")
 """Of a tracker; of the virtual robot."""

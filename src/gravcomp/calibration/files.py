@@ -54,7 +54,9 @@ def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
     needed = ["time_s", "gravity_x", "gravity_y", "gravity_z", *wound, "tip_x_mm", "tip_y_mm", "tip_z_mm"]
     missing = [name for name in needed if name not in header]
     if missing:
-        raise MeasurementError(f"{path}: the column '{missing[0]}' is missing; needed: {', '.join(needed)}; found: {', '.join(header)}")
+        raise MeasurementError(
+            f"{path}: the column '{missing[0]}' is missing; needed: {', '.join(needed)}; found: {', '.join(header)}"
+        )
 
     def column(name: str, empty: float | None = None, scale: float = 1.0) -> np.ndarray:
         values = []

@@ -176,7 +176,8 @@ def predictor_compliance(robot: Robot) -> np.ndarray:
 
 def _unknowns(robot: Robot, before: StaticPrediction, offsets: bool, compliance: bool, winding: bool) -> list[_Unknown]:
     """The modulus first; an offset for every cable that is taut somewhere; a compliance for all taut cables of a segment together; the
-    winding ratio where any cable is taut."""
+    winding ratio where any cable is taut.
+    """
     taut = [c for c in range(len(robot.cables)) if (before.tension[:, c] > 1e-4).any()]
     unknowns = [_Unknown("modulus", (), 1.0)]
     if offsets:
@@ -184,7 +185,11 @@ def _unknowns(robot: Robot, before: StaticPrediction, offsets: bool, compliance:
     if compliance:
         ends = sorted({robot.cable_end(robot.cables[c]) for c in taut})
         unknowns += [
-            _Unknown("compliance", tuple(c for c in range(len(robot.cables)) if robot.cable_end(robot.cables[c]) == end), COMPLIANCE_PRIOR)
+            _Unknown(
+                "compliance",
+                tuple(c for c in range(len(robot.cables)) if robot.cable_end(robot.cables[c]) == end),
+                COMPLIANCE_PRIOR,
+            )
             for end in ends
         ]
     if winding and taut:
@@ -230,7 +235,11 @@ def _warnings(
         found.append(f"{', '.join(slack)}: never taut in these data, so the offset cannot be seen; it stays as it is")
     if not any(u.kind == "offset" for u in unknowns) and np.isfinite(windows.displacement).any():
         found.append("no cable is ever taut in these data: only the modulus was fitted")
-    found += [f"{e.name}: these data hardly tell it (± {e.interval:.2g} {e.unit}); it stays near what was assumed" for e in estimates if not e.seen]
+    found += [
+        f"{e.name}: these data hardly tell it (± {e.interval:.2g} {e.unit}); it stays near what was assumed"
+        for e in estimates
+        if not e.seen
+    ]
     deviation = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(deviation, deviation)
     for i in range(len(estimates)):

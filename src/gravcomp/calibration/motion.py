@@ -16,13 +16,16 @@ import numpy as np
 
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
-from gravcomp.simulation import DynamicsOptions, DynamicSimulator, Shape, ShapeStatus
+from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
 
 STRAIGHT = 2e-3  # m: a course whose tip begins nearer than that to the straight robot's begins straight
 COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
 """Of predicted courses: steps of 5 ms follow a fall within a tenth of a millimetre."""
 _MODULUS_RANGE, _DAMPING_RANGE = (0.05, 20.0), (0.02, 50.0)  # times the values at the start
-_CREEP_RANGES = (0.002, 2.0), (0.03, 5.0)  # of rho, and of T in s: slower creep is at rest for these courses, faster one is damping
+_CREEP_RANGES = (
+    (0.002, 2.0),
+    (0.03, 5.0),
+)  # of rho, and of T in s: slower creep is at rest for these courses, faster one is damping
 _CREEP_START = 0.08, 0.4
 # s: a model that swings out of phase is best overdamped, a wrong minimum; so short a beginning holds no swing to be out of phase with.
 _FIRST_LOOK = 0.3
@@ -57,7 +60,10 @@ class MotionFit:
 def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> tuple[np.ndarray, np.ndarray]:
     """Tip positions (t, 3) in m and directions (t, 3) at the course's times. Raises RuntimeError where the motion cannot be followed."""
     straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
-    rows = [straight if shape is None else (shape.tip_position, shape.tip_direction) for shape in predict_shapes(robot, course, options)]
+    rows = [
+        straight if shape is None else (shape.tip_position, shape.tip_direction)
+        for shape in predict_shapes(robot, course, options)
+    ]
     tips, directions = zip(*rows)
     return np.array(tips), np.array(directions)
 
@@ -102,7 +108,10 @@ def fit_motion(
         ranges = ranges | dict(zip(("creep_ratio", "creep_time"), _CREEP_RANGES))
     all_of_them = _Parameters(robot, starts, ranges)
     beginnings = [course.rows(course.time <= course.time[0] + _FIRST_LOOK) for course in courses]
-    look, whole = _Courses(beginnings, first.robot_at, mapper, progress), _Courses(courses, all_of_them.robot_at, mapper, progress)
+    look, whole = (
+        _Courses(beginnings, first.robot_at, mapper, progress),
+        _Courses(courses, all_of_them.robot_at, mapper, progress),
+    )
     options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}
     x = least_squares(look.residuals, first.start, jac=look.jacobian, bounds=first.bounds, **options).x
     # What creeps later is part of the stiffness of the beginning.

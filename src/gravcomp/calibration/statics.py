@@ -33,7 +33,8 @@ class StaticParameters:
 @dataclass(frozen=True)
 class StaticPrediction:
     """tip (k, 3) m; its derivatives by_modulus (k, 3) m/Pa, by_offset (k, 3, m), by_compliance (k, 3, m) N, by_winding (k, 3) m; tension
-    (k, m) N."""
+    (k, m) N.
+    """
 
     tip: np.ndarray
     by_modulus: np.ndarray

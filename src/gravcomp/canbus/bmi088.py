@@ -1,6 +1,6 @@
 """Scales of the Bosch BMI088: raw counts of the board's IMU frames to SI, by the range codes in BoardStatus [BMI088 data sheet].
 
-    specific force [m/s^2] = counts / (LSB per g) x 9.80665        angular rate [rad/s] = counts x range / 32767
+specific force [m/s^2] = counts / (LSB per g) x 9.80665        angular rate [rad/s] = counts x range / 32767
 """
 
 import math

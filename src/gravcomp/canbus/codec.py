@@ -78,7 +78,9 @@ class Layout:
         Raises FrameError for a missing or unknown signal, NaN, or a value that does not fit.
         """
         if values.keys() != self._names:
-            raise FrameError(f"{self.name} has the signals {', '.join(name for name, *_ in self._given)}; got {', '.join(values)}")
+            raise FrameError(
+                f"{self.name} has the signals {', '.join(name for name, *_ in self._given)}; got {', '.join(values)}"
+            )
         raw = []
         for name, scale, offset, low, high in self._given:
             value = values[name]
@@ -86,7 +88,9 @@ class Layout:
                 raise FrameError(f"{self.name}.{name} is {value}; a finite number is needed")
             count = round((value - offset) / scale)
             if not low <= count <= high:
-                raise FrameError(f"{self.name}.{name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}")
+                raise FrameError(
+                    f"{self.name}.{name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}"
+                )
             raw.append(count)
         if not self.checked:
             return self._struct.pack(*raw)

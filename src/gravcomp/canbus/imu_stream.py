@@ -35,7 +35,8 @@ _RESTART = 1_000_000  # us: a board time that goes back by more, or ahead of the
 
 class ImuSample(NamedTuple):
     """stamp, reception (s, host); board_time (us, wraps); specific_force (m/s^2) and angular_rate (rad/s) along the sensor's
-    axes; temperature (degC)."""
+    axes; temperature (degC).
+    """
 
     stamp: float
     reception: float
@@ -117,7 +118,9 @@ class ImuStream:
         if self.status is None:
             return "the board has not told its status yet"
         if self.status.protocol != codec.PROTOCOL:
-            return f"the board speaks version {self.status.protocol} of the frames; {codec.PROTOCOL} is needed: update its firmware"
+            return (
+                f"the board speaks version {self.status.protocol} of the frames; {codec.PROTOCOL} is needed: update its firmware"
+            )
         if int(self.status.flags) & 1:
             return "the board's IMU does not answer"
         if self.stuck:

@@ -63,7 +63,7 @@ class LoopbackMulticastBus(can.BusABC):
                 datagram, ancillary, _, address = self._receiver.recvmsg(4096, 64)
             except BlockingIOError:
                 remaining = None if deadline is None else deadline - time.monotonic()
-                if remaining is not None and remaining <= 0 or not select.select([self._receiver], [], [], remaining)[0]:
+                if (remaining is not None and remaining <= 0) or not select.select([self._receiver], [], [], remaining)[0]:
                     return None, False
                 continue
             except (OSError, ValueError) as error:
@@ -81,7 +81,7 @@ class LoopbackMulticastBus(can.BusABC):
             if fields["is_fd"] or not 0 <= fields["arbitration_id"] < 1 << 29:
                 raise ValueError("not a classic CAN frame")
             message = can.Message(**fields)
-            if len(message.data) > 8 or message.dlc > 8 or not message.is_remote_frame and message.dlc != len(message.data):
+            if len(message.data) > 8 or message.dlc > 8 or (not message.is_remote_frame and message.dlc != len(message.data)):
                 raise ValueError("not a classic CAN frame")
             return message
         except Exception:  # whatever a stranger sends to the port must not end the receiver

@@ -19,9 +19,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "The worked example for larger arms: the URDF of arm and robot, gravity from the IMU checked against the arm's joints, "
         "the tip error at five poses with and without compensation."
     )
-    parser.add_argument("--xacro", metavar="FILE", help="another arm of seven axes with the soft robot in it (default: the shipped one)")
-    parser.add_argument("--gravity", choices=("imu", "arm", "both"), default="both", help="from the IMU, from the arm's joints, or the IMU checked by the arm (default)")
-    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument(
+        "--xacro", metavar="FILE", help="another arm of seven axes with the soft robot in it (default: the shipped one)"
+    )
+    parser.add_argument(
+        "--gravity",
+        choices=("imu", "arm", "both"),
+        default="both",
+        help="from the IMU, from the arm's joints, or the IMU checked by the arm (default)",
+    )
+    parser.add_argument(
+        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
+    )
     parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="seconds at each pose (default 5)")
     parser.add_argument("--viewer", action="store_true", help="show it in a browser")
     add_page_arguments(parser)
@@ -107,7 +116,13 @@ def _print_summary(figures: dict) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("inclination, deg", "released, mm", "compensated, mm", title="Virtual robot on a seven-axis arm: tip error", title_justify="left")
+    table = Table(
+        "inclination, deg",
+        "released, mm",
+        "compensated, mm",
+        title="Virtual robot on a seven-axis arm: tip error",
+        title_justify="left",
+    )
     rows = zip(figures["inclination_deg"], figures["tip_error_released_mm"], figures["tip_error_compensated_mm"])
     for inclination, released, compensated in rows:
         table.add_row(f"{inclination:g}", f"{released:.2f}", f"{compensated:.2f}")
@@ -119,4 +134,6 @@ def _print_summary(figures: dict) -> None:
     console.print(f"{figures['ratio']:g} times smaller with compensation{agree}", highlight=False)
     if min(figures["followed_percent"].values()) < 100.0:
         shares = ", ".join(f"{name} {share:g} %" for name, share in figures["followed_percent"].items())
-        console.print(f"The bridge did not follow all the time ({shares} of what was measured): this machine was too busy", highlight=False)
+        console.print(
+            f"The bridge did not follow all the time ({shares} of what was measured): this machine was too busy", highlight=False
+        )

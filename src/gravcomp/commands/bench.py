@@ -46,7 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name, summary in BENCHMARKS.items():
         own = choices.add_parser(name, help=summary, description=summary)
         own.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
-        own.add_argument("--write", metavar="DOCUMENT", help="renew the table of figures in a Markdown document, between its marks")
+        own.add_argument(
+            "--write", metavar="DOCUMENT", help="renew the table of figures in a Markdown document, between its marks"
+        )
         own.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
         for option, (default, meaning) in OPTIONS.get(name, {}).items():
             own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
@@ -56,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the command; 0: measured."""
     from rich.console import Console
 
-    from gravcomp.bench.reach import figures as told_first
-    from gravcomp.experiments import figures_table
+    from gravcomp.bench.limits import figures as told_first
+    from gravcomp.report import figures_table
 
     command = f"bench {args.benchmark}"
     if args.write and args.brief:

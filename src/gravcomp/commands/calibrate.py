@@ -18,13 +18,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " gravity_x, gravity_y, gravity_z (m/s^2), CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity,"
         " cable/state and measured/tip (geometry_msgs/PoseStamped in soft_base)."
     )
-    parser.add_argument("data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual': measure the virtual robot of the robot's file")
+    parser.add_argument(
+        "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual': measure the virtual robot of the robot's file"
+    )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
     parser.add_argument("--write", metavar="YAML", help="where the calibrated robot goes (default: NAME-calibrated.yaml here)")
     parser.add_argument("--out", metavar="DIR", default="reports", help="where the page and its JSON go (default: reports)")
     parser.add_argument("--tip-topic", help="the tip's topic, for a bag (default: measured/tip or truth/tip)")
     parser.add_argument("--no-damping", action="store_true", help="leave the damping as it is")
-    parser.add_argument("--creep", action="store_true", help="fit creep besides; it takes a free fall or the like, at 50 Hz or more")
+    parser.add_argument(
+        "--creep", action="store_true", help="fit creep besides; it takes a free fall or the like, at 50 Hz or more"
+    )
     parser.add_argument("--no-offsets", action="store_true", help="leave the cables' offsets as they are")
     parser.add_argument("--no-compliance", action="store_true", help="leave the cables' elasticity as it is")
     parser.add_argument("--no-winding", action="store_true", help="leave the capstans' radius as it is")
@@ -41,12 +45,12 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError, still_windows
     from gravcomp.calibration.motion import fit_motion
+    from gravcomp.calibration.report import calibration_result
+    from gravcomp.closed_loop.setup import Setup
     from gravcomp.commands.model.build import prepare_model
     from gravcomp.description import load_robot_file
-    from gravcomp.experiments.calibration_report import calibration_result
-    from gravcomp.experiments.report import write_report
-    from gravcomp.experiments.setup import Setup
-    from gravcomp.experiments.sweep import Sweep
+    from gravcomp.report.page import write_report
+    from gravcomp.sweep import Sweep
 
     file = load_robot_file(args.robot)
     setup = Setup.of(file)
@@ -71,7 +75,10 @@ def run(args: argparse.Namespace) -> int:
                 winding=not args.no_winding,
                 progress=tell,
             )
-            robot, hardware = calibrated_robot(setup.robot, statics.parameters), calibrated_hardware(setup.hardware, statics.parameters)
+            robot, hardware = (
+                calibrated_robot(setup.robot, statics.parameters),
+                calibrated_hardware(setup.hardware, statics.parameters),
+            )
             courses = [] if args.no_damping else _moving(measured, statics.parameters)
             motion = None
             if courses:
@@ -83,7 +90,9 @@ def run(args: argparse.Namespace) -> int:
         except (MeasurementError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
     write_calibrated(file.source, target, robot, hardware)
-    result = calibration_result(measured.source, str(target), statics, motion, courses, setup.robot.segments[0].material.damping_time)
+    result = calibration_result(
+        measured.source, str(target), statics, motion, courses, setup.robot.segments[0].material.damping_time
+    )
     if not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial holds fast motion, so it stays as it is")
     result.seconds = time.perf_counter() - started
@@ -100,8 +109,8 @@ def _measured(args: argparse.Namespace, setup, sweep, tell):
 
     if args.data != "virtual":
         return read_measured(args.data, setup.robot.cable_names, args.tip_topic)
-    from gravcomp.experiments.measuring import measure
-    from gravcomp.experiments.setup import Context
+    from gravcomp.trials.calibration_run import measure
+    from gravcomp.trials.context import Context
 
     return measure(Context(setup, sweep, tell))
 

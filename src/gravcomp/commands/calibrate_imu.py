@@ -17,14 +17,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " down. From that: scale and offset of the accelerometer, offset of the gyroscope; with --up the IMU's mount; with --bias-model the"
         " gyroscope's bias over temperature, learned while the chip warms."
     )
-    parser.add_argument("file", metavar="FILE", help="a rosbag2 folder, or an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz)")
+    parser.add_argument(
+        "file", metavar="FILE", help="a rosbag2 folder, or an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz)"
+    )
     parser.add_argument("--topic", help="the IMU topic, for a bag with several")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
     parser.add_argument(
         "--up", nargs=3, type=float, action="append", metavar=("X", "Y", "Z"),
         help="direction in soft_base that pointed up in a pose; once for each pose, in their order: fits the mount",
     )  # fmt: skip
-    parser.add_argument("--bias-model", metavar="FILE", help="write the bias over temperature there; needs imu/temperature in the bag")
+    parser.add_argument(
+        "--bias-model", metavar="FILE", help="write the bias over temperature there; needs imu/temperature in the bag"
+    )
     parser.add_argument("--write", metavar="YAML", help="where the calibrated robot goes (default: NAME-calibrated.yaml here)")
     parser.add_argument("--json", action="store_true", help="print the result as JSON, last line of the output")
 
@@ -35,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
     from gravcomp.orientation.calibration import CalibrationError, calibrate
-    from gravcomp.recordings import RecordingError, read_recording
+    from gravcomp.recordings.imu import RecordingError, read_recording
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
@@ -69,7 +73,9 @@ def _learn_bias(recording, options, found, path: Path) -> tuple[float, float]:
     estimator = GravityEstimator(replace(options, calibration=found.correction))
     estimate_recording(recording, estimator)
     if estimator.learned.span is None:
-        raise ConfigError(f"{recording.source}: the IMU did not rest while its temperature was told; no bias over temperature was learned")
+        raise ConfigError(
+            f"{recording.source}: the IMU did not rest while its temperature was told; no bias over temperature was learned"
+        )
     try:
         # Written anew: what an older model holds is relative to the older offset.
         estimator.learned.save(path)
@@ -88,7 +94,11 @@ def _figures(args: argparse.Namespace, found, span: tuple[float, float] | None, 
     return {
         "file": str(args.file),
         "poses": [
-            {"samples": pose.count, "accel_m_s2": np.round(pose.accel, 4).tolist(), "gyro_deg_s": np.round(np.degrees(pose.gyro), 4).tolist()}
+            {
+                "samples": pose.count,
+                "accel_m_s2": np.round(pose.accel, 4).tolist(),
+                "gyro_deg_s": np.round(np.degrees(pose.gyro), 4).tolist(),
+            }
             for pose in found.poses
         ],
         "accel_scale": list(correction.accel_scale),
@@ -118,12 +128,16 @@ def _tell(figures: dict) -> None:
     row("accelerometer scale", figures["accel_scale"], "", figures["accel_scale_std"])
     row("accelerometer offset", figures["accel_offset_m_s2"], "m/s^2", figures["accel_offset_std_m_s2"])
     row("gyroscope offset", figures["gyro_offset_deg_s"], "deg/s")
-    console.print(f"  | |a| - g | at rest    {figures['norm_error_before_m_s2']:.4f} before, {figures['norm_error_after_m_s2']:.4f} m/s^2 after, RMS")
+    console.print(
+        f"  | |a| - g | at rest    {figures['norm_error_before_m_s2']:.4f} before, {figures['norm_error_after_m_s2']:.4f} m/s^2 after, RMS"
+    )
     if figures["mount_rpy_deg"] is not None:
         row("mount roll pitch yaw", figures["mount_rpy_deg"], "deg")
     if figures["bias_model"] is not None:
         model = figures["bias_model"]
-        console.print(f"  bias model            {model['from_degc']:.1f} to {model['to_degc']:.1f} degC: [bold]{model['file']}[/bold]")
+        console.print(
+            f"  bias model            {model['from_degc']:.1f} to {model['to_degc']:.1f} degC: [bold]{model['file']}[/bold]"
+        )
     for note in figures["notes"]:
         console.print(f"[yellow]-[/yellow] {note}")
     console.print(f"written: [bold]{figures['written']}[/bold]")

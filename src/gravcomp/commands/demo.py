@@ -25,8 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=float, default=30.0, metavar="S", help="seconds to play (default 30, at least 10)")
     parser.add_argument("--headless", action="store_true", help="without the viewer")
     parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
-    parser.add_argument("--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder")
-    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument(
+        "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
+    )
+    parser.add_argument(
+        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
+    )
     add_page_arguments(parser)
     parser.add_argument(
         "--screenshots",
@@ -51,7 +55,9 @@ def run(args: argparse.Namespace) -> int:
     if args.screenshots and args.headless:
         raise ConfigError("--screenshots shows the page, which --headless leaves out: give one of them")
     if args.screenshots and args.duration > _LONGEST_LOOKED_BACK:
-        raise ConfigError(f"--screenshots looks back over the play: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s")
+        raise ConfigError(
+            f"--screenshots looks back over the play: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
+        )
     prepare(args.robot, virtual=True)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
@@ -90,7 +96,11 @@ def run(args: argparse.Namespace) -> int:
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
             state = _follow(processes, result_file, args, pictures)
             problem = pictures.take(address) if pictures else ""
-            figures = {**state["figures"], "nodes": state["nodes"], "source": args.imu and Path(args.imu).name or "scenario: sag, compensate, tilt"}
+            figures = {
+                **state["figures"],
+                "nodes": state["nodes"],
+                "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
+            }
     _print_summary(figures)
     if args.json:
         print(json.dumps(figures), flush=True)
@@ -104,7 +114,7 @@ def _begin_of_motion(path: str) -> float:
     import numpy as np
 
     from gravcomp.config import ConfigError
-    from gravcomp.recordings import RecordingError, read_recording
+    from gravcomp.recordings.imu import RecordingError, read_recording
 
     try:
         recording = read_recording(path)
@@ -174,7 +184,11 @@ def _print_summary(figures: dict) -> None:
         ("sag without compensation", figures["sag_mm"], "mm"),
         ("tip error with compensation: lateral", figures["residual_lateral_mm"], "mm RMS"),
         ("tip error with compensation: axial", figures["residual_axial_mm"], "mm RMS"),
-        ("tip error with / without, same motion", f"{figures['tip_error_with_mm']} / {figures['tip_error_without_mm']}", "mm RMS"),
+        (
+            "tip error with / without, same motion",
+            f"{figures['tip_error_with_mm']} / {figures['tip_error_without_mm']}",
+            "mm RMS",
+        ),
         ("correlation of model and truth", figures["correlation"], ""),
         ("gravity's error", figures["gravity_error_deg"], "deg RMS"),
         ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),

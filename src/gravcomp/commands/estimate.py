@@ -11,17 +11,25 @@ import numpy as np
 from gravcomp.orientation import BiasModelError, BiasTemperatureModel, EstimatorOptions, GravityEstimator, estimate_recording
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.inclination import inclination_rmse
-from gravcomp.recordings import RecordingError, read_recording
+from gravcomp.recordings.imu import RecordingError, read_recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("file", help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder")
-    parser.add_argument("--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std")
+    parser.add_argument(
+        "file", help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     parser.add_argument("--topic", help="the IMU topic, for a bag with several")
-    parser.add_argument("--average", type=int, default=1, metavar="N", help="take the mean of every N samples (3: 95.2 Hz in BROAD)")
-    parser.add_argument("--robot", default="article", help="shipped robot or YAML: its mount and its imu_estimator parameters are taken")
+    parser.add_argument(
+        "--average", type=int, default=1, metavar="N", help="take the mean of every N samples (3: 95.2 Hz in BROAD)"
+    )
+    parser.add_argument(
+        "--robot", default="article", help="shipped robot or YAML: its mount and its imu_estimator parameters are taken"
+    )
     parser.add_argument("--bias-model", metavar="FILE", help="bias over temperature as kept by imu_estimator")
 
 

@@ -12,7 +12,9 @@ from gravcomp.launcher.page_address import wait_for_page
 def add_page_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare where the page is served, and whether it is opened."""
     parser.add_argument("--port", type=int, default=8080, help="the viewer's port on this machine (default 8080)")
-    parser.add_argument("--no-open", action="store_true", help="only print the page's address, even where a browser could be opened")
+    parser.add_argument(
+        "--no-open", action="store_true", help="only print the page's address, even where a browser could be opened"
+    )
 
 
 def show_page(processes: Graph, viewer: NodeSpec, no_open: bool) -> str:

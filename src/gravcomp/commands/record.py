@@ -14,7 +14,9 @@ _PATIENCE = 20.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "Record the graph that runs on this machine into a bag that `ros2 bag` reads; a kill loses at most a second."
+    parser.description = (
+        "Record the graph that runs on this machine into a bag that `ros2 bag` reads; a kill loses at most a second."
+    )
     parser.add_argument("--out", metavar="DIR", help="folder of the bag, which must not exist (default: gravcomp_DATE_TIME here)")
     parser.add_argument("--topics", nargs="+", default=[], metavar="TOPIC", help="only these (default: all)")
     parser.add_argument("--namespace", default="", metavar="NS", help="of the robot, for one of several (default: /)")

@@ -18,13 +18,17 @@ _ESTIMATES, _KEPT = ("gravity", "imu/data", "imu/bias"), 1000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = (
-        "Play a recorded IMU stream into estimator, simulator and controller. A bag that was cut off or damaged is read as far as it goes."
+    parser.description = "Play a recorded IMU stream into estimator, simulator and controller. A bag that was cut off or damaged is read as far as it goes."
+    parser.add_argument(
+        "bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, or an .npz file in BROAD's layout"
     )
-    parser.add_argument("bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, or an .npz file in BROAD's layout")
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (default 1); 0: as fast as it is taken")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="X", help="times real time (default 1); 0: as fast as it is taken"
+    )
     parser.add_argument("--topic", default="", help="the IMU topic, for a bag with several")
-    parser.add_argument("--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
+    parser.add_argument(
+        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
+    )
     parser.add_argument("--out", metavar="DIR", help="record what the graph makes of it into a new bag")
     parser.add_argument("--viewer", action="store_true", help="show it in a browser")
     add_page_arguments(parser)
@@ -40,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph
-    from gravcomp.recordings import RecordingError, read_recording
+    from gravcomp.recordings.imu import RecordingError, read_recording
 
     if not 0.0 <= args.speed <= 1000.0:
         raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as it is taken) to 1000")
@@ -91,7 +95,7 @@ def _lossless(namespace: str) -> dict:
 
 def _whole(path: str) -> str:
     """The path itself, or what could be saved of a damaged bag."""
-    from gravcomp.bags.recovery import readable
+    from gravcomp.recordings.bags.recovery import readable
 
     if Path(path).suffix == ".npz":
         return path

@@ -15,8 +15,8 @@ from gravcomp.experiments import EXPERIMENTS, experiment
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from gravcomp.experiments.result import Result
-    from gravcomp.experiments.setup import Setup
+    from gravcomp.closed_loop.setup import Setup
+    from gravcomp.report.result import Result
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,11 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="of the virtual robot's noise (default: the robot file's)")
     parser.add_argument("--workers", type=int, help="processes for sweeps (default: one a core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
-    parser.add_argument("--write", metavar="DOCUMENT", help="renew each experiment's table of figures in a Markdown document, between its marks")
+    parser.add_argument(
+        "--write", metavar="DOCUMENT", help="renew each experiment's table of figures in a Markdown document, between its marks"
+    )
     parser.add_argument(
         "--bag", metavar="BAG", help="judge a recording of the graph on a robot of your own in place of the virtual robot (`gravcomp record`; with its"
         " measured tip as geometry_msgs/PoseStamped on measured/tip)")  # fmt: skip
-    parser.add_argument("--tip-topic", metavar="TOPIC", help="of the measured tip in the bag (default: measured/tip, else truth/tip)")
+    parser.add_argument(
+        "--tip-topic", metavar="TOPIC", help="of the measured tip in the bag (default: measured/tip, else truth/tip)"
+    )
     parser.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
 
 
@@ -44,19 +48,22 @@ def run(args: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    from gravcomp.closed_loop.setup import Setup
     from gravcomp.commands.model.build import prepare_model
     from gravcomp.description import load_robot_file
-    from gravcomp.experiments import figures_table
-    from gravcomp.experiments.report import write_index, write_report
-    from gravcomp.experiments.setup import Context, Setup
-    from gravcomp.experiments.sweep import Sweep
+    from gravcomp.report import figures_table
+    from gravcomp.report.page import write_index, write_report
+    from gravcomp.sweep import Sweep
+    from gravcomp.trials.context import Context
 
     names = list(EXPERIMENTS) if args.name == "all" else [args.name]
     if args.write and args.bag:
         raise ConfigError("--write puts the virtual robot's figures into a document; --bag judges another's: give one of both")
     if args.write:
         if args.brief:
-            raise ConfigError("--write puts the figures of whole experiments into a document; --brief shortens them: give one of both")
+            raise ConfigError(
+                "--write puts the figures of whole experiments into a document; --brief shortens them: give one of both"
+            )
         for name in names:
             figures_table.check_place(Path(args.write), f"reproduce {name}")
     folder = Path(args.out).expanduser()
@@ -102,10 +109,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _judge(args: argparse.Namespace, setup: Setup, folder: Path, console: Console) -> int:
     """The recorded robot in place of the virtual one. Raises ConfigError; with `all`, what the bag cannot tell is only said."""
-    from gravcomp.experiments import figures_table
-    from gravcomp.experiments.recorded import JUDGES, judge
-    from gravcomp.experiments.recorded.run import RecordedRun
-    from gravcomp.experiments.report import write_report
+    from gravcomp.evaluation.recorded import JUDGES, judge
+    from gravcomp.evaluation.recorded.run import RecordedRun
+    from gravcomp.report import figures_table
+    from gravcomp.report.page import write_report
 
     recorded = RecordedRun(Path(args.bag).expanduser(), setup, args.tip_topic)
     # One name for each way of judging.

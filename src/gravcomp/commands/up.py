@@ -11,8 +11,14 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = "Bridge, estimator, simulator and controller of a robot, until Ctrl-C. The motors are driven."
-    parser.add_argument("robot", nargs="?", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)")
-    parser.add_argument("--interface", default="", help="python-can interface in place of the file's, e.g. socketcan; with --virtual a bus of its own")
+    parser.add_argument(
+        "robot", nargs="?", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
+    )
+    parser.add_argument(
+        "--interface",
+        default="",
+        help="python-can interface in place of the file's, e.g. socketcan; with --virtual a bus of its own",
+    )
     parser.add_argument("--channel", default="", help="its channel, e.g. can0")
     parser.add_argument("--virtual", action="store_true", help="with the virtual robot on the bus")
     parser.add_argument("--namespace", default="", help="of all nodes, e.g. /left; for several robots in one graph")

@@ -132,7 +132,9 @@ def from_mapping(cls: type, mapping: Any, *, source: str, key: str = "") -> Any:
     for name, field in fields.items():
         here = _join(key, name)
         if name in mapping:
-            values[field.name] = convert(mapping[name], hints[field.name], field.metadata.get("parameter"), source=source, key=here)
+            values[field.name] = convert(
+                mapping[name], hints[field.name], field.metadata.get("parameter"), source=source, key=here
+            )
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             declared = field.metadata.get("parameter")
             meaning = f" ({declared.description}; allowed: {declared.allowed()})" if declared else ""

@@ -1,8 +1,8 @@
 """The robot as data: one YAML file, read into frozen data classes and checked.
 
-    file = load_robot_file("article")      # a shipped robot by its name, or a path
-    file.robot.segments[0].length          # m
-    file.section("hardware")               # a top-level section as a plain mapping, for its owner to parse
+file = load_robot_file("article")      # a shipped robot by its name, or a path
+file.robot.segments[0].length          # m
+file.section("hardware")               # a top-level section as a plain mapping, for its owner to parse
 """
 
 from gravcomp.description.robot import (

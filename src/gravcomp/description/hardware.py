@@ -27,7 +27,9 @@ class CanInterface:
     """A bus by python-can's interface and channel."""
 
     interface: str = parameter(
-        "udp_multicast", description="python-can interface: udp_multicast (virtual robot), socketcan, slcan, pcan, ...", read_only=True
+        "udp_multicast",
+        description="python-can interface: udp_multicast (virtual robot), socketcan, slcan, pcan, ...",
+        read_only=True,
     )
     channel: str = parameter(
         "239.74.163.2:43113", description="its channel: can0, /dev/ttyACM0, or multicast group:port", read_only=True
@@ -47,16 +49,16 @@ class Drive:
     gear_ratio: float = parameter(36.0, minimum=1, maximum=1000, description="rotor turns a turn of the capstan (M2006: 36)")
     capstan_radius: float = parameter(5.0, edge="mm", minimum=0.5, maximum=50, description="to the middle of the cable")
     torque_constant: float = parameter(0.18, unit="N m/A", minimum=1e-3, maximum=10, description="at the gear's output")
-    current_limit: float = parameter(
-        1.0, unit="A", minimum=0.05, maximum=10, description="no current frame ever asks for more"
-    )
+    current_limit: float = parameter(1.0, unit="A", minimum=0.05, maximum=10, description="no current frame ever asks for more")
     tension_limit: float = parameter(5.0, unit="N", minimum=0, maximum=100, description="of the feed-forward")
     pretension: float = parameter(0.0, unit="N", minimum=0, maximum=20, description="least feed-forward of tension")
     velocity_limit: float = parameter(40.0, edge="mm/s", minimum=0.1, maximum=250, description="of the cable")
     acceleration_limit: float = parameter(0.2, unit="m/s^2", minimum=0.01, maximum=50, description="of the cable's setpoint")
     displacement_minimum: float = parameter(-30.0, edge="mm", minimum=-200, maximum=0, description="farthest paid out")
     displacement_maximum: float = parameter(30.0, edge="mm", minimum=0, maximum=200, description="farthest pulled in")
-    position_gain: float = parameter(25.0, unit="1/s", minimum=0.1, maximum=200, description="velocity asked for a metre of error")
+    position_gain: float = parameter(
+        25.0, unit="1/s", minimum=0.1, maximum=200, description="velocity asked for a metre of error"
+    )
     velocity_gain: float = parameter(90.0, unit="A s/m", minimum=0.1, maximum=5000, description="current for velocity error")
     velocity_integral: float = parameter(
         1500.0, unit="A/m", minimum=0, maximum=1e5, description="current for integrated velocity error; overcomes friction"
@@ -102,11 +104,17 @@ class Watchdog:
     """After what time what is missing counts as gone, and what counts as a fault of a motor."""
 
     command_timeout: float = parameter(
-        200.0, edge="ms", minimum=20, maximum=5000, description="without cable/command caused by an IMU sample younger than this: hold"
+        200.0,
+        edge="ms",
+        minimum=20,
+        maximum=5000,
+        description="without cable/command caused by an IMU sample younger than this: hold",
     )
     command_jump: float = parameter(5.0, edge="mm", minimum=0.1, maximum=100, description="between two commands; more is refused")
     imu_timeout: float = parameter(150.0, edge="ms", minimum=20, maximum=5000, description="without IMU samples: hold")
-    feedback_timeout: float = parameter(100.0, edge="ms", minimum=5, maximum=1000, description="without a motor's feedback: fault")
+    feedback_timeout: float = parameter(
+        100.0, edge="ms", minimum=5, maximum=1000, description="without a motor's feedback: fault"
+    )
     zero_timeout: float = parameter(
         1000.0, edge="ms", minimum=100, maximum=60000, description="without feedback: the count of turns is lost"
     )

@@ -17,9 +17,7 @@ from gravcomp.config import parameter
 class Material:
     """An isotropic soft material."""
 
-    law: str = parameter(
-        "svk", choices=("svk", "neo_hookean"), description="St. Venant-Kirchhoff, or compressible neo-Hookean"
-    )
+    law: str = parameter("svk", choices=("svk", "neo_hookean"), description="St. Venant-Kirchhoff, or compressible neo-Hookean")
     youngs_modulus: float = parameter(0.8, edge="MPa", minimum=1e-3, maximum=1e6, description="Young's modulus")
     poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.495, description="Poisson's ratio")
     density: float = parameter(1145.0, unit="kg/m^3", minimum=0.0, maximum=30000.0, description="density")
@@ -27,7 +25,10 @@ class Material:
         20.0, edge="ms", minimum=0.0, maximum=10000.0, description="Kelvin-Voigt: stress of strain rate over stress of strain"
     )
     creep_ratio: float = parameter(
-        0.0, minimum=0.0, maximum=10.0, description="stiffness that a load finds at first and that creeps away, over the lasting one; in motion alone"
+        0.0,
+        minimum=0.0,
+        maximum=10.0,
+        description="stiffness that a load finds at first and that creeps away, over the lasting one; in motion alone",
     )
     creep_time: float = parameter(0.5, unit="s", minimum=1e-3, maximum=1e4, description="in which it creeps away")
 
@@ -141,9 +142,7 @@ class Limits:
     displacement_min: float = parameter(-30.0, edge="mm", minimum=-1000.0, maximum=0.0, description="farthest paid out")
     displacement_max: float = parameter(30.0, edge="mm", minimum=0.0, maximum=1000.0, description="farthest pulled in")
     tension_rate: float = parameter(20.0, unit="N/s", minimum=0.001, maximum=1e5, description="greatest change of tension")
-    displacement_rate: float = parameter(
-        40.0, edge="mm/s", minimum=0.001, maximum=1e4, description="greatest speed of a cable"
-    )
+    displacement_rate: float = parameter(40.0, edge="mm/s", minimum=0.001, maximum=1e4, description="greatest speed of a cable")
 
     def __post_init__(self) -> None:
         if self.tension_min >= self.tension_max:
@@ -232,9 +231,7 @@ class Robot:
         if self.body is not None:
             material = dataclasses.replace(self.body.material, **changes)
             return dataclasses.replace(self, body=dataclasses.replace(self.body, material=material))
-        segments = tuple(
-            dataclasses.replace(s, material=dataclasses.replace(s.material, **changes)) for s in self.segments
-        )
+        segments = tuple(dataclasses.replace(s, material=dataclasses.replace(s.material, **changes)) for s in self.segments)
         return dataclasses.replace(self, segments=segments)
 
     def _check_cable(self, key: str, cable: Cable) -> None:

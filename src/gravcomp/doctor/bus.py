@@ -30,6 +30,13 @@ def examine(interface: str, channel: str) -> list[Finding]:
             except codec.FrameError as error:
                 heard[f"unknown ({error})"] += 1
     if not heard:
-        return [Finding("missing", "bus", f"{interface} {channel}: nothing was heard for {_LISTEN:g} s", "are motors and board powered, the bus terminated?")]
+        return [
+            Finding(
+                "missing",
+                "bus",
+                f"{interface} {channel}: nothing was heard for {_LISTEN:g} s",
+                "are motors and board powered, the bus terminated?",
+            )
+        ]
     rates = ", ".join(f"{name} {count / _LISTEN:.0f} Hz" for name, count in sorted(heard.items()))
     return [Finding("ok", "bus", f"{interface} {channel}: {rates}")]

@@ -33,7 +33,9 @@ def _packages() -> list[Finding]:
     found, missing = [], []
     for name in _PACKAGES:
         try:
-            found.append(f"{name} {importlib.metadata.version('ros-rclpy' if name == 'rclpy' and not os.environ.get('ROS_DISTRO') else name)}")
+            found.append(
+                f"{name} {importlib.metadata.version('ros-rclpy' if name == 'rclpy' and not os.environ.get('ROS_DISTRO') else name)}"
+            )
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
     findings = [Finding("ok", "packages", ", ".join(found))]

@@ -19,4 +19,10 @@ def examine(robot: str) -> list[Finding]:
                 raise ConfigError(f"{file.source}: unknown key 'nodes.{name}'; allowed: {', '.join(sorted(known))}")
     except ConfigError as error:
         return [Finding("missing", "robot file", str(error))]
-    return [Finding("ok", "robot file", f"{file.source}: {file.robot.name}, {len(file.robot.cables)} cables, {1e3 * file.robot.length:g} mm")]
+    return [
+        Finding(
+            "ok",
+            "robot file",
+            f"{file.source}: {file.robot.name}, {len(file.robot.cables)} cables, {1e3 * file.robot.length:g} mm",
+        )
+    ]

@@ -65,7 +65,9 @@ def _of_sourced_ros() -> Interpreter:
     path = shutil.which("python3")
     found = path and _probe(path)
     if not found or not found["rclpy"]:
-        raise SetupError("ROS_DISTRO is 'jazzy' but python3 finds no rclpy: source /opt/ros/jazzy/setup.bash anew, or unset ROS_DISTRO")
+        raise SetupError(
+            "ROS_DISTRO is 'jazzy' but python3 finds no rclpy: source /opt/ros/jazzy/setup.bash anew, or unset ROS_DISTRO"
+        )
     return Interpreter(path, tuple(found["version"]), found["ensurepip"], found["headers"], prefix)
 
 

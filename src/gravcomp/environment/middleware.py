@@ -17,9 +17,16 @@ def middleware(given: "Mapping[str, str]") -> "dict[str, str]":
         return reach
     if reach["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST" and not given.get("ROS_STATIC_PEERS"):
         # The profile itself keeps to this host; rmw_fastrtps leaves it as it is only where the range is the system's.
-        return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", "FASTRTPS_DEFAULT_PROFILES_FILE": str(_HERE / "fastdds_loopback.xml")}
+        return {
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
+            "FASTRTPS_DEFAULT_PROFILES_FILE": str(_HERE / "fastdds_loopback.xml"),
+        }
     transports = given.get("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-    return {**reach, "FASTDDS_BUILTIN_TRANSPORTS": transports, "FASTRTPS_DEFAULT_PROFILES_FILE": str(_HERE / "fastdds_network.xml")}
+    return {
+        **reach,
+        "FASTDDS_BUILTIN_TRANSPORTS": transports,
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(_HERE / "fastdds_network.xml"),
+    }
 
 
 def reach(given: "Mapping[str, str]") -> str:

@@ -10,7 +10,6 @@ import signal
 import sys
 from pathlib import Path
 
-from gravcomp.commands import COMMANDS, overview
 from gravcomp.environment import packages, system_packages, workspace
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import choose_interpreter
@@ -20,13 +19,7 @@ SEARCH_PATHS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PATH")
 
 
 def enter(root: Path, arguments: "list[str]") -> int:
-    """Run the command in the environment; returns only when it cannot (exit code 2 or 3) or need not."""
-    if not arguments or arguments[0] in ("-h", "--help", "help"):
-        print(overview())
-        return 0
-    if arguments[0] not in COMMANDS:
-        print(f"gravcomp: unknown command '{arguments[0]}'\n\n{overview()}", file=sys.stderr)
-        return 2
+    """Run the command in the environment, which replaces this process; returns only where the environment cannot be made (3, 130)."""
     # A bare environment has neither; ROS logs below HOME, and the build looks its tools up in PATH.
     os.environ.setdefault("PATH", "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin")
     os.environ.setdefault("HOME", pwd.getpwuid(os.geteuid()).pw_dir)
@@ -78,7 +71,9 @@ def _make(root: Path) -> dict:
         system_packages.provide(system_packages.missing_packages(python))
         inner = root / ".venv" / "bin" / "python"
         stamp = root / ".venv" / "packages.key"
-        packages_key = hashlib.sha256(packages.lock_file(root, python).read_bytes() + str((root, python.version, python.ros)).encode()).hexdigest()
+        packages_key = hashlib.sha256(
+            packages.lock_file(root, python).read_bytes() + str((root, python.version, python.ros)).encode()
+        ).hexdigest()
         if not (stamp.exists() and stamp.read_text() == packages_key):
             inner = packages.build(root, python)
             stamp.write_text(packages_key)
@@ -93,15 +88,14 @@ def _make(root: Path) -> dict:
 def _key(root: Path, ros: str) -> str:
     """Everything that makes the environment: the place, the ROS, the locks, the messages, the packages' files.
 
-    Python files do not count, because the workspace links to them; only those of gravcomp_msgs are linked one by one, so
-    there a new one counts.
+    Python files do not count, because the workspace links to their folders.
     """
     sourced = os.environ.get("AMENT_PREFIX_PATH", "").split(":")[-1] if os.environ.get("ROS_DISTRO") else ""
     digest = hashlib.sha256(f"{root}|{ros}|{sourced}".encode())
     files = [*root.glob("*.lock"), root / "colcon.meta"]
     files += [root / "src" / name for name in ("package.xml", "setup.py", "setup.cfg")]
     for package in workspace.PACKAGES[1:]:
-        files += [p for p in (root / package).rglob("*") if p.is_file() and _is_built(p, package)]
+        files += [p for p in (root / package).rglob("*") if p.is_file() and _is_built(p)]
     for path in sorted(files):
         digest.update(str(path.relative_to(root)).encode())
         if path.suffix != ".py" or path.name == "setup.py":
@@ -109,10 +103,10 @@ def _key(root: Path, ros: str) -> str:
     return digest.hexdigest()
 
 
-def _is_built(path: Path, package: str) -> bool:
+def _is_built(path: Path) -> bool:
     if {"__pycache__", "test"} & set(path.parts) or ".egg-info" in str(path) or path.suffix == ".md":
         return False
-    return path.suffix != ".py" or package == "gravcomp_msgs" or path.name == "setup.py"
+    return path.suffix != ".py" or path.name == "setup.py"
 
 
 @contextlib.contextmanager

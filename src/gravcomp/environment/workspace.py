@@ -10,7 +10,7 @@ from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import Interpreter
 from gravcomp.environment.progress import Progress
 
-PACKAGES = ("src", "gravcomp_msgs", "gravcomp_hw", "gravcomp_estimation", "gravcomp_fem")
+PACKAGES = ("src", "gravcomp_msgs", "gravcomp_node", "gravcomp_hw", "gravcomp_estimation", "gravcomp_fem")
 
 
 def build(root: Path, python: Interpreter, inner: Path) -> "dict[str, str]":

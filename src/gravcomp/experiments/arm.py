@@ -1,15 +1,17 @@
 """The robot on an arm that turns its base through the article's five directions and back, two passes of 90 s, straight and bent."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from gravcomp.experiments import metrics
-from gravcomp.experiments.cases import GROUND, Case, target_of
-from gravcomp.experiments.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
-from gravcomp.experiments.loop import ClosedLoop, Trace
-from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context, Setup
+from gravcomp.closed_loop.loop import ClosedLoop, Trace
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.evaluation import metrics
 from gravcomp.inverse.target import arc_points
+from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
+from gravcomp.trials.context import Context
+from gravcomp.trials.holding import GROUND, Case, target_of
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
@@ -50,7 +52,11 @@ def run(context: Context) -> Result:
         plots.append(
             Plot(
                 f"{shape.capitalize()}: at the five poses",
-                _shapes(without, fitted, arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station)),
+                _shapes(
+                    without,
+                    fitted,
+                    arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station),
+                ),
                 "From the side, gravity downwards, at the end of each stop of the first pass. Grey: the shape asked for. Pink: without compensation. Vermilion:"
                 " compensated, calibrated.",
             )
@@ -90,7 +96,10 @@ def run(context: Context) -> Result:
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
     inclinations = [*INCLINATIONS, *INCLINATIONS[-2::-1]]
-    stops = [(base_orientation(np.radians(i)), (HOLD / 10 if brief else HOLD) + (_START if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
+    stops = [
+        (base_orientation(np.radians(i)), (HOLD / 10 if brief else HOLD) + (_START if k == 0 else 0.0))
+        for k, i in enumerate(inclinations)
+    ]
     motion = WaypointMotion(stops, RATE * (5 if brief else 1))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
@@ -106,8 +115,8 @@ def _errors(trace: Trace, target) -> metrics.TipErrors:
 
 def _recovery(trace: Trace, target: np.ndarray) -> float:
     """r between the tip asked for and the true one, in world axes from the base."""
-    wanted = metrics.rotate(trace.base_orientation, np.broadcast_to(target, trace.tip_position.shape))
-    return metrics.recovery_rate(wanted, metrics.rotate(trace.base_orientation, trace.tip_position))
+    wanted = Rotation.from_quat(trace.base_orientation).apply(target)
+    return metrics.recovery_rate(wanted, Rotation.from_quat(trace.base_orientation).apply(trace.tip_position))
 
 
 def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
@@ -137,10 +146,10 @@ def _end_of_stop(trace: Trace, base: np.ndarray) -> int:
 def _course(without: Trace, fitted: Trace, target: np.ndarray) -> str:
     with Drawing(1, 2, width=10.5, height=3.2) as drawing:
         height, error = drawing.axes
-        wanted = metrics.rotate(fitted.base_orientation, np.broadcast_to(target, fitted.tip_position.shape))
+        wanted = Rotation.from_quat(fitted.base_orientation).apply(target)
         height.plot(fitted.time, 1e3 * wanted[:, 2], color=TARGET, label="asked for", linewidth=2.4, alpha=0.6)
         for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated, calibrated")):
-            tip = metrics.rotate(trace.base_orientation, trace.tip_position)
+            tip = Rotation.from_quat(trace.base_orientation).apply(trace.tip_position)
             height.plot(trace.time, 1e3 * tip[:, 2], color=colour, label=label, linewidth=1.2)
             error.plot(trace.time, 1e3 * np.linalg.norm(trace.tip_position - target, axis=1), color=colour, label=label)
         height.set_ylabel("height of the tip in mm")

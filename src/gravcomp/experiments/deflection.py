@@ -7,13 +7,13 @@ import numpy as np
 
 from gravcomp.description import Elements, Robot, Segment
 from gravcomp.description.robot import Material
-from gravcomp.experiments import calculix
-from gravcomp.experiments.beams import Tube, elastica, euler_bernoulli
-from gravcomp.experiments.drawing import CYCLE, REST, Drawing, draw_robot, equal_axes, side_view
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
 from gravcomp.mesh.tube import tube_mesh
+from gravcomp.references import calculix
+from gravcomp.references.beams import Tube, elastica, euler_bernoulli
+from gravcomp.report.drawing import CYCLE, REST, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.simulation import RobotModel, Simulator
+from gravcomp.trials.context import Context
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Deflection under gravity"
@@ -128,7 +128,10 @@ def _solve(job: tuple[float, list[float]]) -> list[tuple[str, list, float]]:
     tetrahedra = RobotModel(robot, tube_mesh(dataclasses.replace(robot, elements=Elements(grading=1.0)), **TETRAHEDRA))
     rest = np.array([0.0, 0.0, robot.length])
     found = []
-    for name, simulator in (("this model", Simulator(robot, reduced=False)), ("linear tetrahedra", Simulator(tetrahedra, reduced=False))):
+    for name, simulator in (
+        ("this model", Simulator(robot, reduced=False)),
+        ("linear tetrahedra", Simulator(tetrahedra, reduced=False)),
+    ):
         simulator.solve(np.zeros(3))  # compiles what is not compiled yet
         started = time.perf_counter()
         tips = [simulator.solve(_gravity(a)).tip_position - rest for a in inclinations]

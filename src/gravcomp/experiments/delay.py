@@ -6,14 +6,15 @@ import time
 
 import numpy as np
 
-from gravcomp.experiments import metrics
-from gravcomp.experiments.cases import Case, target_of
-from gravcomp.experiments.drawing import MODEL, REAL, WITHOUT, Drawing
-from gravcomp.experiments.loop import SAMPLE_PERIOD, ClosedLoop
-from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context, Setup
+from gravcomp.closed_loop.loop import SAMPLE_PERIOD, ClosedLoop
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.evaluation import metrics
 from gravcomp.launcher import LaunchError, NodeDied
+from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
+from gravcomp.trials.context import Context
+from gravcomp.trials.holding import Case, target_of
 from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
 
 TITLE = "Delay, and prediction of gravity"
@@ -108,8 +109,8 @@ def run(context: Context) -> Result:
 
 def _graph_delays(context: Context) -> tuple[list[float], str]:
     """Delays in s of the running graph, or none and why."""
-    from gravcomp.bench.running_graph import RunningGraph
-    from gravcomp.judging.bus_delay import DelayListener
+    from gravcomp.evaluation.bus_delay import DelayListener
+    from gravcomp.launcher.virtual_graph import RunningGraph
 
     context.progress("starting the running graph")
     try:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from gravcomp.experiments.lumen import Lumen, Reach
 from gravcomp.experiments.reaching import reaching
-from gravcomp.experiments.result import Result
-from gravcomp.experiments.setup import Context
+from gravcomp.report.result import Result
+from gravcomp.trials.context import Context
+from gravcomp.trials.lumen import Lumen, Reach
 
 TITLE = "Hand-held, through lumens"
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gravcomp.bench.imu_ablation import COLD, DURATION, RATE, REST, ROOM, board_samples, yaw_errors
-from gravcomp.experiments.drawing import MODEL, REAL, Drawing
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.report.drawing import MODEL, REAL, Drawing
+from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.thermal import HeaterOptions, ThermalPlantOptions
+from gravcomp.trials.context import Context
+from gravcomp.trials.yaw_drift import COLD, DURATION, RATE, REST, ROOM, board_samples, yaw_errors
 from gravcomp.virtual.board import SAMPLE_PERIOD
 from gravcomp.virtual.parameters import Board
 
@@ -22,7 +22,11 @@ _FILTERS = (("filter", "with filter"), ("no_filter", "raw rate integrated"))
 def run(context: Context) -> Result:
     """The experiment."""
     duration = DURATION / 9 if context.brief else DURATION
-    jobs = [(context.setup.truth.board, rate, heated, duration, context.setup.seed) for _, rate in _MOTIONS for heated in (True, False)]
+    jobs = [
+        (context.setup.truth.board, rate, heated, duration, context.setup.seed)
+        for _, rate in _MOTIONS
+        for heated in (True, False)
+    ]
     courses = context.map(_drift, jobs, "nine minutes of IMU samples")
     runs = [(motion, heated) for motion, _ in _MOTIONS for heated in (True, False)]
     figures, rows = [], []
@@ -30,11 +34,15 @@ def run(context: Context) -> Result:
         for key, label in _FILTERS:
             yaw = course[key]
             heating = "heated" if heated else "not heated"
-            rows.append((motion, label, heating, float(np.abs(yaw).max()), _within(yaw, _WINDOW), float(course["temperature"].std())))
+            rows.append(
+                (motion, label, heating, float(np.abs(yaw).max()), _within(yaw, _WINDOW), float(course["temperature"].std()))
+            )
             if key == "filter" or not heated:
                 article = "wanders about 20 deg in 30 s" if (key, heated, motion) == ("no_filter", False, "at rest") else ""
                 limit = 1.0 if (key, heated, motion) == ("filter", True, "at rest") else None
-                figures.append(Figure(f"yaw drift, {motion}, {label}, {heating}", float(np.abs(yaw).max()), "deg", article, limit))
+                figures.append(
+                    Figure(f"yaw drift, {motion}, {label}, {heating}", float(np.abs(yaw).max()), "deg", article, limit)
+                )
     return Result(
         name="imu-ablation",
         title=TITLE,
@@ -43,16 +51,32 @@ def run(context: Context) -> Result:
         f" the core at full speed. Stored at {COLD:g} degC, in a room of {ROOM:g} degC; yaw against the truth after {REST:g} s at rest.",
         figures=figures,
         parts=[
-            Plot("Yaw drift over nine minutes", _panels(runs, courses), "Mind the different scales: the filter's panels would be a line in the others."),
+            Plot(
+                "Yaw drift over nine minutes",
+                _panels(runs, courses),
+                "Mind the different scales: the filter's panels would be a line in the others.",
+            ),
             Table(
                 "All eight pipelines",
-                ("motion", "orientation", "heating", "largest drift, deg", "largest within 30 s, deg", "temperature's deviation, degC"),
+                (
+                    "motion",
+                    "orientation",
+                    "heating",
+                    "largest drift, deg",
+                    "largest within 30 s, deg",
+                    "temperature's deviation, degC",
+                ),
                 rows,
                 "Yaw alone: it is not observable from gravity, so it shows the gyroscope's bias at its barest. Compensation needs only the"
                 " direction of gravity, which the accelerometer holds.",
             ),
         ],
-        parameters={"duration_s": duration, "rest_s": REST, "rate_deg_s": float(np.degrees(RATE)), "board": repr(context.setup.truth.board)},
+        parameters={
+            "duration_s": duration,
+            "rest_s": REST,
+            "rate_deg_s": float(np.degrees(RATE)),
+            "board": repr(context.setup.truth.board),
+        },
     )
 
 

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.experiments import metrics
-from gravcomp.experiments.cases import GROUND, Case, Outcome, pooled_recovery, run_case
-from gravcomp.experiments.drawing import MODEL, REAL, REST, WITHOUT, Drawing, draw_robot, equal_axes, side_view
-from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.evaluation import metrics
+from gravcomp.report.drawing import MODEL, REAL, REST, WITHOUT, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
+from gravcomp.trials.context import Context
+from gravcomp.trials.holding import GROUND, Case, Outcome, pooled_recovery, run_case
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "A longer distal segment"

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from gravcomp.experiments.cases import GROUND
-from gravcomp.experiments.drawing import REAL, TARGET, Drawing, draw_robot
-from gravcomp.experiments.drawing import WITHOUT as WITHOUT_COLOUR
-from gravcomp.experiments.lumen import FED, HELD, WITHOUT, Reach, Reached, run_reach
-from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.report.drawing import REAL, TARGET, Drawing, draw_robot
+from gravcomp.report.drawing import WITHOUT as WITHOUT_COLOUR
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
+from gravcomp.trials.context import Context
+from gravcomp.trials.holding import GROUND
+from gravcomp.trials.lumen import FED, HELD, WITHOUT, Reach, Reached, run_reach
 
 
 def reaching(context: Context, name: str, title: str, question: str, reaches: tuple[Reach, ...]) -> Result:
@@ -91,7 +91,9 @@ def _bodies(pairs: list[tuple[Reached, Reached]]) -> str:
             way = np.linspace(0.0, held.reach.last + 5e-3, 200)
             centre = lumen.point(way)
             normal = np.cross(across, lumen.direction(way))
-            for axes, sideways, wall in zip(drawing.axes[0, 2 * index : 2 * index + 2], (plane, across), (normal, np.tile(across, (200, 1)))):
+            for axes, sideways, wall in zip(
+                drawing.axes[0, 2 * index : 2 * index + 2], (plane, across), (normal, np.tile(across, (200, 1)))
+            ):
                 for sign in (-1, 1):
                     side = centre + sign * wall * lumen.diameter / 2
                     axes.plot(1e3 * side @ sideways, 1e3 * side[:, 2], color="#8a6d5a", linewidth=2.0)
@@ -115,7 +117,12 @@ def _courses(pairs: list[tuple[Reached, Reached]]) -> str:
         for index, pair in enumerate(pairs):
             clearance, camera = drawing.axes[:, index]
             for result, colour, label in zip(pair, (WITHOUT_COLOUR, REAL), ("without", "with compensation")):
-                clearance.plot(1e3 * result.depth, 1e3 * np.where(np.isfinite(result.clearance), result.clearance, np.nan), color=colour, label=label)
+                clearance.plot(
+                    1e3 * result.depth,
+                    1e3 * np.where(np.isfinite(result.clearance), result.clearance, np.nan),
+                    color=colour,
+                    label=label,
+                )
                 camera.plot(1e3 * result.depth, np.degrees(result.camera), color=colour)
             clearance.axhline(0.0, color="#8a6d5a", linewidth=2.0)
             clearance.set_title(pair[0].reach.name)

@@ -4,12 +4,13 @@ import numpy as np
 
 from gravcomp.calibration.measured import Measured
 from gravcomp.calibration.motion import fit_motion, predict_course, predict_shapes
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
-from gravcomp.experiments.drawing import MODEL, REAL, REST, Drawing, draw_robot, equal_axes, side_view
-from gravcomp.experiments.free_fall import SAMPLE, falling_rod, free_fall
-from gravcomp.experiments.metrics import angle_between
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context, Setup
+from gravcomp.evaluation.metrics import angle_between
+from gravcomp.report.drawing import MODEL, REAL, REST, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.context import Context
+from gravcomp.trials.free_fall import SAMPLE, falling_rod, free_fall
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Real to simulation: free fall"
@@ -71,7 +72,10 @@ def run(context: Context) -> Result:
             ),
             Plot(
                 "Shapes",
-                _shapes([(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0], setup.robot.length),
+                _shapes(
+                    [(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0],
+                    setup.robot.length,
+                ),
                 f"From the side, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the robot was let go. Grey the rest shape without"
                 " gravity, vermilion the virtual robot, blue the calibrated model's axis.",
             ),
@@ -79,7 +83,14 @@ def run(context: Context) -> Result:
                 "Errors by pose",
                 ("inclination", "model", "worst, mm", "at rest, mm", "worst, deg", "at rest, deg"),
                 [
-                    (f"{i:g}°", name, 1e3 * p.max(), 1e3 * p[rest].max(), float(np.degrees(d.max())), float(np.degrees(d[rest].max())))
+                    (
+                        f"{i:g}°",
+                        name,
+                        1e3 * p.max(),
+                        1e3 * p[rest].max(),
+                        float(np.degrees(d.max())),
+                        float(np.degrees(d[rest].max())),
+                    )
                     for name in robots
                     for i, (p, d) in zip(inclinations, errors[name])
                 ],
@@ -128,8 +139,12 @@ def _shapes(falls: list[tuple[float, list]], length: float) -> str:
             straight = np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, length], 9)
             draw_robot(axes, side_view(straight, base_orientation(np.radians(inclination))), REST, "rest shape", alpha=0.6)
             for k, (true, modelled) in enumerate(shapes):
-                draw_robot(axes, true[:, [0, 2]], REAL, "virtual robot" if k == 0 else None, alpha=0.45 + 0.55 * (k + 1) / len(shapes))
-                axes.plot(*(1e3 * modelled[:, [0, 2]].T), color=MODEL, linewidth=1.2, linestyle="--", label="model" if k == 0 else None)
+                draw_robot(
+                    axes, true[:, [0, 2]], REAL, "virtual robot" if k == 0 else None, alpha=0.45 + 0.55 * (k + 1) / len(shapes)
+                )
+                axes.plot(
+                    *(1e3 * modelled[:, [0, 2]].T), color=MODEL, linewidth=1.2, linestyle="--", label="model" if k == 0 else None
+                )
             axes.set_title(f"{inclination:g}°")
             equal_axes(axes)
         drawing.axes[0, 0].legend(loc="lower left")

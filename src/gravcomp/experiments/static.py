@@ -1,13 +1,14 @@
 """Static compensation: released at several poses, then held straight or bent; by a controller that knows nothing of the virtual robot's
-own parameters, and by the same controller after calibration."""
+own parameters, and by the same controller after calibration.
+"""
 
 import numpy as np
 
-from gravcomp.experiments.cases import GROUND, Case, Outcome, pooled_recovery, run_case
-from gravcomp.experiments.drawing import MODEL, REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
-from gravcomp.experiments.measuring import calibrate_on_virtual_robot
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.report.drawing import MODEL, REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
+from gravcomp.trials.context import Context
+from gravcomp.trials.holding import GROUND, Case, Outcome, pooled_recovery, run_case
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Static compensation"
@@ -39,7 +40,9 @@ def run(context: Context) -> Result:
         question="How straight, and how exactly bent, does the robot stay against gravity at rest?",
         ground=GROUND,
         figures=[
-            Figure("recovery rate r at rest, calibrated", pooled_recovery(fitted), "", "> 0.99", limit=0.999, at_least=True, digits=6),
+            Figure(
+                "recovery rate r at rest, calibrated", pooled_recovery(fitted), "", "> 0.99", limit=0.999, at_least=True, digits=6
+            ),
             Figure("recovery rate r at rest, not calibrated", pooled_recovery(plain), "", "> 0.99", digits=6),
             Figure("r with the way between, calibrated", pooled_recovery(fitted, at_rest=False), "", digits=4),
             Figure("largest lateral residual, calibrated", 1e3 * max(o.held.lateral for o in fitted), "mm", limit=1.0),
@@ -118,7 +121,12 @@ def _course(plain: Outcome, fitted: Outcome) -> str:
         for axes, limit in zip(drawing.axes, (None, 2.5)):
             for outcome, colour, label in ((plain, MODEL, "not calibrated"), (fitted, REAL, "calibrated")):
                 trace = outcome.trace
-                axes.plot(trace.time, 1e3 * np.linalg.norm(trace.tip_position - outcome.target.tip_position, axis=1), color=colour, label=label)
+                axes.plot(
+                    trace.time,
+                    1e3 * np.linalg.norm(trace.tip_position - outcome.target.tip_position, axis=1),
+                    color=colour,
+                    label=label,
+                )
             axes.axhline(0.0, color=TARGET, linewidth=1.0)
             axes.set_xlabel("time in s")
             axes.set_ylabel("tip error in mm")

@@ -1,6 +1,6 @@
 """The article's tuning, a grid of 25 pairs of modulus and Rayleigh damping, and the calibration that takes its place.
 
-    e_total = (sum_k e_k) Var(e),    e_k = |p_sim(t_k) - p_real(t_k)|
+e_total = (sum_k e_k) Var(e),    e_k = |p_sim(t_k) - p_real(t_k)|
 """
 
 import dataclasses
@@ -10,11 +10,11 @@ import numpy as np
 from gravcomp.calibration.measured import Measured
 from gravcomp.calibration.motion import COURSE_OPTIONS, fit_motion, predict_course
 from gravcomp.description import Robot
-from gravcomp.experiments.drawing import MODEL, REAL, WITHOUT, Drawing
-from gravcomp.experiments.free_fall import free_fall
-from gravcomp.experiments.known_robot import Recovered, recover
-from gravcomp.experiments.result import Figure, Plot, Result, Table
-from gravcomp.experiments.setup import Context
+from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
+from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.context import Context
+from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.known_robot import Recovered, recover
 
 TITLE = "Tuning: the grid, and calibration"
 
@@ -29,12 +29,16 @@ def run(context: Context) -> Result:
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
     moduli, dampings = (MODULI[1:4], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
-    falls = context.map(free_fall, [(setup, *pose, _DURATION, trial) for trial, pose in enumerate(poses)], "free falls to tune by")
+    falls = context.map(
+        free_fall, [(setup, *pose, _DURATION, trial) for trial, pose in enumerate(poses)], "free falls to tune by"
+    )
     pairs = [(m, c) for m in moduli for c in dampings]
     errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c) for m, c in pairs], "the grid")))
     best = min(pairs, key=lambda pair: total(errors[pair]))
     # Modulus and damping alone, as the grid: two parameters against two.
-    fit = fit_motion(setup.robot, falls, mapper=context.sweep.map, progress=lambda s: context.progress(f"calibration: {s}"), creep=False)
+    fit = fit_motion(
+        setup.robot, falls, mapper=context.sweep.map, progress=lambda s: context.progress(f"calibration: {s}"), creep=False
+    )
     fitted = np.concatenate([np.linalg.norm(tip - f.tip_position, axis=1) for tip, f in zip(fit.predicted, falls)])
     recovered = recover(context)
     judged = [r for r in recovered if "offset" not in r.name]
@@ -50,7 +54,9 @@ def run(context: Context) -> Result:
             Figure("e_total of the grid's best pair over the calibration's", ratio, "", "best pair of the grid", 1.0, True),
             Figure("RMS error, best pair of the grid", 1e3 * _rms(errors[best]), "mm"),
             Figure("RMS error, calibration", 1e3 * _rms(fitted), "mm", "", 1e3 * _rms(errors[best])),
-            Figure("evaluations, calibration", fit.evaluations, "", f"{len(MODULI) * len(RAYLEIGH)} pairs", float(len(pairs) - 1)),
+            Figure(
+                "evaluations, calibration", fit.evaluations, "", f"{len(MODULI) * len(RAYLEIGH)} pairs", float(len(pairs) - 1)
+            ),
             Figure("known modulus and damping recovered within", 100 * max(r.error for r in judged), "%", "", 2.0),
             Figure("known cable offsets recovered within", max((abs(r.fitted - r.true) for r in offsets), default=np.nan), "mm"),
         ],
@@ -97,7 +103,9 @@ def total(error: np.ndarray) -> float:
 def _pair(job: tuple[Robot, list[Measured], float, float]) -> np.ndarray:
     """(t,) m: errors of all falls with one pair."""
     robot, falls, modulus, damping = job
-    return np.concatenate([np.linalg.norm(_rayleigh_fall(robot, fall, modulus, damping) - fall.tip_position, axis=1) for fall in falls])
+    return np.concatenate(
+        [np.linalg.norm(_rayleigh_fall(robot, fall, modulus, damping) - fall.tip_position, axis=1) for fall in falls]
+    )
 
 
 def _rayleigh_fall(robot: Robot, fall: Measured, modulus: float, damping: float) -> np.ndarray:

@@ -48,7 +48,9 @@ def topic_table() -> str:
 
 def renewed(text: str) -> str:
     """The document with its tables as the code has them now."""
-    return _BLOCK.sub(lambda m: m.group(1) + (topic_table() if m.group(2) == "topics" else node_tables(node(m.group(3)))) + m.group(4), text)
+    return _BLOCK.sub(
+        lambda m: m.group(1) + (topic_table() if m.group(2) == "topics" else node_tables(node(m.group(3)))) + m.group(4), text
+    )
 
 
 def _short(kind: str) -> str:

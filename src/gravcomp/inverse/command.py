@@ -16,7 +16,8 @@ from gravcomp.inverse.status import ControllerCode
 
 class Command(NamedTuple):
     """displacement (m,) m and tension (m,) N of the cables; code and message say how well the target is kept;
-    distance, lateral, axial m and tilt rad: what is predicted of the tip against its target (NaN: nothing); solve_time s."""
+    distance, lateral, axial m and tilt rad: what is predicted of the tip against its target (NaN: nothing); solve_time s.
+    """
 
     displacement: np.ndarray
     tension: np.ndarray
@@ -32,5 +33,6 @@ class Command(NamedTuple):
 @njit(cache=True)
 def cable_displacement(path: np.ndarray, compliance: np.ndarray, unwanted: np.ndarray, slack: float) -> np.ndarray:
     """Displacement (m,) of the winches for the predicted path displacement (m,), the cables' compliance (m, m) and how much tension
-    (m,) the programme would take away if they could push."""
+    (m,) the programme would take away if they could push.
+    """
     return path - np.minimum(slack, np.diag(compliance) * unwanted)

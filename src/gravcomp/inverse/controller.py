@@ -15,6 +15,7 @@ from numba import njit
 from gravcomp.description.robot import Robot
 from gravcomp.inverse.command import Command, cable_displacement
 from gravcomp.inverse.damping import StepDamping
+from gravcomp.inverse.errors import backbone_missed, tip_errors
 from gravcomp.inverse.limits import held_within, limits_met, within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme
@@ -22,11 +23,10 @@ from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, judge
-from gravcomp.inverse.errors import backbone_missed, tip_errors
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
-    from gravcomp.simulation.shape import Response
+    from gravcomp.full_model.shape import Response
 
 # Longer pauses between two steps allow no longer strides: the linear answer would not carry that far.
 _LONGEST_INTERVAL = 0.1
@@ -48,7 +48,8 @@ class InverseController:
 
     def reset(self, displacement: np.ndarray | None = None) -> None:
         """Forget the past: rates count from `displacement` (m,), or, without it, from where the cables' paths are at
-        the next step."""
+        the next step.
+        """
         self._solver.reset()
         self._damping = StepDamping()
         self._retreat.reset()
@@ -127,7 +128,12 @@ class InverseController:
             met[0] = False  # it is not the motors that hold it back
         missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
         code, message = judge(
-            target=target, points_missed=missed, tilt=errors.tilt, met=met if any_met else None, names=self._names, options=options
+            target=target,
+            points_missed=missed,
+            tilt=errors.tilt,
+            met=met if any_met else None,
+            names=self._names,
+            options=options,
         )
         self._displacement, self._tension = displacement, tension
         return Command(
@@ -163,7 +169,10 @@ class InverseController:
             path = response.compliance_aa @ tension + response.displacement_free
             shape = np.where(tension > 0.0, path, path - self.options.slack)
             displacement = within_limits(shape, previous, self.robot.limits, interval)
-            code, message = ControllerCode.UNREACHABLE, "the model finds no equilibrium on the way to the target: the last shape is kept"
+            code, message = (
+                ControllerCode.UNREACHABLE,
+                "the model finds no equilibrium on the way to the target: the last shape is kept",
+            )
         else:
             # Where the equilibria end, the linear answer tells little of where the cables would be free; on the straight robot they are at 0.
             free = response.displacement_free if followed else np.minimum(response.displacement_free, 0.0)
@@ -215,7 +224,8 @@ def _outcome(
 ):  # fmt: skip
     """What the solution (arguments of `unscaled`) comes to, from the tensions `before` (m,): tension (m,), change of path displacement
     (m,), its product with the last one and that of their lengths, displacement (m,) of the winches, effector (e,), the limits met and
-    whether any is, errors of the tip. travel: longest way of a step, least and largest displacement."""
+    whether any is, errors of the tip. travel: longest way of a step, least and largest displacement.
+    """
     tension, unwanted = unscaled(*solution)
     path = compliance_aa @ tension + displacement_free
     change = compliance_aa @ (tension - before)

@@ -20,7 +20,8 @@ class StepDamping:
 
     def observe(self, along: float, lengths: float) -> None:
         """Take in the changes of path displacement (m,) that the last two programmes asked for: their scalar product and the product of
-        their lengths, m^2."""
+        their lengths, m^2.
+        """
         if lengths <= _SMALLEST_CHANGE**2:
             return  # settled: with less damping it might not stay so
         if along < _BACK_AND_FORTH * lengths:

@@ -1,5 +1,6 @@
 """How far an effector is from its target: the tip's distance, its parts across and along the robot, its tilt, and the
-backbone's distance."""
+backbone's distance.
+"""
 
 from typing import NamedTuple
 
@@ -22,7 +23,8 @@ class TipErrors(NamedTuple):
 @njit(cache=True)
 def tip_errors(effector: np.ndarray, tip: np.ndarray, direction: np.ndarray) -> TipErrors:
     """Errors of the tip in the effector (e,), whose rows 0-2 are its position and 3-5 its direction, against the position `tip`
-    (3,) and the direction (3,) that is asked for, zeros for none."""
+    (3,) and the direction (3,) that is asked for, zeros for none.
+    """
     axis = tip_axis(effector, direction)
     distance, axial, across, chord = 0.0, 0.0, 0.0, 0.0
     for i in range(3):

@@ -42,7 +42,9 @@ def step_bounds(displacement, tension, path, reach, farthest_out, farthest_in, l
 
 def within_limits(displacement: np.ndarray, previous: np.ndarray, limits: Limits, interval: float) -> np.ndarray:
     """The displacement (m,) held to its bounds and to what the winches reach from the previous one in the interval (s)."""
-    return held_within(displacement, previous, limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max)
+    return held_within(
+        displacement, previous, limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max
+    )
 
 
 @njit(cache=True)

@@ -8,7 +8,8 @@ from gravcomp.config import parameter
 @dataclass(frozen=True)
 class InverseOptions:
     """Options of the inverse problem; those without unit are relative to the tip's answer to the cables, so they suit
-    any robot."""
+    any robot.
+    """
 
     axial_weight: float = parameter(
         0.05, minimum=0.0, maximum=1.0,
@@ -27,7 +28,11 @@ class InverseOptions:
         0.0, unit="N", minimum=0.0, maximum=5.0, description="least tension of every cable; above 0 no cable ever goes slack"
     )
     tolerance: float = parameter(
-        4.0, edge="mm", minimum=0.01, maximum=100.0, description="distance from the target up to which it counts as kept, the cables' shortening included"
+        4.0,
+        edge="mm",
+        minimum=0.01,
+        maximum=100.0,
+        description="distance from the target up to which it counts as kept, the cables' shortening included",
     )
     tilt_tolerance: float = parameter(
         5.0,

@@ -29,7 +29,7 @@ from gravcomp.inverse.scaling import Programme, ScaledProgramme, scaled
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
-    from gravcomp.simulation.shape import Response
+    from gravcomp.full_model.shape import Response
 
 
 def build_programme(
@@ -81,7 +81,8 @@ def build_programme(
 @njit(cache=True)
 def tip_axis(effector: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Unit vector (3,) that splits the tip's error into axial and lateral: the target's direction (3,), where that is zeros the
-    effector's (e,)."""
+    effector's (e,).
+    """
     return direction if (direction * direction).sum() > 0.0 else _unit(effector[3:6])
 
 
@@ -104,7 +105,8 @@ def _weighted_errors(
     change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
 ):
     """M W_ea (k, m) and M (e_free - e_target) (k,) for the rows of the parts of the target that have a weight; along the robot is
-    where it lies under the present tensions (m,). `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T."""
+    where it lies under the present tensions (m,). `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T.
+    """
     m = len(tension)
     effector = change @ tension + free
     count = int(tip_weight > 0.0) + int(direction_weight > 0.0) + int((weights > 0.0).sum())

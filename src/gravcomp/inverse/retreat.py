@@ -54,7 +54,8 @@ class Retreat:
 
     def move(self, followed: bool, target: Target, tip: np.ndarray, tension: np.ndarray) -> Move:
         """The next move. followed: whether the model reached an equilibrium under the last command; tip (3,) m and tension (m,) N of
-        its present shape."""
+        its present shape.
+        """
         if not _same(target, self._target):
             self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
         if followed and tension.max() <= _LITTLE_TENSION:
@@ -97,4 +98,6 @@ class Retreat:
 def _same(target: Target, other: Target | None) -> bool:
     if target is other or other is None:
         return target is other
-    return np.array_equal(target.tip_position, other.tip_position) and np.array_equal(target.direction_or_zeros, other.direction_or_zeros)
+    return np.array_equal(target.tip_position, other.tip_position) and np.array_equal(
+        target.direction_or_zeros, other.direction_or_zeros
+    )

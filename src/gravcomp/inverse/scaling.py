@@ -1,5 +1,6 @@
 """The programme of a step in the solver's units: tensions scaled to a Hessian of unit diagonal, displacements to rows of unit length,
-the cost in square millimetres."""
+the cost in square millimetres.
+"""
 
 from typing import NamedTuple
 
@@ -17,7 +18,8 @@ _QUANTUM = 2.0**-30
 
 class Programme(NamedTuple):
     """min 1/2 x^T hessian x + gradient^T x over the tensions x (m,), subject to the bounds, with displacement =
-    compliance x + offset."""
+    compliance x + offset.
+    """
 
     hessian: np.ndarray
     gradient: np.ndarray
@@ -69,7 +71,17 @@ def scaled(programme: Programme) -> ScaledProgramme:
         upper[i] = min((bounds.displacement_upper[i] - offset[i]) * row, NO_BOUND)
     trace = hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
     return ScaledProgramme(
-        to_hessian, to_gradient, rows, lower, upper, box_lower, box_upper, scale, bounds.tension_lower, bounds.tension_upper, trace
+        to_hessian,
+        to_gradient,
+        rows,
+        lower,
+        upper,
+        box_lower,
+        box_upper,
+        scale,
+        bounds.tension_lower,
+        bounds.tension_upper,
+        trace,
     )
 
 

@@ -25,7 +25,8 @@ class SolverFailed(RuntimeError):
 
 class Solution(NamedTuple):
     """What the solver found, in its units: the programme's unknowns, the multipliers of its rows and then of its box; solve_time s;
-    iterations. `scaling.unscaled` makes tensions of it, before the next solve, which writes over it."""
+    iterations. `scaling.unscaled` makes tensions of it, before the next solve, which writes over it.
+    """
 
     unknowns: np.ndarray
     multipliers: np.ndarray

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-
 _NO_DIRECTION = np.zeros(3)
 _REACH = 1.5  # robot's lengths
 
@@ -65,7 +64,8 @@ class Target:
 
     def check_reach(self, length: float) -> None:
         """Raises TargetError where a point with a weight is out of any reach of a robot of `length` (m): a mistake in its unit or frame,
-        after which the cables would bend the robot as far as they can."""
+        after which the cables would bend the robot as far as they can.
+        """
         points = {"tip_position": self.tip_position} if self.tip_position_weight > 0.0 else {}
         points |= {f"backbone_position {k}": p for k, p in enumerate(self.backbone_position) if self.backbone_weight[k] > 0.0}
         for name, point in points.items():
@@ -92,7 +92,8 @@ def bend_target(
     backbone_weight: np.ndarray = (),
 ) -> Target:
     """The target of constant curvature: `length` (m) of the robot bent by `angle` (rad) into the plane at `plane` (rad,
-    about z from x)."""
+    about z from x).
+    """
     if not np.all(np.isfinite([length, angle, plane])) or length <= 0.0 or abs(angle) > 2.0 * np.pi:
         bend = f"a bend of {angle!r} rad at {plane!r} rad over {length!r} m"
         raise TargetError(f"{bend}; finite numbers and at most a full turn are needed")

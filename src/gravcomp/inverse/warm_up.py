@@ -1,13 +1,14 @@
 """Compiling the controller's kernels ahead of the first command: compiling takes half a minute on a new machine, in which the
-motors would be sent nothing but stale commands."""
+motors would be sent nothing but stale commands.
+"""
 
 import numpy as np
 
 from gravcomp.description.robot import Robot
+from gravcomp.full_model.shape import Response
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import straight_target
-from gravcomp.simulation.shape import Response
 
 
 def warm_up(robot: Robot, options: InverseOptions = InverseOptions()) -> None:

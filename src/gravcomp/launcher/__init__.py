@@ -1,8 +1,8 @@
 """The graph as processes: starts the nodes, watches them, ends them without orphans.
 
-    with Graph([NodeSpec("gravcomp_fem", "fem_simulator", parameters={"robot": "article"})]) as graph:
-        graph.start()
-        while graph.watch() is None: ...
+with Graph([NodeSpec("gravcomp_fem", "fem_simulator", parameters={"robot": "article"})]) as graph:
+    graph.start()
+    while graph.watch() is None: ...
 """
 
 from gravcomp.launcher.graph import Graph, NodeDied

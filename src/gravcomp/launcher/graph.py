@@ -10,7 +10,6 @@ from pathlib import Path
 
 from gravcomp.launcher.node_process import NodeProcess, NodeSpec, stop_together
 
-
 _MARK = "GRAVCOMP_GRAPH"
 _LEFTOVER_PATIENCE = 2.0  # s between SIGTERM and SIGKILL
 

@@ -62,7 +62,9 @@ def find_executable(package: str, executable: str) -> str:
                 return str(path)
             known = sorted(p.name for p in path.parent.glob("*")) if path.parent.exists() else []
             raise LaunchError(f"package '{package}' has no executable '{executable}'; it has: {', '.join(known) or 'none'}")
-    raise LaunchError(f"package '{package}' is in none of AMENT_PREFIX_PATH ({', '.join(prefixes) or 'empty'}): is the workspace built?")
+    raise LaunchError(
+        f"package '{package}' is in none of AMENT_PREFIX_PATH ({', '.join(prefixes) or 'empty'}): is the workspace built?"
+    )
 
 
 class NodeProcess:

@@ -16,7 +16,8 @@ LOOP = (
 @dataclass(frozen=True)
 class RobotGraph:
     """One robot's nodes. robot: a shipped name or a path; channel: a CAN channel in place of the file's; namespace: of all nodes;
-    parameters: {executable: {parameter: value}} beyond the robot's file."""
+    parameters: {executable: {parameter: value}} beyond the robot's file.
+    """
 
     robot: str
     interface: str = ""

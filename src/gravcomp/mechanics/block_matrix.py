@@ -75,9 +75,7 @@ class BlockMatrix:
         self.pattern = pattern
         diagonal, coupling, count = pattern.offsets
         self.values = np.zeros(count)
-        self._diagonal = [
-            self.values[o : o + s * s].reshape(s, s, order="F") for o, s in zip(diagonal, pattern.size)
-        ]
+        self._diagonal = [self.values[o : o + s * s].reshape(s, s, order="F") for o, s in zip(diagonal, pattern.size)]
         self._coupling = [
             self.values[o : o + r * c].reshape(r, c, order="F") for o, r, c in zip(coupling, pattern.size[1:], pattern.seen)
         ]

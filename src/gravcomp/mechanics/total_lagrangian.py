@@ -16,8 +16,8 @@ from numba import njit
 
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
 from gravcomp.mechanics.material_laws import FAST, Lame, add_linear_tangent, inverse_cauchy_green, linear_stress, stress
-from gravcomp.mesh.elements import mass_quadrature, shape_gradients, shape_values, stiffness_quadrature
 from gravcomp.mesh import Mesh, MeshError
+from gravcomp.mesh.elements import mass_quadrature, shape_gradients, shape_values, stiffness_quadrature
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,9 +86,7 @@ class SolidElements:
 
     def energy(self, u: np.ndarray) -> float:
         """Elastic energy in J."""
-        return _energy(
-            u, self._connectivity, self.gradients, self.weights, self.lame.law, self.lame.first, self.lame.shear
-        )
+        return _energy(u, self._connectivity, self.gradients, self.weights, self.lame.law, self.lame.first, self.lame.shear)
 
     def nodal_mass(self) -> np.ndarray:
         """(n,) integral of density times shape function in kg: what gravity pulls at; it may be negative at corners."""
@@ -298,15 +296,11 @@ def _assemble(
                 d3, d4, d5 = w * d[m, 3], w * d[m, 4], w * d[m, 5]
                 for r in range(n):
                     local_f[r] += b[m, r] * ws
-                    db[m, r] = (
-                        d0 * b[0, r] + d1 * b[1, r] + d2 * b[2, r] + d3 * b[3, r] + d4 * b[4, r] + d5 * b[5, r]
-                    )
+                    db[m, r] = d0 * b[0, r] + d1 * b[1, r] + d2 * b[2, r] + d3 * b[3, r] + d4 * b[4, r] + d5 * b[5, r]
             for r in range(n):
                 b0, b1, b2, b3, b4, b5 = b[0, r], b[1, r], b[2, r], b[3, r], b[4, r], b[5, r]
                 for q in range(r + 1):
-                    local_k[r, q] += (
-                        b0 * db[0, q] + b1 * db[1, q] + b2 * db[2, q] + b3 * db[3, q] + b4 * db[4, q] + b5 * db[5, q]
-                    )
+                    local_k[r, q] += b0 * db[0, q] + b1 * db[1, q] + b2 * db[2, q] + b3 * db[3, q] + b4 * db[4, q] + b5 * db[5, q]
             if foreseen:
                 _foreseen_stress(u, origin, nodes, gradient, law[k], first[k], shear[k], f, e, s, d)
             for a in range(c):

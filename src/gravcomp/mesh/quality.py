@@ -12,7 +12,8 @@ from gravcomp.mesh.quadratic import TET_EDGES
 @dataclasses.dataclass(frozen=True)
 class MeshQuality:
     """kind; nodes and elements: counts; jacobian_ratio: smallest over largest det dX/dxi of the worst element (1: undistorted,
-    0 or less: inverted somewhere); aspect_ratio: longest over shortest edge of the worst element; advice: sentences."""
+    0 or less: inverted somewhere); aspect_ratio: longest over shortest edge of the worst element; advice: sentences.
+    """
 
     kind: str
     nodes: int

@@ -171,7 +171,13 @@ class Bridge:
             self._fault(f"CAN bus lost: {why}", latched=False)
 
     def command(
-        self, displacement: Sequence[float], tension: Sequence[float], now: float, *, age: float = 0.0, stamp: object | None = None
+        self,
+        displacement: Sequence[float],
+        tension: Sequence[float],
+        now: float,
+        *,
+        age: float = 0.0,
+        stamp: object | None = None,
     ) -> str | None:
         """A command: displacement (m) and expected tension (N, may be empty) a cable.
 
@@ -308,7 +314,9 @@ class Bridge:
         """A count of turns that is not certain must not be driven by, until somebody has decided or homing has found the zero."""
         motors = zip(self._hardware.motors, self._encoders, self._zeros)
         unsure = [
-            self._name(motor) for motor, encoder, zero in motors if not encoder.certain and not encoder.settling and zero is not None
+            self._name(motor)
+            for motor, encoder, zero in motors
+            if not encoder.certain and not encoder.settling and zero is not None
         ]
         if not unsure or self._unsure_told or self.state is State.HOMING:
             return

@@ -32,7 +32,9 @@ HEATER_TIMEOUT = 0.5
 """s without a heater command after which the duty is zero."""
 
 _NEAR = 0.15  # of a control period
-_BEAT_PERIOD = 0.01  # s; at 25 mm/s a rotor makes a third of a turn in it, and the guard shall know the turns when the bridge dies
+_BEAT_PERIOD = (
+    0.01  # s; at 25 mm/s a rotor makes a third of a turn in it, and the guard shall know the turns when the bridge dies
+)
 _HEATER_PERIOD = 0.1  # s
 _LONGEST_QUEUE = 256
 _SWITCH_INTERVAL = 5e-4  # s; Python's default of 5 ms would let another thread delay the control by that
@@ -43,7 +45,8 @@ _PAUSE_AFTER_ERROR = 0.01  # s
 @dataclasses.dataclass(frozen=True)
 class DriverOptions:
     """rate: control periods a second; state_rate: snapshots a second, beside one at every change of the state; guard: a guard process
-    is required."""
+    is required.
+    """
 
     rate: float = 250.0
     state_rate: float = 100.0
@@ -153,7 +156,9 @@ class BridgeDriver:
         while not self._ending.is_set():
             try:
                 self._cycle()
-            except Exception as error:  # nothing known; but a thread that ended would leave the motors to the guard, and no way back
+            except (
+                Exception
+            ) as error:  # nothing known; but a thread that ended would leave the motors to the guard, and no way back
                 self.bridge.stop(f"error in the bridge: {error!r}")
                 self.link.send(self.bridge.zero_frames())
                 time.sleep(_PAUSE_AFTER_ERROR)
@@ -228,7 +233,8 @@ class BridgeDriver:
         try:
             guard = GuardClient.connect(self._hardware.can, self._hardware, record)
         except Exception as error:
-            self.request(lambda bridge, now: bridge.stop(f"the guard is gone: {error}"))
+            why = f"the guard is gone: {error}"  # the name `error` ends with this block, before the request runs
+            self.request(lambda bridge, now: bridge.stop(why))
             return
         self._guard = guard
         if self._ending.is_set():
@@ -244,4 +250,3 @@ class BridgeDriver:
     def _send_zeros(self) -> None:
         for _ in range(_ZEROS_AT_END):
             self.link.send(self.bridge.zero_frames())
-

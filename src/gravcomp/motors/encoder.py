@@ -45,7 +45,8 @@ _SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current: beyond wha
 @dataclasses.dataclass
 class _Doubt:
     """The arrival of the last feedback before the doubt and of the first in it (s); by which whole turns the count may be off, and the
-    least time (s) that the rotor needs for what it has then turned since."""
+    least time (s) that the rotor needs for what it has then turned since.
+    """
 
     begin: float
     since: float
@@ -54,7 +55,8 @@ class _Doubt:
 
 class Encoder:
     """The rotor's count (not wrapped) since its first feedback. Attributes: count (counts), speed (rpm), current (A), time (s), jumps
-    (implausible feedbacks less half the plausible ones since), rejected (since start)."""
+    (implausible feedbacks less half the plausible ones since), rejected (since start).
+    """
 
     def __init__(self) -> None:
         self.count: int | None = None

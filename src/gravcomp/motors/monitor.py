@@ -28,7 +28,8 @@ class MotorMonitor:
 
     def update(self, seen: float, current: float, velocity: float, lag: float) -> str | None:
         """`seen` (s): when the feedback came; `current` (A) as commanded, `velocity` (m/s) measured, `lag` (m) setpoint minus
-        measured displacement."""
+        measured displacement.
+        """
         self._step = 0.0 if self._seen is None else min(max(seen - self._seen, 0.0), LONGEST_STEP)
         self._seen = seen
         drive, watchdog = self._drive, self._watchdog

@@ -37,7 +37,8 @@ class CableSnapshot:
 @dataclasses.dataclass(frozen=True)
 class RotorRecord:
     """What another process or a later run needs to go on counting a rotor: its count and zero (counts), its speed (rpm) at `time`
-    (s, monotonic: the same in all processes of a host), and whether its whole turns are certain."""
+    (s, monotonic: the same in all processes of a host), and whether its whole turns are certain.
+    """
 
     count: int
     zero: int

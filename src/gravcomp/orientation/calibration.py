@@ -17,7 +17,7 @@ import numpy as np
 from gravcomp.config import parameter
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector
-from gravcomp.recordings import Recording
+from gravcomp.recordings.imu import Recording
 
 SCALE_PRIOR = 0.03
 OFFSET_PRIOR = 0.3  # m/s^2
@@ -34,7 +34,9 @@ class CalibrationError(ValueError):
 class ImuCalibration:
     """corrected specific force = accel_scale (a - accel_offset), corrected rate = rate - gyro_offset."""
 
-    accel_scale: tuple[float, float, float] = parameter((1.0, 1.0, 1.0), minimum=0.5, maximum=2, description="accelerometer scale, by axis")
+    accel_scale: tuple[float, float, float] = parameter(
+        (1.0, 1.0, 1.0), minimum=0.5, maximum=2, description="accelerometer scale, by axis"
+    )
     accel_offset: tuple[float, float, float] = parameter(
         (0.0, 0.0, 0.0), unit="m/s^2", minimum=-5, maximum=5, description="accelerometer offset, by axis"
     )
@@ -42,7 +44,11 @@ class ImuCalibration:
         (0.0, 0.0, 0.0), edge="deg/s", minimum=-20, maximum=20, description="gyroscope offset, by axis"
     )
     norm_tolerance: float = parameter(
-        0.3, unit="m/s^2", minimum=0.01, maximum=5, description="|a| at rest farther from gravity than that: calibration is needed"
+        0.3,
+        unit="m/s^2",
+        minimum=0.01,
+        maximum=5,
+        description="|a| at rest farther from gravity than that: calibration is needed",
     )
 
 
@@ -105,7 +111,9 @@ def calibrate(recording: Recording, options: FilterOptions | None = None, base_u
     mount = None
     if base_up is not None:
         if len(base_up) != len(poses):
-            raise CalibrationError(f"{recording.source}: holds {len(poses)} distinct resting pose(s); {len(base_up)} direction(s) that pointed up are given")
+            raise CalibrationError(
+                f"{recording.source}: holds {len(poses)} distinct resting pose(s); {len(base_up)} direction(s) that pointed up are given"
+            )
         mount = fit_mount(np.array([fit.scale * (pose.accel - fit.offset) for pose in poses]), base_up)
     return RestCalibration(poses, fit, fit_gyro_offset(poses), mount)
 

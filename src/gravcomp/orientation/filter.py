@@ -33,7 +33,9 @@ SATURATED_RATE_NOISE = 2.0  # rad/s/sqrt(Hz): faster than the gyroscope can tell
 STUCK_RATE_NOISE = 0.3  # rad/s/sqrt(Hz): the gyroscope says nothing, the sensor turns as a hand turns it
 UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer says nothing
 CONTRADICTION = 0.5  # m/s: a repeated value that leads to such a velocity is a stuck sensor's, not that of a sensor at rest
-CONTRADICTED_TILT = math.radians(2.0)  # at rest between specific force and gravity: more than a calibration to be believed explains
+CONTRADICTED_TILT = math.radians(
+    2.0
+)  # at rest between specific force and gravity: more than a calibration to be believed explains
 MISSED_PERIODS = 2.5  # a longer step than so many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: how far |a| at rest may be off and still be made good

@@ -94,7 +94,9 @@ class SampleGuard:
         accel_saturated = largest_accel >= SATURATED_FROM * options.accel_range
         if problem is Problem.NONE:
             if gyro_stuck or accel_stuck:
-                problem = Problem.STUCK if gyro_stuck and accel_stuck else Problem.GYRO_STUCK if gyro_stuck else Problem.ACCEL_STUCK
+                problem = (
+                    Problem.STUCK if gyro_stuck and accel_stuck else Problem.GYRO_STUCK if gyro_stuck else Problem.ACCEL_STUCK
+                )
             elif gyro_saturated or accel_saturated:
                 problem = Problem.GYRO_SATURATED if gyro_saturated else Problem.ACCEL_SATURATED
         return Verdict(problem, dt, gyro_saturated, accel_saturated, gyro_stuck, accel_stuck)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gravcomp.orientation.estimator import GravityEstimator
 from gravcomp.orientation.guard import Problem
-from gravcomp.recordings import Recording
+from gravcomp.recordings.imu import Recording
 
 PROGRESS_EVERY = 2000  # samples
 

@@ -13,16 +13,26 @@ from gravcomp.config import parameter
 class RestOptions:
     """When the sensor counts as being at rest."""
 
-    time_constant: float = parameter(0.5, unit="s", minimum=0.05, maximum=10, description="of the low-pass that deviations count from")
-    gyro_deviation: float = parameter(2.0, edge="deg/s", minimum=0.01, maximum=100, description="largest deviation of a rate at rest")
+    time_constant: float = parameter(
+        0.5, unit="s", minimum=0.05, maximum=10, description="of the low-pass that deviations count from"
+    )
+    gyro_deviation: float = parameter(
+        2.0, edge="deg/s", minimum=0.01, maximum=100, description="largest deviation of a rate at rest"
+    )
     accel_deviation: float = parameter(
         0.5, unit="m/s^2", minimum=0.001, maximum=10, description="largest deviation of a specific force at rest"
     )
     accel_drift: float = parameter(
-        0.05, unit="m/s^2", minimum=0.001, maximum=1, description="largest drift of the mean specific force since rest began: 0.3 deg of tilt"
+        0.05,
+        unit="m/s^2",
+        minimum=0.001,
+        maximum=1,
+        description="largest drift of the mean specific force since rest began: 0.3 deg of tilt",
     )
     minimum_time: float = parameter(1.5, unit="s", minimum=0.1, maximum=60, description="how long it must be still")
-    largest_bias: float = parameter(3.0, edge="deg/s", minimum=0.1, maximum=20, description="a mean rate above it is motion, not bias")
+    largest_bias: float = parameter(
+        3.0, edge="deg/s", minimum=0.1, maximum=20, description="a mean rate above it is motion, not bias"
+    )
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,9 @@ class SensorOptions:
         2.5, edge="ms", minimum=0, maximum=50,
         description="group delay of the IMU's own low-pass (about 2 to 3 ms at 116 Hz), made good with the measured rate",
     )  # fmt: skip
-    stuck_time: float = parameter(1.0, unit="s", minimum=0.02, maximum=60, description="the same values for so long: the sensor is stuck")
+    stuck_time: float = parameter(
+        1.0, unit="s", minimum=0.02, maximum=60, description="the same values for so long: the sensor is stuck"
+    )
     largest_gap: float = parameter(
         0.5, unit="s", minimum=0.02, maximum=10, description="a longer gap between samples makes the inclination start anew"
     )
@@ -46,7 +58,9 @@ class FilterOptions:
     """Noise of the model and of the sensor."""
 
     gravity: float = parameter(9.81, unit="m/s^2", minimum=9.7, maximum=9.9, description="local gravity")
-    gyro_noise: float = parameter(0.01, edge="deg/s", minimum=1e-5, maximum=10, description="noise density of the gyroscope, per sqrt(Hz)")
+    gyro_noise: float = parameter(
+        0.01, edge="deg/s", minimum=1e-5, maximum=10, description="noise density of the gyroscope, per sqrt(Hz)"
+    )
     gyro_noise_per_rate: float = parameter(
         0.001, unit="sqrt(s)", minimum=0, maximum=1, description="its growth with the rate: scale error and misalignment"
     )
@@ -54,15 +68,29 @@ class FilterOptions:
         0.01, unit="m/s^2/sqrt(Hz)", minimum=1e-5, maximum=10, description="noise density of the accelerometer"
     )
     accel_error: float = parameter(
-        0.03, unit="m/s^2", minimum=0, maximum=2, description="uncertainty of its calibration, part of the reported inclination covariance"
+        0.03,
+        unit="m/s^2",
+        minimum=0,
+        maximum=2,
+        description="uncertainty of its calibration, part of the reported inclination covariance",
     )
     bias_walk: float = parameter(0.01, edge="deg/s", minimum=0, maximum=1, description="random walk of the bias, per sqrt(s)")
     bias_walk_stable: float = parameter(
-        0.001, edge="deg/s", minimum=0, maximum=1, description="the same, per sqrt(s), while the temperature is known to stand still"
+        0.001,
+        edge="deg/s",
+        minimum=0,
+        maximum=1,
+        description="the same, per sqrt(s), while the temperature is known to stand still",
     )
-    bias_initial: float = parameter(1.0, edge="deg/s", minimum=0.001, maximum=20, description="standard deviation of the bias at the start")
+    bias_initial: float = parameter(
+        1.0, edge="deg/s", minimum=0.001, maximum=20, description="standard deviation of the bias at the start"
+    )
     velocity_noise: float = parameter(
-        0.15, unit="m/s sqrt(s)", minimum=0.001, maximum=100, description="density of 'the velocity is about zero': the sensor moves, but stays about"
+        0.15,
+        unit="m/s sqrt(s)",
+        minimum=0.001,
+        maximum=100,
+        description="density of 'the velocity is about zero': the sensor moves, but stays about",
     )
     rest_noise: float = parameter(
         0.05, edge="deg/s", minimum=1e-4, maximum=10, description="density of 'the mean rate at rest is the bias', times sqrt(s)"

@@ -16,7 +16,9 @@ from gravcomp.orientation import quaternion as quat
 class PredictionOptions:
     """How far ahead, and how the trend is told from noise."""
 
-    horizon: float = parameter(0.0, edge="ms", minimum=0, maximum=500, description="how far ahead gravity is given: the loop's delay")
+    horizon: float = parameter(
+        0.0, edge="ms", minimum=0, maximum=500, description="how far ahead gravity is given: the loop's delay"
+    )
     trend_time: float = parameter(10.0, edge="ms", minimum=5, maximum=5000, description="low-pass of the rate's slope")
     longest_trend: float = parameter(
         10.0, edge="ms", minimum=0, maximum=500, description="how long the slope is believed to last; the rate lasts the horizon"

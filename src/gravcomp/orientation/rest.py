@@ -64,10 +64,15 @@ class RestDetector:
             self.mean_gyro[i] += gain * gyro_deviation
             self.mean_accel[i] += gain * accel_deviation
             mean = self.mean_gyro[i]
-            if abs(gyro_deviation) > options.gyro_deviation or abs(accel_deviation) > options.accel_deviation or abs(mean) > options.largest_bias:
+            if (
+                abs(gyro_deviation) > options.gyro_deviation
+                or abs(accel_deviation) > options.accel_deviation
+                or abs(mean) > options.largest_bias
+            ):
                 still = calm = False
             elif (
-                abs(mean - bias[i]) > consistent_within(bias_std[i]) or abs(self.mean_accel[i] - self._reference[i]) > options.accel_drift
+                abs(mean - bias[i]) > consistent_within(bias_std[i])
+                or abs(self.mean_accel[i] - self._reference[i]) > options.accel_drift
             ):
                 still = False
             if abs(self.mean_accel[i] - self._calm_reference[i]) > options.accel_drift:

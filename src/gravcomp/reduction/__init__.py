@@ -1,8 +1,6 @@
-"""The reduced model: built once a robot, it follows the full one within micrometres at a small part of its cost."""
+"""The reduced model: it follows the full one within micrometres at a small part of its cost. `gravcomp.training` builds it."""
 
-from gravcomp.reduction.build import BuildOptions, build
 from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, load, path_of, why_not
-from gravcomp.reduction.training import TrainingOptions
 
-__all__ = ["BuildOptions", "ReducedServing", "Reduction", "TrainingOptions", "build", "load", "path_of", "why_not"]
+__all__ = ["ReducedServing", "Reduction", "load", "path_of", "why_not"]

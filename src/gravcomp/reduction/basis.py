@@ -30,7 +30,8 @@ def energy_basis(snapshots: np.ndarray, stiffness: Callable[[np.ndarray], np.nda
 
 def principal_combinations(gram: np.ndarray, count: int) -> np.ndarray:
     """Weights (s, k) of the combinations of s vectors with the Gram matrix (s, s) that hold most of them, orthonormal;
-    k <= count."""
+    k <= count.
+    """
     values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
     best = np.argsort(values)[::-1][:count]
     best = best[values[best] > _ROUNDING * values[best[0]]]

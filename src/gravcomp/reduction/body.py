@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.full_model.statics import CableInput
 from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import strain_at
-from gravcomp.simulation.statics import CableInput
 
 
 class Body(NamedTuple):
@@ -44,7 +44,8 @@ def point_at(body: Body, q: np.ndarray) -> Point:
 
 def cable_arrays(cables: CableInput, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The input for compiled functions: displacements that the cables are wound to (m,), NaN for released ones; tensions that go
-    first (m,), or (0,) where none are given."""
+    first (m,), or (0,) where none are given.
+    """
     if cables.tension is not None:
         return np.full(count, np.nan), cables.tension
     return np.full(count, np.nan) if cables.wound is None else cables.wound, np.zeros(0)

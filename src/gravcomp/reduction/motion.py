@@ -14,15 +14,15 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
+from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
+from gravcomp.full_model.statics import CableInput
+from gravcomp.full_model.viscosity import branch
 from gravcomp.reduction.body import Point, body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
-from gravcomp.simulation.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.simulation.statics import CableInput
-from gravcomp.simulation.viscosity import branch
 
 _MOST_ITERATIONS = 16
 
@@ -31,7 +31,8 @@ _MOST_ITERATIONS = 16
 class ReducedMotion:
     """A state of motion: q, velocity, acceleration (r,), tension (m,), the model at that point, the forces g (r,), the strains (k,)
     one step before and those held by the branch that creeps, that step in s, the norm of the forces out of balance in N, and whether
-    the step converged."""
+    the step converged.
+    """
 
     q: np.ndarray
     velocity: np.ndarray
@@ -65,7 +66,8 @@ class ReducedDynamicSolver:
     ):
         """mass (r, r) in the coordinates; damping_time (s) of Kelvin-Voigt's law; length (m) of the robot; tolerance:
         correction of the tip's displacement, as a fraction of the length, that ends a step; creep: rho and T in s, as in
-        `simulation.viscosity`."""
+        `simulation.viscosity`.
+        """
         self.model, self.options = model, options
         self._mass = mass
         self._damping_time, self._creep_ratio = (damping_time, creep[0]) if options.damping == "kelvin_voigt" else (0.0, 0.0)
@@ -193,7 +195,8 @@ def _stepped(body, point, q, tension, rest, inertia, weight, wound, given, now, 
 
 def _backward_difference(last: ReducedMotion, h: float) -> tuple[float, np.ndarray]:
     """a and b (k,) of d eps / dt = a eps + b at the end of a step of h seconds: the second backward difference, the first
-    where the step before was another."""
+    where the step before was another.
+    """
     if abs(last.step - h) > 1e-9 * h:
         return 1.0 / h, -last.point.strain / h
     return 1.5 / h, (last.strain_before - 4.0 * last.point.strain) / (2.0 * h)

@@ -10,7 +10,8 @@ from gravcomp.reduction.rounding import REORDERED
 
 class ReducedCables(NamedTuple):
     """rest (s, 3), change (3 s, r) and cable (s,) of the straight pieces; rest_length (m,) of the paths and the cables' own
-    axial_compliance (m,)."""
+    axial_compliance (m,).
+    """
 
     rest: np.ndarray
     change: np.ndarray
@@ -21,7 +22,8 @@ class ReducedCables(NamedTuple):
 
 class ReducedTendons(NamedTuple):
     """The cables at coordinates q: tangent (s, 3) and length (s,) of the pieces, displacement (m,) of the paths and its
-    derivative jacobian (m, r)."""
+    derivative jacobian (m, r).
+    """
 
     tangent: np.ndarray
     length: np.ndarray
@@ -88,9 +90,12 @@ def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.nd
 
 
 @njit(cache=True)
-def lacking(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, compliance: np.ndarray, wound: np.ndarray) -> np.ndarray:
+def lacking(
+    cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, compliance: np.ndarray, wound: np.ndarray
+) -> np.ndarray:
     """Change of tension (m,) that would about bring the cables to the displacements they are wound to (m,), NaN for released
-    ones; none where they are slack. compliance (m, m)."""
+    ones; none where they are slack. compliance (m, m).
+    """
     change = np.zeros_like(tension)
     for i in range(len(tension)):
         gap = wound[i] - tendons.displacement[i] - cables.axial_compliance[i] * tension[i]

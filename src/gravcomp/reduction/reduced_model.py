@@ -12,11 +12,11 @@ from numba import njit
 
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import pieces_of
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.observation import observe
 from gravcomp.reduction.reduced_cables import ReducedCables
 from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
-from gravcomp.simulation.model import RobotModel
-from gravcomp.simulation.observation import observe
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class ReducedModel:
     """basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g of the nodal
     forces f that the basis sees as g; elasticity; weight (r, 3): force of unit gravity; cables; section_rest (n + 1, 3, 3),
     section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| that it may serve;
-    error (m): the worst tip error found when it was built."""
+    error (m): the worst tip error found when it was built.
+    """
 
     basis: np.ndarray
     coordinates_of: np.ndarray
@@ -43,7 +44,8 @@ class ReducedModel:
 
     def observe(self, q: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`; of them what `observation.observe` makes, with the changes
-        for changes (k, r) of q."""
+        for changes (k, r) of q.
+        """
         return _observed(self.section_rest, self.section_change, q, answer)
 
     def tip(self, q: np.ndarray) -> np.ndarray:
@@ -52,7 +54,8 @@ class ReducedModel:
 
     def outside(self, q: np.ndarray) -> float:
         """How far q (r,) lies outside of what was trained: above 1 it does. |q| is the root of twice the linear elastic
-        energy."""
+        energy.
+        """
         return math.sqrt(q @ q) / self.reach
 
 
@@ -80,9 +83,7 @@ def _observed(section_rest, section_change, q, answer):
     return sections, values, change, orientation
 
 
-def project(
-    model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, reach: float, error: float
-) -> ReducedModel:
+def project(model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, reach: float, error: float) -> ReducedModel:
     """The model on a basis (3 n_free, r). reach: largest |q| to serve; error (m): known of the basis."""
     r = basis.shape[1]
     fields = np.zeros((r, len(model.mesh.nodes), 3))

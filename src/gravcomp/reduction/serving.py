@@ -12,11 +12,11 @@ import time
 
 import numpy as np
 
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.shape import Response, Shape, ShapeStatus
+from gravcomp.full_model.statics import CableInput, Equilibrium, StaticSolver
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
-from gravcomp.simulation.model import RobotModel
-from gravcomp.simulation.shape import Response, Shape, ShapeStatus
-from gravcomp.simulation.statics import CableInput, Equilibrium, StaticSolver
 
 # Largest tip error, as a fraction of the length, at which the reduced model serves; half of it lets it serve again.
 _TOLERANCE = 1e-3

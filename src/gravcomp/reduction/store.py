@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
+from gravcomp.full_model.model import RobotModel
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
-from gravcomp.simulation.model import RobotModel
 
 # Part of the key; to be raised when what is stored, or how it is trained, changes.
 _FORMAT = 7
@@ -23,7 +23,8 @@ _FORMAT = 7
 class Reduction:
     """What is built once: basis (3 n_free, r) and elasticity at the Young's modulus `modulus` (Pa) of the first
     material; reach: the largest |q| to serve; modulus_low and modulus_high (Pa) of what was trained; samples, and the
-    median and worst tip error (m) over shapes not trained."""
+    median and worst tip error (m) over shapes not trained.
+    """
 
     basis: np.ndarray
     elasticity: StrainPolynomials

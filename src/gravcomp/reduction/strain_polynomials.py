@@ -138,7 +138,8 @@ def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np
 @dataclass(frozen=True)
 class _Points:
     """Some quadrature points: gradient (p, 3, 3, r) of the modes, their linear strains (6 p, r), strains (6 p, s) of
-    the snapshots."""
+    the snapshots.
+    """
 
     gradient: np.ndarray
     linear: np.ndarray

@@ -14,19 +14,20 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
+from gravcomp.full_model.statics import CableInput
 from gravcomp.reduction.body import body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
-from gravcomp.simulation.statics import CableInput
 
 
 @dataclass
 class ReducedState:
     """q (r,), tension (m,), displacement (m,) of the cables' paths; compliance (m, m) and answer X^T (m, r) of the last step;
-    residual (N): of the nodal forces out of balance, as far as the basis sees them, the norm, no less than the largest; converged."""
+    residual (N): of the nodal forces out of balance, as far as the basis sees them, the norm, no less than the largest; converged.
+    """
 
     q: np.ndarray
     tension: np.ndarray
@@ -40,9 +41,12 @@ class ReducedState:
 class ReducedTracker:
     """Owns the current reduced state."""
 
-    def __init__(self, model: ReducedModel, length: float, tolerance: float = 5e-5, longest_step: float = 0.12, near: float = 0.02):
+    def __init__(
+        self, model: ReducedModel, length: float, tolerance: float = 5e-5, longest_step: float = 0.12, near: float = 0.02
+    ):
         """length (m) of the robot; tolerance, longest_step and near (the step up to which its own factor may judge it):
-        displacement of the tip as a fraction of it."""
+        displacement of the tip as a fraction of it.
+        """
         self.model = model
         self._limits = longest_step * length, near * length, tolerance * length
         self._body = body_of(model)

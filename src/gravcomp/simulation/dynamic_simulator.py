@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.simulation.generalized_alpha import DynamicsOptions
-from gravcomp.simulation.dynamics import DynamicSolver, Motion
-from gravcomp.simulation.model import RobotModel
-from gravcomp.simulation.observation import observe
-from gravcomp.simulation.shape import Shape, ShapeStatus
+from gravcomp.full_model.dynamics import DynamicSolver, Motion
+from gravcomp.full_model.generalized_alpha import DynamicsOptions
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.observation import observe
+from gravcomp.full_model.shape import Shape, ShapeStatus
+from gravcomp.full_model.statics import CableInput
 from gravcomp.simulation.simulator import Simulator
-from gravcomp.simulation.statics import CableInput
 
 if TYPE_CHECKING:
     from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion
@@ -129,7 +129,9 @@ class DynamicSimulator:
             q = reduced.coordinates_of @ free(last.u)
             tip = self.model.effectors.sections(self.model.mesh.nodes + last.u)[-1, 0]
             if np.linalg.norm(reduced.tip(q) - tip) < _AGREEMENT * self.model.length:
-                self._reduced.go_on(q, self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration), last.tension)
+                self._reduced.go_on(
+                    q, self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration), last.tension
+                )
                 self._in_reduced = True
         return self._in_reduced
 
@@ -146,7 +148,8 @@ class DynamicSimulator:
 
     def _reduced_solver(self) -> "tuple[ReducedDynamicSolver | None, np.ndarray | None]":
         """The reduced model's motion, and the matrix (r, 3 n_free) to the coordinates' velocity of the same momentum; None
-        without a reduced model, and where the materials do not damp and creep alike."""
+        without a reduced model, and where the materials do not damp and creep alike.
+        """
         reduced = self.statics.reduced_model
         laws = {(m.damping_time, m.creep_ratio, m.creep_time) for m in self.model.mesh.materials}
         if reduced is None or (len(laws) > 1 and self.options.damping == "kelvin_voigt"):
@@ -161,7 +164,12 @@ class DynamicSimulator:
 
 
 def _advanced(
-    solver: "DynamicSolver | ReducedDynamicSolver", gravity: np.ndarray, cables: CableInput, h: float, count: int = 1, halvings: int = _HALVINGS
+    solver: "DynamicSolver | ReducedDynamicSolver",
+    gravity: np.ndarray,
+    cables: CableInput,
+    h: float,
+    count: int = 1,
+    halvings: int = _HALVINGS,
 ) -> "Motion | ReducedMotion":
     """`count` steps of h seconds, each in halves where Newton's method does not settle; the last state where that does not help."""
     for _ in range(count):

@@ -7,7 +7,7 @@ whoever took that step can take it back.
 
 import numpy as np
 
-from gravcomp.simulation.statics import CableInput
+from gravcomp.full_model.statics import CableInput
 
 # Steps before a search, the first and the longest pause.
 _FIRST_PAUSE, _LONGEST_PAUSE = 50, 3200
@@ -51,4 +51,6 @@ class SearchPace:
         if wound is None or cables.wound is None or np.linalg.norm(gravity - before) > _GRAVITY_JUMP * np.linalg.norm(gravity):
             return True
         moved = np.abs(cables.wound - wound)
-        return bool((np.isnan(cables.wound) != np.isnan(wound)).any() or np.nanmax(moved, initial=0.0) > _CABLE_JUMP * self._length)
+        return bool(
+            (np.isnan(cables.wound) != np.isnan(wound)).any() or np.nanmax(moved, initial=0.0) > _CABLE_JUMP * self._length
+        )

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.observation import observe
+from gravcomp.full_model.shape import Response, Shape, ShapeStatus
+from gravcomp.full_model.statics import CableInput, Equilibrium, StaticSolver
 from gravcomp.mechanics.total_lagrangian import SolidElements
-from gravcomp.simulation.model import RobotModel
-from gravcomp.simulation.observation import observe
 from gravcomp.simulation.search_pace import SearchPace
-from gravcomp.simulation.shape import Response, Shape, ShapeStatus
-from gravcomp.simulation.statics import CableInput, Equilibrium, StaticSolver
 
 if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
@@ -57,9 +57,7 @@ class Simulator:
         if self._serving:
             self._serving.reset()
 
-    def step(
-        self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None
-    ) -> Shape:
+    def step(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
         """Follow the equilibrium, starting from the last shape: for small changes, a control step apart. Where it is lost it is
         searched for from the straight robot, now and then (see `SearchPace`): else the last shape is returned, NOT_CONVERGED.
 
@@ -95,9 +93,7 @@ class Simulator:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model serves")
 
-    def solve(
-        self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None
-    ) -> Shape:
+    def solve(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
         """The equilibrium from the straight robot, independent of what was computed before; arguments as in `step`."""
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)

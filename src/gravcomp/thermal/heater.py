@@ -20,18 +20,31 @@ class HeaterOptions:
     """Target, safety and readiness."""
 
     enabled: bool = parameter(True, description="heat at all")
-    rise: float = parameter(15.0, unit="degC", minimum=0, maximum=60, description="target above the ambient, used where no target is given")
+    rise: float = parameter(
+        15.0, unit="degC", minimum=0, maximum=60, description="target above the ambient, used where no target is given"
+    )
     target: float | None = parameter(None, unit="degC", minimum=0, maximum=65, description="fixed target; none: ambient + rise")
     ambient: float | None = parameter(None, unit="degC", minimum=-40, maximum=60, description="ambient; none: the first reading")
     warmest_ambient: float = parameter(
-        30.0, unit="degC", minimum=0, maximum=60, description="a first reading above it is of a chip that is still warm, and counts as this")
+        30.0,
+        unit="degC",
+        minimum=0,
+        maximum=60,
+        description="a first reading above it is of a chip that is still warm, and counts as this",
+    )
     highest_target: float = parameter(60.0, unit="degC", minimum=0, maximum=65, description="a target above it is cut to it")
     over_temperature: float = parameter(70.0, unit="degC", minimum=20, maximum=105, description="heater off for good from here")
-    largest_excess: float = parameter(15.0, unit="degC", minimum=3, maximum=60, description="heater off for good so far above the target")
+    largest_excess: float = parameter(
+        15.0, unit="degC", minimum=3, maximum=60, description="heater off for good so far above the target"
+    )
     margin: float = parameter(0.5, unit="degC", minimum=0.1, maximum=10, description="ready within so much of the target")
     ready_time: float = parameter(5.0, unit="s", minimum=0, maximum=600, description="ready after so long within the margin")
-    sensor_timeout: float = parameter(5.0, unit="s", minimum=1.5, maximum=60, description="no reading for so long: the sensor is dead")
-    dead_time: float = parameter(30.0, unit="s", minimum=5, maximum=600, description="heating so long without warming: the heater is dead")
+    sensor_timeout: float = parameter(
+        5.0, unit="s", minimum=1.5, maximum=60, description="no reading for so long: the sensor is dead"
+    )
+    dead_time: float = parameter(
+        30.0, unit="s", minimum=5, maximum=600, description="heating so long without warming: the heater is dead"
+    )
     dead_rise: float = parameter(1.0, unit="degC", minimum=0.125, maximum=20, description="what it must have warmed in that time")
     pid: PidOptions = field(default_factory=PidOptions)
 

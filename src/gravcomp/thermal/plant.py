@@ -21,7 +21,9 @@ class ThermalPlantOptions:
     ambient: float = parameter(20.0, unit="degC", minimum=-40, maximum=85, description="temperature of the surroundings")
     rise: float = parameter(45.0, unit="degC", minimum=1, maximum=200, description="steady rise above the ambient at full duty")
     time_constant: float = parameter(60.0, unit="s", minimum=1, maximum=3600, description="of heating and cooling")
-    start: float | None = parameter(None, unit="degC", minimum=-40, maximum=120, description="temperature at the start; none: the ambient")
+    start: float | None = parameter(
+        None, unit="degC", minimum=-40, maximum=120, description="temperature at the start; none: the ambient"
+    )
 
 
 class ThermalPlant:

@@ -88,7 +88,9 @@ class Browser:
             self.page.wait_for_function("document.querySelector('[data-held-at]')?.dataset.heldAt", polling=200)
             held_at = float(self.page.locator("[data-held-at]").get_attribute("data-held-at"))
             self.set_slider("look back s", round(held_at - time, 1))
-            self.page.wait_for_function(f"Math.abs(document.querySelector('[data-time]').dataset.time - {time}) < 0.2", polling=200)
+            self.page.wait_for_function(
+                f"Math.abs(document.querySelector('[data-time]').dataset.time - {time}) < 0.2", polling=200
+            )
         except Error as error:
             raise BrowserError(f"the page cannot be turned back: {error.message.splitlines()[0]}") from error
 

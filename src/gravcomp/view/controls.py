@@ -61,8 +61,12 @@ class Controls:
 
     def _add_target(self) -> None:
         with self._gui.add_folder("Target"):
-            self._angle = self._gui.add_slider("bend °", min=0.0, max=120.0, step=1.0, initial_value=0.0, hint="between base and tip direction")
-            self._plane = self._gui.add_slider("plane °", min=-180.0, max=180.0, step=1.0, initial_value=0.0, hint="into which it bends, from x")
+            self._angle = self._gui.add_slider(
+                "bend °", min=0.0, max=120.0, step=1.0, initial_value=0.0, hint="between base and tip direction"
+            )
+            self._plane = self._gui.add_slider(
+                "plane °", min=-180.0, max=180.0, step=1.0, initial_value=0.0, hint="into which it bends, from x"
+            )
             straight = self._gui.add_button("Straight")
         self._angle.on_update(self._on_bend)
         self._plane.on_update(self._on_bend)
@@ -113,7 +117,8 @@ class Controls:
         with self._base:
             presets = self._gui.add_button_group("presets", _TILTS)
             self._inclination = self._gui.add_slider(
-                "inclination °", min=-90.0, max=180.0, step=1.0, initial_value=0.0, hint="0 horizontal, 90 pointing up")
+                "inclination °", min=-90.0, max=180.0, step=1.0, initial_value=0.0, hint="0 horizontal, 90 pointing up"
+            )
             self._roll = self._gui.add_slider("roll °", min=-180.0, max=180.0, step=1.0, initial_value=0.0)
         self._inclination.on_update(self._on_tilt)
         self._roll.on_update(self._on_tilt)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import viser
-from viser import uplot
 
 from gravcomp.view import colours
 from gravcomp.view.history import History
@@ -58,7 +57,8 @@ class Plots:
 
 def top_of(values: np.ndarray, top: float, least: float) -> float:
     """Where an axis from 0 ends: `top` as long as the values (never negative, NaN: unknown) fill a fair part of it, else the next of 1, 2, 5, 10...
-    that leaves a little room, at least `least`."""
+    that leaves a little room, at least `least`.
+    """
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
     if max(0.3 * top, least) <= largest <= top or (largest <= top == least):
         return top
@@ -97,7 +97,10 @@ def _add(server: viser.ViserServer, plot: _Plot, window: float, dark: bool) -> v
     ink, line = ("#aab4c3", "#2b3340") if dark else ("#5b6675", "#e3e8ee")
     axis = {"stroke": ink, "grid": {"stroke": line, "width": 1}, "ticks": {"stroke": line, "width": 1}, "font": "11px sans-serif"}
     series = [{"label": "s"}]
-    series += [{"label": label, "stroke": stroke, "width": 1.6, "points": {"show": False}} for label, stroke in zip(plot.labels, plot.strokes)]
+    series += [
+        {"label": label, "stroke": stroke, "width": 1.6, "points": {"show": False}}
+        for label, stroke in zip(plot.labels, plot.strokes)
+    ]
     scales = _scales(window, (0.0, plot.least) if plot.reach is None else (-plot.reach, plot.reach))
     chips = "".join(_chip(label, stroke) for label, stroke in zip(plot.labels, plot.strokes))
     server.gui.add_html(f'<div style="padding:.5em .7em 0;font-size:.82em"><b>{plot.title}</b><br>{chips}</div>')

@@ -78,7 +78,14 @@ class Scene:
         wall = revolved(np.full(40, lumen.diameter / 2), np.linspace(0.0, 1.0, 40), 1.0, around=48)
         vertices = wall.on(Backbone(arc.station, arc.position + np.array([0.0, 0.0, lumen.start]), arc.orientation))
         self._scene.add_mesh_simple(
-            "/robot/lumen_wall", SCALE * vertices, wall.faces, color=(226, 120, 120), opacity=0.16, side="double", cast_shadow=False)
+            "/robot/lumen_wall",
+            SCALE * vertices,
+            wall.faces,
+            color=(226, 120, 120),
+            opacity=0.16,
+            side="double",
+            cast_shadow=False,
+        )
 
     def _surroundings(self, server: viser.ViserServer, size: float, dark: bool) -> None:
         scene = self._scene
@@ -86,10 +93,13 @@ class Scene:
         scene.world_axes.visible = False
         scene.configure_default_lights(enabled=False)
         self._key = scene.add_light_directional(
-            "/lights/key", intensity=2.2, cast_shadow=True, position=(2.0, -3.0, 5.0), color=(255, 246, 235))
+            "/lights/key", intensity=2.2, cast_shadow=True, position=(2.0, -3.0, 5.0), color=(255, 246, 235)
+        )
         self._rim = scene.add_light_directional("/lights/rim", intensity=0.9, position=(-4.0, 3.0, 2.0), color=(200, 220, 255))
         # In place of the reflections where graphics are light.
-        self._sky = scene.add_light_hemisphere("/lights/sky", sky_color=(235, 240, 255), ground_color=(120, 116, 110), intensity=1.6)
+        self._sky = scene.add_light_hemisphere(
+            "/lights/sky", sky_color=(235, 240, 255), ground_color=(120, 116, 110), intensity=1.6
+        )
         scene.set_background_image(_gradient(dark), format="png")
         cell, section = ((46, 54, 68), (64, 76, 96)) if dark else ((214, 220, 228), (190, 198, 210))
         scene.add_grid(
@@ -133,13 +143,16 @@ class Scene:
         self._body += self._cables
         self._body_skin, self._body_parts = joined(skins)
         self._ghosts = [
-            self._mesh(f"/robot/rest{i}", skin, straight, colours.GHOST, opacity=0.3, cast_shadow=False) for i, skin in enumerate(walls)
+            self._mesh(f"/robot/rest{i}", skin, straight, colours.GHOST, opacity=0.3, cast_shadow=False)
+            for i, skin in enumerate(walls)
         ]
 
     def _add_truth(self, straight: Backbone, radius: float) -> None:
         self._truth_skin = line_skin(0.3 * radius)
         self._truth = self._mesh("/robot/truth", self._truth_skin, straight, colours.TRUTH, cast_shadow=False)
-        self._truth_tip = self._scene.add_icosphere("/robot/truth_tip", SCALE * 0.42 * radius, color=colours.TRUTH, cast_shadow=False)
+        self._truth_tip = self._scene.add_icosphere(
+            "/robot/truth_tip", SCALE * 0.42 * radius, color=colours.TRUTH, cast_shadow=False
+        )
         self._truth.visible = self._truth_tip.visible = False
 
     def _add_target(self, straight: Backbone, radius: float) -> None:
@@ -151,7 +164,8 @@ class Scene:
         angle = np.linspace(0.0, 2 * math.pi, 49)
         circle = ring * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
         self._target_ring = self._scene.add_line_segments(
-            "/robot/target_ring", SCALE * np.stack([circle[:-1], circle[1:]], axis=1), colours.TARGET, thickness=SCALE * 0.0006)
+            "/robot/target_ring", SCALE * np.stack([circle[:-1], circle[1:]], axis=1), colours.TARGET, thickness=SCALE * 0.0006
+        )
         self.gizmo = self._scene.add_transform_controls(
             "/robot/target_handle", scale=SCALE * 0.022, line_width=2.0, disable_rotations=True, disable_sliders=True,
             depth_test=False, opacity=0.85, position=SCALE * straight.tip, visible=False)  # fmt: skip
@@ -195,18 +209,24 @@ class _Mount:
     def __init__(self, scene: viser.SceneApi, size: float, motors: int):
         unit = size / 0.018
         self._scene, self._unit = scene, unit
-        self._turn("flange", [(0, 0), (7, 0), (8, -1), (8, -6), (22, -8), (23, -9), (23, -12), (22, -13), (0, -13)], colours.METAL)
+        self._turn(
+            "flange", [(0, 0), (7, 0), (8, -1), (8, -6), (22, -8), (23, -9), (23, -12), (22, -13), (0, -13)], colours.METAL
+        )
         self._turn("core", [(0, -13), (9, -13), (9, -42), (0, -42)], (58, 64, 74))
         self._turn("plate", [(0, -42), (22, -42), (23, -43), (23, -46), (22, -47), (0, -47)], colours.METAL)
         self._turn("handle", [(0, -47), (9, -47), (10.5, -49), (9.5, -62), (10.5, -80), (8, -84), (0, -84)], (52, 58, 68))
         for i in range(motors):
             angle = 2 * math.pi * i / motors
-            self._turn(f"motor{i}", [(0, -14), (4.6, -14), (5, -14.6), (5, -41), (0, -41)], (176, 184, 196), 16.0, angle, around=20)
+            self._turn(
+                f"motor{i}", [(0, -14), (4.6, -14), (5, -14.6), (5, -41), (0, -41)], (176, 184, 196), 16.0, angle, around=20
+            )
         scene.add_box(
             "/robot/mount/board", color=colours.BOARD, dimensions=tuple(SCALE * unit * 1e-3 * d for d in (14, 18, 1.6)),
             position=(0.0, -SCALE * unit * 0.012, -SCALE * unit * 0.0072), wxyz=(0.9659, 0.2588, 0.0, 0.0))  # fmt: skip
 
-    def _turn(self, name: str, profile_mm: list, colour: colours.Rgb, away_mm: float = 0.0, angle: float = 0.0, around: int = 36) -> None:
+    def _turn(
+        self, name: str, profile_mm: list, colour: colours.Rgb, away_mm: float = 0.0, angle: float = 0.0, around: int = 36
+    ) -> None:
         """A turned part; its profile (radius, z) in mm runs from the front backward."""
         profile = 1e-3 * self._unit * np.array(profile_mm, float)[::-1]
         radii, heights = _sharp(profile)
@@ -214,7 +234,9 @@ class _Mount:
         vertices = np.column_stack([part.offset, part.station])
         away = SCALE * 1e-3 * self._unit * away_mm
         position = (away * math.cos(angle), away * math.sin(angle), 0.0)
-        self._scene.add_mesh_simple(f"/robot/mount/{name}", SCALE * vertices, part.faces, color=colour, position=position, side="front")
+        self._scene.add_mesh_simple(
+            f"/robot/mount/{name}", SCALE * vertices, part.faces, color=colour, position=position, side="front"
+        )
 
 
 def _sharp(profile: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -227,7 +249,9 @@ def _sharp(profile: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gradient(dark: bool) -> np.ndarray:
-    top, bottom = (np.array([34, 40, 52]), np.array([14, 17, 23])) if dark else (np.array([252, 253, 255]), np.array([222, 229, 238]))
+    top, bottom = (
+        (np.array([34, 40, 52]), np.array([14, 17, 23])) if dark else (np.array([252, 253, 255]), np.array([222, 229, 238]))
+    )
     ramp = np.linspace(0.0, 1.0, 256)[:, None]
     column = top + (bottom - top) * ramp
     return np.repeat(column[:, None, :], 8, axis=1).astype(np.uint8)

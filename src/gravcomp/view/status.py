@@ -32,9 +32,13 @@ def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
     ]
     recording = ""
     if snapshot.recording:
-        recording = f'<div style="margin-top:.4em;font-size:.8em;color:#ef4444">● recording {html.escape(snapshot.recording)}</div>'
+        recording = (
+            f'<div style="margin-top:.4em;font-size:.8em;color:#ef4444">● recording {html.escape(snapshot.recording)}</div>'
+        )
     if held_at is not None:
-        recording = f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">looking back: {held_at - snapshot.time:.1f} s ago</div>'
+        recording = (
+            f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">looking back: {held_at - snapshot.time:.1f} s ago</div>'
+        )
     return (
         f'<div data-time="{snapshot.time:.3f}" data-held-at="{"" if held_at is None else f"{held_at:.3f}"}" '
         f'style="padding:.55em .9em .3em">{sentence}{motors}'

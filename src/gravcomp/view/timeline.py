@@ -16,7 +16,9 @@ class Timeline:
 
     def __init__(self, gui: viser.GuiApi, span: float, rate: float):
         self._snapshots: collections.deque[Snapshot] = collections.deque(maxlen=int(span * rate) + 1)
-        self._ago = gui.add_slider("look back s", min=0.0, max=span, step=0.1, initial_value=0.0, hint="0: live; the robot goes on meanwhile")
+        self._ago = gui.add_slider(
+            "look back s", min=0.0, max=span, step=0.1, initial_value=0.0, hint="0: live; the robot goes on meanwhile"
+        )
         self._since: list[Snapshot] = []  # what could be looked back at when the page was held
 
     def add(self, snapshot: Snapshot) -> None:

@@ -28,7 +28,8 @@ FIRMWARE = (1, 0)
 
 class VirtualBoard:
     """The board's state. Its faults are attributes: `imu_fault` one of None, 'stuck', 'saturated', 'invalid', 'silent';
-    `heater_fault` None, 'dead', 'stuck_on'; `temperature_stuck`."""
+    `heater_fault` None, 'dead', 'stuck_on'; `temperature_stuck`.
+    """
 
     def __init__(self, parameters: Board, random: np.random.Generator):
         self._parameters, self._random = parameters, random

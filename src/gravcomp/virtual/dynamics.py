@@ -82,7 +82,8 @@ class MovingRod:
 
     def along(self, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (k, 3) and orientations (k, 4), x y z w, in the base's frame at the stations (k,), along the helices of
-        the elements."""
+        the elements.
+        """
         position, orientation = np.empty((len(station), 3)), np.empty((len(station), 4))
         _along(
             station, self.model.station, self.orientation, self.position, self.strain, self.model.length, position, orientation

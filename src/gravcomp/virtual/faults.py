@@ -66,7 +66,8 @@ class FrameFaults:
 
     def through(self, frames: list[can.Message], now: float, faults: list[tuple[Fault, int | None]]) -> list[can.Message]:
         """The frames that arrive by `now` (s), those delayed before included; faults come with the id of their motor's
-        feedback."""
+        feedback.
+        """
         if not faults and not self._late and self._held is None:
             return frames
         if any(fault.kind == "bus_off" for fault, _ in faults):

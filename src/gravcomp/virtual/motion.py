@@ -23,7 +23,8 @@ class BaseMotion(Protocol):
 
     def imu(self, time: float, period: float) -> tuple[np.ndarray, np.ndarray] | None:
         """Angular rate (3,) rad/s and specific force (3,) m/s^2 over the `period` before `time`, or None: to be derived from
-        the pose."""
+        the pose.
+        """
 
 
 class SyntheticMotion:

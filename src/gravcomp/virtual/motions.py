@@ -4,7 +4,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
-from gravcomp.recordings import read_recording
+from gravcomp.recordings.imu import read_recording
 from gravcomp.virtual.motion import (
     BaseMotion,
     FollowedMotion,

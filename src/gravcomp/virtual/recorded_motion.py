@@ -6,7 +6,7 @@ whatever the two rates are. Gaps in the ground truth and samples that are not fi
 
 import numpy as np
 
-from gravcomp.recordings import Recording, RecordingError
+from gravcomp.recordings.imu import Recording, RecordingError
 from gravcomp.virtual.motion import rotation_from_quaternion, turned
 from gravcomp.virtual.se3 import rotation_log
 

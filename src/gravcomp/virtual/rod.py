@@ -85,7 +85,8 @@ def strains(orientation, position, length, out):
 @njit(cache=True, error_model="numpy")
 def tendon_lengths(strain, length, tendon_offset, tendon_start, tendon_end, direction, out):
     """out (m, n): length of each tendon in each element (0 where it does not pass); direction (m, n, 3): its unit vectors
-    there."""
+    there.
+    """
     for c in range(tendon_end.shape[0]):
         d0, d1 = tendon_offset[c, 0], tendon_offset[c, 1]
         for e in range(length.shape[0]):

@@ -51,7 +51,8 @@ def rotation_log(r, out):
 @njit(cache=True, error_model="numpy")
 def rotation_to_quaternion(r, out):
     """out (4,) = x y z w of the rotation r (3, 3), w >= 0: the largest component from the diagonal, the others from sums
-    (Shepperd)."""
+    (Shepperd).
+    """
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     k = 3
     largest = trace
@@ -75,7 +76,7 @@ def rotation_to_quaternion(r, out):
 
 @njit(cache=True, error_model="numpy")
 def motion_exp(xi, rotation, translation):
-    """rotation (3, 3), translation (3,) = exp(xi) for the twist xi (6,)."""
+    """Rotation (3, 3), translation (3,) = exp(xi) for the twist xi (6,)."""
     w0, w1, w2 = xi[3], xi[4], xi[5]
     rotation_exp(xi[3:], rotation)
     angle2 = w0 * w0 + w1 * w1 + w2 * w2

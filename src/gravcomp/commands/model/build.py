@@ -45,8 +45,9 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from gravcomp.description import load_robot_file
-    from gravcomp.reduction import build, load
-    from gravcomp.simulation.model import RobotModel
+    from gravcomp.full_model.model import RobotModel
+    from gravcomp.reduction import load
+    from gravcomp.training import build
 
     model = RobotModel(load_robot_file(robot).robot)
     reduction = None if force else load(model)

@@ -18,9 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand; 0: done."""
     from gravcomp.description import load_robot_file
+    from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.mesh.quality import mesh_quality
     from gravcomp.simulation import Simulator
-    from gravcomp.simulation.modes import natural_frequencies
 
     file = load_robot_file(args.robot)
     simulator = Simulator(file.robot, reduced=False)
@@ -33,9 +33,7 @@ def run(args: argparse.Namespace) -> int:
         "length_mm": 1e3 * robot.length,
         "mass_g": 1e3 * model.mass,
         "payload_g": 1e3 * robot.payload.mass,
-        "cables": {
-            name: {"length_mm": 1e3 * length} for name, length in zip(robot.cable_names, model.tendons.rest_length)
-        },
+        "cables": {name: {"length_mm": 1e3 * length} for name, length in zip(robot.cable_names, model.tendons.rest_length)},
         "natural_frequency_hz": natural_frequencies(model).tolist(),
         "horizontal_tip_mm": (1e3 * sag.tip_position).tolist(),
         "reach": _reach(simulator),
@@ -47,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _reach(simulator) -> list[dict]:
     """Where each cable alone brings the weightless robot: with growing tension, up to the limits or a half turn."""
-    from gravcomp.simulation.statics import CableInput
+    from gravcomp.full_model.statics import CableInput
 
     robot, reach = simulator.robot, []
     for index, name in enumerate(robot.cable_names):
@@ -88,7 +86,9 @@ def _mesh_error(robot, sag) -> dict:
     good = error < 2e-3 * robot.length
     return {
         "tip_change_when_refined_mm": 1e3 * error,
-        "refinement": "fine enough" if good else "raise elements.along or elements.around: the change is above 0.2 % of the length",
+        "refinement": "fine enough"
+        if good
+        else "raise elements.along or elements.around: the change is above 0.2 % of the length",
     }
 
 
@@ -112,7 +112,9 @@ def _table(figures: dict) -> str:
         f" worst Jacobian ratio {mesh['jacobian_ratio']:.2f}, worst aspect ratio {mesh['aspect_ratio']:.1f}"
     )
     if "tip_change_when_refined_mm" in mesh:
-        lines.append(f"  refined twice, the horizontal tip moves {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}")
+        lines.append(
+            f"  refined twice, the horizontal tip moves {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"
+        )
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]

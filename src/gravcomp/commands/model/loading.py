@@ -15,9 +15,15 @@ def add_load_arguments(parser: argparse.ArgumentParser) -> None:
     cables = parser.add_mutually_exclusive_group()
     cables.add_argument("--tension", nargs="+", type=float, metavar="N", help="tension of every cable")
     cables.add_argument(
-        "--displacement", nargs="+", type=float, metavar="MM", help="displacement of every cable, pulled in is positive; nan: released"
+        "--displacement",
+        nargs="+",
+        type=float,
+        metavar="MM",
+        help="displacement of every cable, pulled in is positive; nan: released",
     )
-    cables.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to reach with the cables, mm")
+    cables.add_argument(
+        "--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to reach with the cables, mm"
+    )
     parser.add_argument("--direction", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip direction to reach, with --target")
     parser.add_argument("--full", action="store_true", help="the full model even where a reduced one is built")
 

@@ -57,7 +57,9 @@ def _table(figures: dict) -> str:
     ]
     if "target_mm" in figures:
         message = figures["controller_message"]
-        lines.append(f"  {figures['target_distance_mm']:.3f} mm from the target; controller: {figures['controller']} {message}".rstrip())
+        lines.append(
+            f"  {figures['target_distance_mm']:.3f} mm from the target; controller: {figures['controller']} {message}".rstrip()
+        )
     lines += [
         f"  {name}: {tension:.4f} N, {displacement:+.3f} mm"
         for name, tension, displacement in zip(figures["cables"], figures["tension_n"], figures["displacement_mm"])

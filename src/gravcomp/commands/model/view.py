@@ -17,7 +17,9 @@ _FACES["tet4"] = _FACES["tet10"]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
     add_load_arguments(parser)
-    parser.add_argument("--out", default="robot.png", metavar="FILE", help="picture to write: .png, .svg or .pdf (default: robot.png)")
+    parser.add_argument(
+        "--out", default="robot.png", metavar="FILE", help="picture to write: .png, .svg or .pdf (default: robot.png)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

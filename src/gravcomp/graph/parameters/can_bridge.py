@@ -10,10 +10,16 @@ from gravcomp.motors.bridge import ZERO_POLICIES
 class CanBridgeParameters:
     """What can be set on the node; the motors are in the robot's file under `hardware`."""
 
-    interface: str = parameter("", description="python-can interface; empty: hardware.can.interface of the robot's file", read_only=True)
+    interface: str = parameter(
+        "", description="python-can interface; empty: hardware.can.interface of the robot's file", read_only=True
+    )
     channel: str = parameter("", description="its channel; empty: hardware.can.channel of the robot's file", read_only=True)
-    control_rate: float = parameter(250.0, unit="Hz", minimum=200, maximum=1000, description="of the position loops", read_only=True)
-    state_rate: float = parameter(50.0, unit="Hz", minimum=1, maximum=500, description="of cable/state and joint_states", read_only=True)
+    control_rate: float = parameter(
+        250.0, unit="Hz", minimum=200, maximum=1000, description="of the position loops", read_only=True
+    )
+    state_rate: float = parameter(
+        50.0, unit="Hz", minimum=1, maximum=500, description="of cable/state and joint_states", read_only=True
+    )
     zero: str = parameter(
         "start",
         choices=ZERO_POLICIES,

@@ -10,4 +10,6 @@ class SharedParameters:
     """Which robot, and whether the node goes active by itself."""
 
     robot: str = parameter("article", read_only=True, description="a shipped robot's name or the path of a robot's YAML")
-    autostart: bool = parameter(True, read_only=True, description="configure and activate at the start, without a lifecycle manager")
+    autostart: bool = parameter(
+        True, read_only=True, description="configure and activate at the start, without a lifecycle manager"
+    )

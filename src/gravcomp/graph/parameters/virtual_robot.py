@@ -26,7 +26,9 @@ class VirtualRobotNodeParameters:
         "as a recording's ground truth, or following virtual/base_orientation",
     )
     steerable: bool = parameter(
-        False, read_only=True, description="virtual/base_orientation takes the base over from any motion, as it always does with motion topic"
+        False,
+        read_only=True,
+        description="virtual/base_orientation takes the base over from any motion, as it always does with motion topic",
     )
     inclination: float = parameter(
         0.0,

@@ -1,0 +1,20 @@
+"""The shell that all nodes share: declared parameters, lifecycle, status, diagnostics and a clean end.
+
+class Sensor(ManagedNode):
+    name = "sensor"
+    parameters_class = SensorParameters
+
+    def configure(self): ...      # resources, publishers; raise ConfigError to refuse
+    def activate(self): ...       # subscriptions, timers
+    def deactivate(self): ...
+    def cleanup(self): ...
+
+def main():
+    return run(Sensor)
+"""
+
+from gravcomp_node.managed_node import ManagedNode
+from gravcomp_node.qos import COMMAND, LATCHED, SENSOR
+from gravcomp_node.run import run
+
+__all__ = ["COMMAND", "LATCHED", "SENSOR", "ManagedNode", "run"]

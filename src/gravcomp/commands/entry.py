@@ -1,0 +1,21 @@
+"""`./gravcomp COMMAND ...` before anything is installed: the overview, wrong names, then the environment and the command in it.
+
+Nothing but Python's own library is imported here.
+"""
+
+import sys
+from pathlib import Path
+
+from gravcomp.commands import COMMANDS, overview
+from gravcomp.environment.ready import enter
+
+
+def start(root: Path, arguments: "list[str]") -> int:
+    """Run the command of the repository `root`; returns the exit code where no command replaces this process."""
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(overview())
+        return 0
+    if arguments[0] not in COMMANDS:
+        print(f"gravcomp: unknown command '{arguments[0]}'\n\n{overview()}", file=sys.stderr)
+        return 2
+    return enter(root, arguments)

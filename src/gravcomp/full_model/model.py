@@ -1,0 +1,72 @@
+"""Everything about a robot that does not change while it moves: mesh, elements, cables, sections, weights.
+
+Nodes are numbered level by level from the clamp, the clamped ones last; the unknowns q are the first `n_free` rows of the
+displacements u (n, 3), component by component within a node.
+"""
+
+import numpy as np
+
+from gravcomp.cables.routing import route_cables
+from gravcomp.cables.tendons import Tendons, pieces_of
+from gravcomp.description import Robot
+from gravcomp.full_model.effectors import Effectors
+from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
+from gravcomp.mechanics.corotational import CorotationalElements
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.mesh import Mesh, body_mesh
+
+
+class RobotModel:
+    """The finite-element model of a robot.
+
+    robot, mesh (renumbered), pattern (of the stiffness), elements, tendons, effectors, nodal_weight (n,) in kg: what
+    gravity pulls at each node, the payload included; n_free: number of free nodes.
+    """
+
+    def __init__(self, robot: Robot, mesh: Mesh | None = None):
+        """`mesh` replaces the one that the robot's description gives. Raises MeshError."""
+        self.robot = robot
+        mesh = mesh or body_mesh(robot)
+        routes = route_cables(robot, mesh)
+        cliques = [mesh.elements]
+        cliques += [nodes[None, :] for route in routes for nodes, _ in pieces_of(route)]
+        order, self.pattern = order_in_levels(cliques, len(mesh.nodes), mesh.clamped)
+        self.mesh = mesh = mesh.renumbered(order)
+        self.n_free = self.pattern.n // 3
+        kind = CorotationalElements if mesh.kind == "tet4" else SolidElements
+        self.elements = kind(mesh, self.pattern)
+        self.tendons = Tendons(robot.cables, [r.renumbered(order) for r in routes], mesh.nodes, self.pattern)
+        self.effectors = Effectors(mesh, robot.effectors.backbone_station)
+        self.body_weight = self.elements.nodal_mass()
+        self.nodal_weight = self.body_weight + robot.payload.mass * self.effectors.tip_weights
+        self.length = robot.length
+
+    @property
+    def mass(self) -> float:
+        """Mass of the body and its payload in kg."""
+        return float(self.nodal_weight.sum())
+
+    def new_matrix(self) -> BlockMatrix:
+        """Storage for a stiffness matrix."""
+        return BlockMatrix(self.pattern)
+
+    def mass_matrix(self) -> BlockMatrix:
+        """The consistent mass of body and payload."""
+        matrix = self.new_matrix()
+        self.elements.add_mass(matrix, 1.0)
+        if self.robot.payload.mass > 0.0:
+            weights = self.effectors.tip_weights[: self.n_free]
+            nodes = np.flatnonzero(weights)
+            a, b = (nodes[index] for index in np.tril_indices(len(nodes)))
+            for i in range(3):
+                place = self.pattern.position(3 * a + i, 3 * b + i)
+                np.add.at(matrix.values, place, self.robot.payload.mass * weights[a] * weights[b])
+        return matrix
+
+    def free(self, field: np.ndarray) -> np.ndarray:
+        """The unknowns (3 n_free,) of a field on all nodes (n, 3); a view where that is possible."""
+        return field[: self.n_free].reshape(-1)
+
+    def weight(self, gravity: np.ndarray) -> np.ndarray:
+        """(3 n_free,) forces of `gravity` (3,) in N."""
+        return np.outer(self.nodal_weight[: self.n_free], gravity).reshape(-1)

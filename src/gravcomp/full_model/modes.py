@@ -1,0 +1,27 @@
+"""Vibration of the straight robot: K phi = omega^2 M phi."""
+
+import numpy as np
+
+from gravcomp.full_model.model import RobotModel
+
+
+def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
+    """(count,) the lowest natural frequencies in Hz, undamped, without cables and gravity."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n = model.pattern.n
+    stiffness = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), stiffness)
+    mass = model.mass_matrix()
+    factor = stiffness.factor()
+    start = model.weight(np.array([1.0, 1.0, 1.0]))  # any start that every mode takes part in; a fixed one repeats
+    values = eigsh(
+        LinearOperator((n, n), matvec=lambda x: x, dtype=float),  # not used: the inverse below stands for it
+        k=count,
+        M=LinearOperator((n, n), matvec=mass.multiply, dtype=float),
+        sigma=0.0,
+        OPinv=LinearOperator((n, n), matvec=factor.solve, dtype=float),
+        v0=start,
+        return_eigenvectors=False,
+    )
+    return np.sort(np.sqrt(np.maximum(values, 0.0))) / (2.0 * np.pi)

@@ -1,0 +1,55 @@
+"""What the material adds to its elastic stress in motion: Kelvin-Voigt damping, and one Maxwell branch that creeps.
+
+    S = S_elastic(E) + C : (beta dE/dt + rho H),      dH/dt = dE/dt - H / T,
+
+H is the strain that the branch still holds: rho of the stiffness more at once, nothing of it after some T. Over a step of h the rate of
+strain is the second backward difference, dE/dt = (3 E_(n+1) - 4 E_n + E_(n-1)) / (2 h), and H what a steady rate makes of it,
+
+    H_(n+1) = e^-x H_n + g (E_(n+1) - E_n),      x = h / T,   g = (1 - e^-x) / x,
+
+so that both are linear in the strain at the step's end, as `ViscousStrain` has it.
+"""
+
+import numpy as np
+
+from gravcomp.mechanics.total_lagrangian import ViscousStrain
+from gravcomp.mesh import Mesh
+
+
+class Viscosity:
+    """The laws of a mesh's k elements. creeps: whether any of them has a branch that creeps."""
+
+    def __init__(self, mesh: Mesh):
+        def of(name: str) -> np.ndarray:
+            return np.array([getattr(material, name) for material in mesh.materials])[mesh.region][:, None, None]
+
+        self._damping_time, self._ratio, self._creep_time = of("damping_time"), of("creep_ratio"), of("creep_time")
+        self.creeps = bool(self._ratio.any())
+
+    def step(self, strain: np.ndarray, strain_before: np.ndarray | None, held: np.ndarray, h: float) -> ViscousStrain:
+        """At the end of a step of h s from `strain` and `held` (k, p, 6); strain_before: of h s earlier, None where it is not known: then
+        the rate of strain is the first difference.
+        """
+        if strain_before is None:
+            rate, past = 1.0 / h, strain / h
+        else:
+            rate, past = 1.5 / h, (4.0 * strain - strain_before) / (2.0 * h)
+        factor, past = rate * self._damping_time, self._damping_time * past
+        if self.creeps:
+            decay, gain = branch(h, self._creep_time)
+            factor = factor + self._ratio * gain
+            past = past + self._ratio * (gain * strain - decay * held)
+        return ViscousStrain(factor[:, 0, 0], past)
+
+    def held_after(self, strain: np.ndarray, strain_before: np.ndarray, held: np.ndarray, h: float) -> np.ndarray:
+        """(k, p, 6): the strain held when a step of h s from `strain_before` and `held` has ended in `strain`."""
+        if not self.creeps:
+            return held
+        decay, gain = branch(h, self._creep_time)
+        return decay * held + gain * (strain - strain_before)
+
+
+def branch(h: float, creep_time: float | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
+    """e^-x and g for a step of h s."""
+    x = h / creep_time
+    return np.exp(-x), -np.expm1(-x) / x

@@ -1,0 +1,132 @@
+"""A bag's topics as arrays, one row a message."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gravcomp.recordings.bags.errors import BagError
+
+VECTOR = "geometry_msgs/msg/Vector3Stamped"
+POSE = "geometry_msgs/msg/PoseStamped"
+CABLE_STATE = "gravcomp_msgs/msg/CableState"
+CABLE_COMMAND = "gravcomp_msgs/msg/CableCommand"
+CONTROLLER_STATUS = "gravcomp_msgs/msg/ControllerStatus"
+SHAPE_TARGET = "gravcomp_msgs/msg/ShapeTarget"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A topic of the type `kind` whose name ends with one of `names`; those earlier in the tuple go first. A name that begins with '/' is the
+    topic's full one. `optional`: it may be missing.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Stream:
+    """k messages in the order of their reception. What a row of `values` holds depends on the type: see `_VALUES`."""
+
+    topic: str
+    stamp: np.ndarray  # (k,) s, of the headers
+    received: np.ndarray  # (k,) s
+    values: np.ndarray  # (k, n)
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        """(len(time), n) interpolated between the stamps; the first and the last row beyond them."""
+        order = np.argsort(self.stamp, kind="stable")
+        return np.column_stack([np.interp(time, self.stamp[order], column[order]) for column in self.values.T])
+
+
+def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int = 2) -> dict[str, Stream | None]:
+    """The topics by the keys of `wanted`, None for an optional one that is missing. A damaged bag is read as far as it goes.
+
+    Raises BagError, also when one that is there holds fewer than `least` messages and is not optional.
+    """
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.rosbag2 import ReaderError
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, get_typestore
+
+    from gravcomp.recordings.bags.recovery import readable
+
+    try:
+        with AnyReader([readable(path).path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            found = {c.topic: c.msgtype for c in reader.connections}
+            topics = {key: _topic(path, found, want) for key, want in wanted.items()}
+            rows: dict[str, list] = {topic: [] for topic in topics.values() if topic}
+            for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
+                message = reader.deserialize(raw, connection.msgtype)
+                stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+                rows[connection.topic].append((stamp, 1e-9 * received, _VALUES[connection.msgtype](message)))
+    except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
+        raise BagError(f"{path}: is not a readable bag: {error}") from error
+    streams: dict[str, Stream | None] = {}
+    for key, topic in topics.items():
+        few = topic is not None and len(rows[topic]) < (1 if wanted[key].optional else least)
+        if few and not wanted[key].optional:
+            raise BagError(f"{path}: '{topic}' holds {len(rows[topic])} messages; at least {least} are needed")
+        streams[key] = None if topic is None or few else _stream(path, topic, rows[topic])
+    return streams
+
+
+def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
+    for name in want.names:
+        if name.startswith("/") and name in found and found[name] != want.kind:
+            raise BagError(f"{path}: '{name}' is {found[name]}; {want.kind} is needed")
+        full = name if name.startswith("/") else f"/{name}"
+        topics = [
+            t for t, kind in found.items() if kind == want.kind and (t == name if name.startswith("/") else t.endswith(full))
+        ]
+        # The virtual robot's truth/gravity lies below the namespace of the robot's own gravity.
+        spaces = sorted((topic[: len(topic) - len(full) + 1], topic) for topic in topics)
+        if spaces and all(space.startswith(spaces[0][0]) for space, _ in spaces):
+            return spaces[0][1]
+        if topics:
+            raise BagError(
+                f"{path}: has several topics '{name}': {', '.join(sorted(topics))}; record one robot, or name the topic"
+            )
+    if want.optional:
+        return None
+    listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(found.items()))
+    raise BagError(
+        f"{path}: has no {want.kind} on {' or '.join(repr(name) for name in want.names)}; found: {listed or 'nothing'}"
+    )
+
+
+def _stream(path: str | Path, topic: str, rows: list[tuple]) -> Stream:
+    width = len(rows[0][2])
+    if any(len(row[2]) != width for row in rows):
+        raise BagError(f"{path}: the messages of '{topic}' hold different numbers of values; one robot's are needed")
+    stamp, received, values = zip(*rows)
+    return Stream(topic, np.array(stamp), np.array(received), np.array(values, dtype=float).reshape(len(rows), width))
+
+
+def _vector(v: Any) -> tuple[float, ...]:
+    return v.x, v.y, v.z
+
+
+def _pose(message: Any) -> tuple[float, ...]:
+    """Position, and orientation x y z w."""
+    q = message.pose.orientation
+    return *_vector(message.pose.position), q.x, q.y, q.z, q.w
+
+
+def _shape_target(message: Any) -> tuple[float, ...]:
+    """Whether it is a bend, its angle and plane, the tip's position and direction."""
+    return message.bend, message.bend_angle, message.bend_plane, *_vector(message.tip_position), *_vector(message.tip_direction)
+
+
+_VALUES: dict[str, Callable[[Any], tuple[float, ...]]] = {
+    VECTOR: lambda message: _vector(message.vector),
+    POSE: _pose,
+    CABLE_STATE: lambda message: tuple(message.displacement),
+    CABLE_COMMAND: lambda message: tuple(message.displacement),
+    CONTROLLER_STATUS: lambda message: (message.code,),
+    SHAPE_TARGET: _shape_target,
+}

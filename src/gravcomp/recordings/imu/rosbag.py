@@ -1,0 +1,104 @@
+"""Reading a rosbag2 folder (MCAP or SQLite) with the library rosbags; a damaged one as far as it goes.
+
+Taken are the one sensor_msgs/Imu topic (of several the one ending in `imu/data_raw`), the sensor_msgs/Temperature of the
+same namespace and, as truth, `virtual/base_orientation` (geometry_msgs/QuaternionStamped). Stamps are those of the headers.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from gravcomp.recordings.imu.recording import Recording, RecordingError
+
+IMU = "sensor_msgs/msg/Imu"
+TEMPERATURE = "sensor_msgs/msg/Temperature"
+TRUTH = "geometry_msgs/msg/QuaternionStamped"
+
+
+def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
+    """The IMU stream in the folder; `topic` chooses among several. Raises RecordingError."""
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.rosbag2 import ReaderError
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, get_typestore
+
+    from gravcomp.recordings.bags import BagError
+    from gravcomp.recordings.bags.recovery import readable
+
+    path = Path(path)
+    try:
+        whole = readable(path).path
+    except BagError as error:
+        raise RecordingError(str(error)) from error
+    try:
+        with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+            name = _choose(reader.connections, topic, path)
+            prefix = name[: -len("imu/data_raw")] if name.endswith("imu/data_raw") else name.rsplit("/", 1)[0] + "/"
+            temperatures = [c.topic for c in reader.connections if c.msgtype == TEMPERATURE and c.topic.startswith(prefix)]
+            truths = [
+                c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
+            ]
+            rows = {name: [], **{t: [] for t in temperatures[:1] + truths}}
+            for connection, _, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
+                message = reader.deserialize(raw, connection.msgtype)
+                stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+                rows[connection.topic].append((stamp, _values(message)))
+    except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
+        if isinstance(error, RecordingError):
+            raise
+        raise RecordingError(f"{path}: is not a readable rosbag2 recording: {error}") from error
+
+    stamp, values = _arrays(rows[name], 6)
+    temperature = _arrays(rows[temperatures[0]], 1) if temperatures else None
+    truth = _arrays(rows[truths[0]], 4) if truths else None
+    return Recording(
+        source=str(path),
+        stamp_ns=stamp,
+        gyro=values[:, :3].copy(),
+        accel=values[:, 3:].copy(),
+        temperature_stamp_ns=temperature[0] if temperature else None,
+        temperature=temperature[1][:, 0] if temperature else None,
+        orientation=_nearest(stamp, *truth) if truth and len(truth[0]) else None,
+    )
+
+
+def _choose(connections: list, topic: str | None, path: Path) -> str:
+    found = sorted({c.topic for c in connections if c.msgtype == IMU})
+    if topic is not None:
+        if topic not in found:
+            raise RecordingError(f"{path}: has no {IMU} on '{topic}'; found: {', '.join(found) or 'none'}")
+        return topic
+    raw = [name for name in found if name.endswith("imu/data_raw")]
+    if len(raw) == 1:
+        return raw[0]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise RecordingError(f"{path}: has no topic of type {IMU}; found: {', '.join(sorted({c.topic for c in connections}))}")
+    raise RecordingError(f"{path}: has several topics of type {IMU}: {', '.join(found)}; name one of them")
+
+
+def _values(message) -> tuple:
+    if message.__msgtype__ == IMU:
+        gyro, accel = message.angular_velocity, message.linear_acceleration
+        return gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z
+    if message.__msgtype__ == TEMPERATURE:
+        return (message.temperature,)
+    q = message.quaternion
+    return q.w, q.x, q.y, q.z
+
+
+def _arrays(rows: list, width: int) -> tuple[np.ndarray, np.ndarray]:
+    stamp = np.array([row[0] for row in rows], dtype=np.int64)
+    return stamp, np.array([row[1] for row in rows], dtype=float).reshape(len(rows), width)
+
+
+def _nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:
+    """The truth whose stamp is nearest to each sample's, NaN beyond the tolerance."""
+    after = np.clip(np.searchsorted(truth_stamp, stamp), 1, max(len(truth_stamp) - 1, 1))
+    after = np.minimum(after, len(truth_stamp) - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(np.abs(truth_stamp[before] - stamp) <= np.abs(truth_stamp[after] - stamp), before, after)
+    result = truth[nearest].copy()
+    result[np.abs(truth_stamp[nearest] - stamp) > tolerance_ns] = np.nan
+    return result

@@ -1,0 +1,107 @@
+"""CalculiX as the general finite-element program: run where it is installed, otherwise its stored results.
+
+`calculix_h20r.csv` holds CalculiX 2.20 (C3D20R, 1 x 10 x 24 graded toward the clamp, large displacements) for the hollow cylinder of 100 mm, 9 mm
+outside, 3 mm inside, 1150 kg/m^3; `REFERENCE` names that tube. Gravity is g (-cos, 0, -sin) of the inclination.
+"""
+
+import csv
+import math
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from gravcomp.mesh import Mesh
+
+GRAVITY = 9.81  # m/s^2
+REFERENCE = {"length": 0.1, "outer_diameter": 9e-3, "inner_diameter": 3e-3, "density": 1150.0}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One solved case: law 'svk' or 'nh', modulus Pa, Poisson's ratio, inclination rad, displacement (3,) m of the end face."""
+
+    law: str
+    youngs_modulus: float
+    poissons_ratio: float
+    inclination: float
+    tip: np.ndarray
+
+
+def stored_rows() -> list[Row]:
+    """The stored table."""
+    text = (resources.files("gravcomp.references") / "calculix_h20r.csv").read_text()
+    return [
+        Row(
+            line["material"],
+            float(line["E_MPa"]) * 1e6,
+            float(line["nu"]),
+            math.radians(float(line["incl_deg"])),
+            1e-3 * np.array([float(line[f"tip_u{axis}_mm"]) for axis in "xyz"]),
+        )
+        for line in csv.DictReader(text.splitlines())
+    ]
+
+
+def installed() -> str | None:
+    """Path of the solver, or None."""
+    return shutil.which("ccx")
+
+
+def solve(mesh: Mesh, inclination: float) -> np.ndarray:
+    """(3,) m: mean displacement of the end face of a mesh of 'hex20' in one material, computed now. Raises RuntimeError."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "tube.inp").write_text(deck(mesh, inclination), encoding="ascii")
+        try:
+            done = subprocess.run([installed() or "ccx", "-i", "tube"], cwd=folder, capture_output=True, text=True, timeout=600)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise RuntimeError(f"CalculiX did not run: {error}") from error
+        output = Path(folder) / "tube.dat"
+        if done.returncode != 0 or not output.exists():
+            raise RuntimeError(f"CalculiX ended with code {done.returncode}: {done.stdout.strip()[-200:]}")
+        return last_displacements(output.read_text()).mean(axis=0)
+
+
+def deck(mesh: Mesh, inclination: float) -> str:
+    """The input file. VTK's order of the nodes of a 20-node hexahedron is that of C3D20R."""
+    material = mesh.materials[0]
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{i}, {x:.9e}, {y:.9e}, {z:.9e}" for i, (x, y, z) in enumerate(mesh.nodes, start=1)]
+    lines.append("*ELEMENT, TYPE=C3D20R, ELSET=BODY")
+    for i, element in enumerate(mesh.elements + 1, start=1):
+        lines += [", ".join(map(str, [i, *element[:15]])) + ",", ", ".join(map(str, element[15:]))]
+    for name, nodes in (("CLAMP", mesh.clamped), ("TIP", mesh.tip)):
+        lines += [f"*NSET, NSET={name}", *(f"{node + 1}," for node in nodes)]
+    lines += [
+        "*MATERIAL, NAME=SOFT",
+        "*ELASTIC",
+        f"{material.youngs_modulus:.9e}, {material.poissons_ratio:.6f}",
+        "*DENSITY",
+        f"{material.density:.9e}",
+        "*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT",
+        "*STEP, NLGEOM, INC=1000",
+        "*STATIC",
+        "0.1, 1.0",
+        "*BOUNDARY",
+        "CLAMP, 1, 3",
+        "*DLOAD",
+        f"BODY, GRAV, {GRAVITY}, {-math.cos(inclination):.9f}, 0.0, {-math.sin(inclination):.9f}",
+        "*NODE PRINT, NSET=TIP",
+        "U",
+        "*END STEP",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def last_displacements(output: str) -> np.ndarray:
+    """(n, 3) m: the displacements of the last increment in a .dat file. Raises RuntimeError when there are none."""
+    block = output.rpartition("displacements")[2]
+    rows = [line.split() for line in block.splitlines()]
+    values = [[float(x) for x in row[1:]] for row in rows if len(row) == 4 and row[0].isdigit()]
+    if not values:
+        raise RuntimeError("CalculiX wrote no displacements")
+    return np.array(values)

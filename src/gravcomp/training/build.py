@@ -1,0 +1,96 @@
+"""Building a robot's reduction: train, decompose, integrate, and test on motions that it was not trained for."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.statics import CableInput
+from gravcomp.mesh import MeshError
+from gravcomp.reduction.basis import energy_basis
+from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
+from gravcomp.reduction.strain_polynomials import strain_polynomials
+from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.training.samples import Sample, TrainingOptions, samples
+
+# The trained |q| may be exceeded by this factor; the error is measured in any case.
+_MARGIN = 1.3
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """modes r; strains: principal strains beside those of the modes; decomposed: most snapshots to decompose; training;
+    test: motions to test with.
+    """
+
+    modes: int = 44
+    strains: int = 36
+    decomposed: int = 1100
+    training: TrainingOptions = TrainingOptions()
+    test: TrainingOptions = TrainingOptions(paths=6, steps=20, seed=1000)
+
+
+def build(
+    model: RobotModel, options: BuildOptions = BuildOptions(), progress: Callable[[str, float], None] = lambda stage, share: None
+) -> tuple[Reduction, float]:
+    """Build and store the model's reduction; returns it and the seconds it took. progress: called with the stage and
+    the share of it done.
+
+    Raises MeshError for a robot that cannot be reduced, or whose full model finds no equilibrium to train with.
+    """
+    started = time.perf_counter()
+    reason = why_not(model)
+    if reason:
+        raise MeshError(reason)
+    trained = samples(model, options.training, lambda share: progress("training", share))
+    if len(trained) < options.modes:
+        raise MeshError(f"only {len(trained)} equilibria were found to train with; the robot may not carry its own weight")
+    progress("decomposing", 0.0)
+    shapes = np.array([sample.unknowns for sample in trained])
+    shapes = shapes[np.linspace(0, len(shapes) - 1, min(options.decomposed, len(shapes))).astype(int)]
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    basis = energy_basis(shapes, matrix.multiply, options.modes)
+    progress("integrating", 0.0)
+    elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
+    low, high = options.training.modulus_range
+    modulus = first_modulus(model)
+    coordinates = np.array([sample.unknowns for sample in trained]) @ matrix.multiply(basis)
+    reduction = Reduction(
+        basis=basis,
+        elasticity=elasticity,
+        reach=_MARGIN * float(np.linalg.norm(coordinates, axis=1).max()),
+        modulus=modulus,
+        modulus_low=low * modulus,
+        modulus_high=high * modulus,
+        samples=len(trained),
+        error_median=np.nan,
+        error_worst=np.nan,
+    )
+    unseen = samples(model, options.test, lambda share: progress("testing", share))
+    errors = tip_errors(model, reduction, unseen)
+    if not errors.size:
+        raise MeshError("the reduced model finds none of the equilibria that it was tested with: the full model serves")
+    reduction = replace(reduction, error_median=float(np.median(errors)), error_worst=float(errors.max()))
+    save(reduction, path_of(model))
+    return reduction, time.perf_counter() - started
+
+
+def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) -> np.ndarray:
+    """Distances (k,) in m of the reduced model's tip from those of the samples that it finds; where it does not, the
+    full model would serve.
+    """
+    reduced = reduction.reduced_model(model)
+    tracker = ReducedTracker(reduced, model.length)
+    u = np.zeros_like(model.mesh.nodes)
+    errors = []
+    for sample in unseen:
+        tracker.place(reduced.coordinates_of @ sample.unknowns, sample.tension)
+        state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10)
+        if state.converged:
+            model.free(u)[:] = sample.unknowns
+            tip = model.effectors.sections(model.mesh.nodes + u)[-1, 0]
+            errors.append(np.linalg.norm(reduced.tip(state.q) - tip))
+    return np.array(errors)

@@ -1,0 +1,97 @@
+"""Shapes to train the reduced basis with: closed-loop and free motions of the full model.
+
+Young's moduli that are all `s` times as large are the same as gravity and tensions that are `s` times smaller, so the
+moduli to be served are trained by the size of gravity. Each path turns gravity in random directions. On most of them
+the inverse controller keeps the robot straight or bent into a random plane, with and without a weight on the tip's
+direction, so that the tensions are those the loop will ask for, its transients included; on the others the cables are
+released and the robot hangs.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.shape import ShapeStatus
+from gravcomp.inverse import InverseController, bend_target
+from gravcomp.simulation.simulator import Simulator
+
+GRAVITY = 9.81
+# One step of a path: what gravity turns by, and the time in which the cables may follow.
+_TURN = np.radians(5.0)
+_INTERVAL = 0.05
+_STEPS_A_TURN = 15
+# Of the paths: those without control, and of the others those that keep the robot straight.
+_RELEASED, _STRAIGHT = 0.15, 0.3
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """paths and steps of each; modulus_range: Young's moduli to be served, relative to the robot's; bend (rad): the
+    largest; seed.
+    """
+
+    paths: int = 75
+    steps: int = 30
+    modulus_range: tuple[float, float] = (0.6, 1.6)
+    bend: float = np.radians(50.0)
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Sample:
+    """An equilibrium of the full model: unknowns (3 n_free,), gravity (3,), tension (m,)."""
+
+    unknowns: np.ndarray
+    gravity: np.ndarray
+    tension: np.ndarray
+
+
+def samples(model: RobotModel, options: TrainingOptions, progress: Callable[[float], None] = lambda share: None) -> list[Sample]:
+    """Equilibria along random paths; progress is called with the share done."""
+    rng = np.random.default_rng(options.seed)
+    found = []
+    for path in range(options.paths):
+        found += _path(model, options, rng)
+        progress((path + 1) / options.paths)
+    return found
+
+
+def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator) -> Iterator[Sample]:
+    low, high = options.modulus_range
+    size = GRAVITY / np.exp(rng.uniform(np.log(low), np.log(high)))
+    kind = rng.random()
+    target = None
+    if kind >= _RELEASED:
+        bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
+        weight = rng.choice([0.0, 1e-3])
+        target = bend_target(model.length, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
+    simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
+    gravity, displacement = size * _direction(rng), None
+    for step in range(options.steps):
+        shape = simulator.step(gravity, displacement)
+        if shape.status == ShapeStatus.OK:
+            yield Sample(model.free(simulator.displacements).copy(), gravity, shape.cable_tension.copy())
+        if step % _STEPS_A_TURN == 0:
+            axis = _direction(rng)
+        gravity = _rotated(gravity, axis, _TURN)
+        if target is not None:
+            displacement = controller.step(
+                shape.response,
+                target,
+                backbone_station=shape.backbone_station,
+                tension=shape.cable_tension,
+                interval=_INTERVAL,
+            ).displacement
+
+
+def _direction(rng: np.random.Generator) -> np.ndarray:
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def _rotated(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues' rotation of the vector (3,) about the unit axis (3,)."""
+    along = axis * (axis @ vector)
+    return along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector)

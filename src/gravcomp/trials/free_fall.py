@@ -1,0 +1,63 @@
+"""The virtual robot let go: straight and at rest at first, cables released, the base standing still."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gravcomp.calibration.measured import Measured
+from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.trials.calibration_run import CAMERA_NOISE
+from gravcomp.virtual.body import build_friction, build_material, build_rod
+from gravcomp.virtual.dynamics import MovingRod
+from gravcomp.virtual.equilibrium import RodShape
+from gravcomp.virtual.motion import StaticMotion, base_orientation
+
+SAMPLE = 0.010  # s
+_STEP = 0.002  # s
+_RELEASED = -0.03  # m
+_IMU_TIME = 1.5  # s of IMU samples from which gravity is known
+
+
+def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
+    """(setup, inclination and roll in deg, duration s, number of the trial): the true course, and gravity as the IMU tells it."""
+    setup, inclination, roll, duration, trial = job
+    base = base_orientation(np.radians(inclination), np.radians(roll))
+    tips, directions = zip(
+        *((position[-1], orientation[-1, :, 2]) for position, orientation in falling_rod(setup, base, duration))
+    )
+    random = np.random.default_rng([setup.seed, trial])
+    tip = np.array(tips) @ base
+    return Measured(
+        source="virtual robot",
+        trial=np.full(len(tip), trial),
+        time=SAMPLE * np.arange(len(tip)),
+        gravity=np.tile(_felt_gravity(setup, base), (len(tip), 1)),
+        displacement=np.full((len(tip), len(setup.nominal.cables)), np.nan),
+        tip_position=tip + CAMERA_NOISE * random.standard_normal(tip.shape),
+        tip_direction=np.array(directions) @ base,
+    )
+
+
+def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Positions (n, 3) and orientations (n, 3, 3) of the rod's nodes in the world, every `SAMPLE` s from the moment at which it is let go;
+    `base` (3, 3): world from soft_base.
+    """
+    model = build_rod(setup.nominal, setup.truth)
+    rod = MovingRod(model, build_material(model, setup.truth), build_friction(setup.truth))
+    none = np.zeros(model.tendons)
+    rod.rest(RodShape(*model.straight(), tension=none, displacement=none, iterations=0), base, np.zeros(3))
+    # Copies: the rod moves its arrays on in place.
+    yield rod.position.copy(), rod.orientation.copy()
+    world_gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    for step in range(1, round(duration / _STEP) + 1):
+        rod.step(_STEP, base, np.zeros(3), world_gravity, np.full(model.tendons, _RELEASED))
+        if step % round(SAMPLE / _STEP) == 0:
+            yield rod.position.copy(), rod.orientation.copy()
+
+
+def _felt_gravity(setup: Setup, base: np.ndarray) -> np.ndarray:
+    loop = ClosedLoop(setup, StaticMotion(base))
+    loop.run(_IMU_TIME)
+    return loop.trace.estimated_gravity[-50:].mean(axis=0)

@@ -1,0 +1,105 @@
+"""Recovering what is known: virtual robots whose modulus, damping, cable offsets and cable elasticity are set, and fitted anew from their tips."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.calibration.fit import StaticFit, fit_statics
+from gravcomp.calibration.measured import StillWindows
+from gravcomp.calibration.motion import fit_motion
+from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.trials.context import Context
+from gravcomp.trials.free_fall import free_fall
+from gravcomp.virtual.body import build_rod
+from gravcomp.virtual.equilibrium import equilibrium
+from gravcomp.virtual.motion import base_orientation
+
+MODULI = (0.55e6, 0.75e6, 1.05e6)  # Pa
+DAMPING_TIME = 25e-3  # s
+OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
+# m: by which one cable after the other is wound in; two tensions tell an offset from an elongation.
+_PULLS = (0.6e-3, 1.8e-3)
+_NOISE = 0.1e-3  # m: a picture's; ten are averaged
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """name and unit of a parameter, its true value, what was fitted, half width of the interval at 95 %."""
+
+    name: str
+    unit: str
+    true: float
+    fitted: float
+    interval: float
+
+    @property
+    def error(self) -> float:
+        """Relative."""
+        return abs(self.fitted / self.true - 1.0)
+
+
+def recover(context: Context) -> list[Recovered]:
+    """Modulus, offsets and elasticity from resting tips, modulus and damping from free falls."""
+    moduli = MODULI[:1] if context.brief else MODULI
+    fits = context.map(_fit_known, [(context.setup, modulus) for modulus in moduli], "recovering known robots")
+    found = []
+    for modulus, fit in zip(moduli, fits):
+        estimate = fit.estimates[0]
+        found.append(Recovered("Young's modulus, at rest", "MPa", modulus * 1e-6, estimate.value, estimate.interval))
+    for estimate in fits[0].estimates[1:]:
+        cable = next((i for i, c in enumerate(context.setup.robot.cables) if estimate.name == f"offset of {c.name}"), None)
+        if cable is not None:
+            found.append(Recovered(estimate.name, "mm", 1e3 * OFFSETS[cable], estimate.value, estimate.interval))
+    setup = known_setup(context.setup, moduli[0])
+    falls = context.map(
+        free_fall, [(setup, i, 0.0, 1.5, trial) for trial, i in enumerate((0.0, 30.0))], "free falls of the known robot"
+    )
+    motion = fit_motion(
+        context.setup.robot,
+        falls,
+        mapper=context.sweep.map,
+        progress=lambda s: context.progress(f"known robot's fall: {s}"),
+        creep=False,
+    )
+    found.append(
+        Recovered(
+            "Young's modulus, in motion", "MPa", moduli[0] * 1e-6, motion.youngs_modulus * 1e-6, motion.modulus_interval * 1e-6
+        )
+    )
+    found.append(Recovered("damping time", "ms", 1e3 * DAMPING_TIME, 1e3 * motion.damping_time, 1e3 * motion.damping_interval))
+    return found
+
+
+def known_setup(setup: Setup, modulus: float) -> Setup:
+    """A virtual robot of the model's own kind of material, without creep and friction, with the parameters above."""
+    material, truth = setup.robot.segments[0].material, setup.truth
+    body = dataclasses.replace(
+        truth.body, youngs_modulus=modulus, poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(0.0,),
+        creep_time=(1.0,), damping_time=DAMPING_TIME, slip_ratio=0.0,
+    )  # fmt: skip
+    tendons = dataclasses.replace(truth.tendons, radius_offset=0.0, angle_offset=0.0, friction=0.0)
+    return dataclasses.replace(setup, truth=dataclasses.replace(truth, body=body, tendons=tendons))
+
+
+def known_windows(setup: Setup) -> StillWindows:
+    """Resting tips of the known robot: released, and with each cable wound in while it lies horizontally at several rolls."""
+    rod, random = build_rod(setup.nominal, setup.truth), np.random.default_rng(setup.seed)
+    count, rows = rod.tendons, []
+    for inclination, roll in ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0)):
+        gravity = base_orientation(np.radians(inclination), np.radians(roll)).T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
+        pulls = [np.full(count, np.nan)] + [
+            np.where(np.arange(count) == c, pull, np.nan) for c in range(count) for pull in _PULLS
+        ]
+        for command in pulls:
+            # A released cable hangs loose.
+            wound = np.where(np.isnan(command), -0.03, command + OFFSETS)
+            shape = equilibrium(rod, gravity, displacement=wound)
+            rows.append((gravity, command, shape.tip + _NOISE / np.sqrt(10.0) * random.standard_normal(3)))
+    return StillWindows(*(np.array(column) for column in zip(*rows)))
+
+
+def _fit_known(job: tuple[Setup, float]) -> StaticFit:
+    setup, modulus = job
+    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus)))
