@@ -7,8 +7,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from gravcomp.config import ConfigError, declared_parameters, from_mapping
-from gravcomp.config.parameters import DeclaredParameter, convert
+from gravcomp.config import ConfigError, DeclaredParameter, convert, declared_parameters, from_mapping
 
 
 def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:

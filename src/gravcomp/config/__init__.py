@@ -1,6 +1,19 @@
-"""Configuration: what is read from YAML or from ROS parameters, checked against declared units and ranges."""
+"""Configuration from YAML files and ROS parameters, checked against declared units and ranges."""
 
-from gravcomp.config.parameters import ConfigError, Parameter, declared_parameters, from_mapping, parameter, to_mapping
+from gravcomp.config.declaration import Parameter, parameter
+from gravcomp.config.errors import ConfigError
+from gravcomp.config.reading import convert, from_mapping
+from gravcomp.config.writing import DeclaredParameter, declared_parameters, to_mapping
 from gravcomp.config.yaml_file import load_yaml
 
-__all__ = ["ConfigError", "Parameter", "declared_parameters", "from_mapping", "load_yaml", "parameter", "to_mapping"]
+__all__ = [
+    "ConfigError",
+    "DeclaredParameter",
+    "Parameter",
+    "convert",
+    "declared_parameters",
+    "from_mapping",
+    "load_yaml",
+    "parameter",
+    "to_mapping",
+]

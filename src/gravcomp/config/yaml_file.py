@@ -1,15 +1,15 @@
-"""Reading YAML so that a mistake in the file becomes one clear sentence."""
+"""Reading YAML files, with errors that name file, line and column."""
 
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from gravcomp.config.parameters import ConfigError
+from gravcomp.config.errors import ConfigError
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """Refuses a key that is given twice, where YAML itself would keep the last one silently."""
+    """Refuses a key that is given twice; PyYAML silently keeps the last value."""
 
 
 def _mapping_without_repeats(loader: _StrictLoader, node: yaml.MappingNode) -> dict:
@@ -26,13 +26,13 @@ _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _m
 
 
 def load_yaml(path: str | Path) -> Any:
-    """The document in the file. Raises ConfigError when it cannot be read or is not YAML."""
+    """Return the document in the file. Raises ConfigError when the file cannot be read or is not YAML."""
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: is not a text file in UTF-8") from error
+        raise ConfigError(f"{path}: is not a UTF-8 text file") from error
     try:
         return yaml.load(text, Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:

@@ -13,7 +13,7 @@ import dataclasses
 import math
 from typing import Any
 
-from gravcomp.config.parameters import ConfigError, from_mapping, parameter
+from gravcomp.config import ConfigError, from_mapping, parameter
 
 COUNTS_PER_TURN = 8192
 """Of the C610's rotor angle, 0..8191."""

@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from gravcomp.config.parameters import parameter
+from gravcomp.config import parameter
 
 MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 

@@ -1,0 +1,120 @@
+"""Reading a mapping of edge keys (from YAML or ROS parameters) into a declared data class, with checks.
+
+from_mapping(Tube, {"length_mm": 50}, source="robot.yaml")   # Tube(length=0.05)
+"""
+
+import contextlib
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of
+from gravcomp.config.errors import ConfigError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
+
+
+def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T:
+    """Build the data class `cls` from a mapping of edge keys.
+
+    `source` (name of a file or node) and `key` (dotted path of the mapping) appear in the errors.
+    Raises ConfigError for an unknown, renamed or missing key, and for a value of the wrong type or out of range.
+    """
+    mapping = {} if mapping is None else mapping
+    if not isinstance(mapping, dict):
+        raise ConfigError(f"{source}: {key or 'the document'} is {_show(mapping)}; a mapping of keys is needed")
+    hints = typing.get_type_hints(cls)
+    fields = {key_of(f): f for f in dataclasses.fields(cls) if f.init}
+    for name in mapping:
+        if name not in fields:
+            raise ConfigError(f"{source}: {_unknown(name, fields, key)}")
+    values = {}
+    for name, field in fields.items():
+        here, declared = joined(key, name), parameter_of(field)
+        if name in mapping:
+            values[field.name] = convert(mapping[name], hints[field.name], declared, source=source, key=here)
+        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+            meaning = f" ({declared.description}; allowed: {declared.allowed()})" if declared else ""
+            raise ConfigError(f"{source}: key '{here}' is missing{meaning}")
+    try:
+        return cls(**values)
+    except ConfigError:
+        raise
+    except ValueError as error:  # a check of several fields in the data class's __post_init__
+        raise ConfigError(f"{source}: {key or cls.__name__}: {error}") from error
+
+
+def convert(value: Any, kind: Any, declared: Parameter | None, *, source: str, key: str) -> Any:
+    """Check one edge value and convert it to the SI value of type `kind`.
+
+    Raises ConfigError, with `source` and `key`, when the type is wrong or the value is out of range.
+    """
+    declared = declared or Parameter("")
+    origin = typing.get_origin(kind)
+    if origin in (typing.Union, types.UnionType):
+        if value is None:
+            return None
+        member = next(k for k in typing.get_args(kind) if k is not type(None))
+        return convert(value, member, declared, source=source, key=key)
+    if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+        return from_mapping(kind, value, source=source, key=key)
+    if origin is tuple:
+        if not isinstance(value, (list, tuple)):
+            raise ConfigError(f"{source}: {key} is {_show(value)}; a list is needed")
+        members = typing.get_args(kind)
+        if len(members) == 2 and members[1] is Ellipsis:
+            members = (members[0],) * len(value)
+        if len(members) != len(value):
+            raise ConfigError(f"{source}: {key} has {len(value)} entries; {len(members)} are needed")
+        return tuple(convert(v, k, declared, source=source, key=f"{key}[{i}]") for i, (v, k) in enumerate(zip(value, members)))
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise ConfigError(f"{source}: {key} is {_show(value)}; a mapping is needed")
+        member = typing.get_args(kind)[1]
+        return {str(k): convert(v, member, declared, source=source, key=joined(key, k)) for k, v in value.items()}
+    return _scalar(value, kind, declared, source=source, key=key)
+
+
+def _unknown(name: Any, fields: dict[str, dataclasses.Field], key: str) -> str:
+    for current, field in fields.items():
+        declared = parameter_of(field)
+        if declared is not None and name == declared.renamed_from:
+            return f"key '{joined(key, name)}' has been renamed; write '{current}' instead"
+    near = difflib.get_close_matches(str(name), fields, n=1)
+    hint = f" (did you mean '{near[0]}'?)" if near else ""
+    return f"unknown key '{joined(key, name)}'{hint}; allowed: {', '.join(sorted(fields))}"
+
+
+def _scalar(value: Any, kind: type, declared: Parameter, *, source: str, key: str) -> Any:
+    if kind is float and isinstance(value, str):
+        with contextlib.suppress(ValueError):  # YAML 1.1 reads '1e-3' as a string, but the user means the number
+            value = float(value)
+    right_type = {
+        bool: isinstance(value, bool),
+        int: isinstance(value, int) and not isinstance(value, bool),
+        float: isinstance(value, (int, float)) and not isinstance(value, bool),
+        str: isinstance(value, str),
+    }.get(kind, True)
+    if not right_type:
+        name = {bool: "true or false", int: "a whole number", float: "a number", str: "a string"}[kind]
+        raise ConfigError(f"{source}: {key} is {_show(value)}; {name} is needed ({declared.allowed()})")
+    if kind is float:
+        value = float(value)
+        if not math.isfinite(value):
+            raise ConfigError(f"{source}: {key} is {value}; a finite number is needed ({declared.allowed()})")
+    below = declared.minimum is not None and kind in (int, float) and value < declared.minimum
+    above = declared.maximum is not None and kind in (int, float) and value > declared.maximum
+    if below or above or (declared.choices is not None and value not in declared.choices):
+        raise ConfigError(f"{source}: {key} is {_show(value)}; allowed: {declared.allowed()}")
+    return value * declared.factor if kind is float else value
+
+
+def _show(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
