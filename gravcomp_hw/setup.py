@@ -21,8 +21,6 @@ setup(
         "console_scripts": [
             "can_bridge = gravcomp_hw.can_bridge:main",
             "can_guard = gravcomp.motors.guard:main",
-            "fault_probe = gravcomp_hw.fault_probe:main",
-            "graph_probe = gravcomp_hw.graph_probe:main",
             "judge = gravcomp_hw.judge:main",
             "virtual_robot = gravcomp_hw.virtual_robot:main",
         ],

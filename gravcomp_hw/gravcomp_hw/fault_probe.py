@@ -183,3 +183,7 @@ def _tell(**what: object) -> None:
 
 def main() -> int:
     return run(FaultProbe)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

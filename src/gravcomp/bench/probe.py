@@ -29,7 +29,7 @@ class Probe:
 
     def __init__(self, graph: RunningGraph):
         self._process = subprocess.Popen(
-            graph.robot.node("gravcomp_hw", "fault_probe").command(),
+            graph.robot.node("gravcomp_hw", "fault_probe").module_command(),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
         )  # fmt: skip
         self.states: list[StateSeen] = []

@@ -11,7 +11,7 @@ _TIMEOUT = 60.0  # s
 
 def examine(namespace: str = "") -> list[Finding]:
     """Rates, delays and fitting QoS of every topic that keeps a rate."""
-    command = NodeSpec("gravcomp_hw", "graph_probe", namespace=namespace).command()
+    command = NodeSpec("gravcomp_hw", "graph_probe", namespace=namespace).module_command()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT)
         return [Finding(**entry) for entry in json.loads(done.stdout.strip().splitlines()[-1])]

@@ -6,7 +6,7 @@ Topic and service names are relative to the robot's namespace; those with ~ to t
 import importlib
 from dataclasses import dataclass
 
-from gravcomp.config.parameters import DeclaredParameter, declared_parameters
+from gravcomp.config import DeclaredParameter, declared_parameters
 from gravcomp.graph.parameters.shared import SharedParameters
 
 
@@ -48,17 +48,6 @@ class Node:
 
 _PARAMETERS = "gravcomp.graph.parameters"
 _DIAGNOSTICS = Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "state of the node, 1 Hz")
-_FLOODED = (
-    ("cable/command", "gravcomp_msgs/msg/CableCommand"),
-    ("imu/heater", "std_msgs/msg/Float32"),
-    ("imu/data_raw", "sensor_msgs/msg/Imu"),
-    ("imu/temperature", "sensor_msgs/msg/Temperature"),
-    ("gravity", "geometry_msgs/msg/Vector3Stamped"),
-    ("robot/deformation", "gravcomp_msgs/msg/Deformation"),
-    ("target", "geometry_msgs/msg/PoseStamped"),
-    ("target/shape", "gravcomp_msgs/msg/ShapeTarget"),
-    ("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped"),
-)
 
 NODES = (
     Node(
@@ -162,26 +151,6 @@ NODES = (
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its rate"),
         ),
         gives=(_DIAGNOSTICS,),
-        tool=True,
-    ),
-    Node(
-        "gravcomp_hw", "fault_probe", "breaks the virtual robot and floods the graph on request, for the campaign of faults",
-        f"{_PARAMETERS}.fault_probe:FaultProbeParameters",
-        takes=(
-            Port("cable/state", "gravcomp_msgs/msg/CableState", "what the bridge makes of it"),
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "counted"),
-            Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "the bridge's counters"),
-        ),
-        gives=(
-            Port("virtual/fault", "std_msgs/msg/String", "faults"),
-            *(Port(name, kind, "hostile messages") for name, kind in _FLOODED),
-            _DIAGNOSTICS,
-        ),
-        tool=True,
-    ),
-    Node(
-        "gravcomp_hw", "graph_probe", "rates, delays and fitting QoS of a running graph, for the doctor; ends by itself",
-        takes=(Port("*", "any", "every topic that keeps a rate"),),
         tool=True,
     ),
     Node(

@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,6 +42,14 @@ class NodeSpec:
 
     def command(self) -> list[str]:
         """The command line. Raises LaunchError when the executable is not installed."""
+        return [find_executable(self.package, self.executable), *self.arguments()]
+
+    def module_command(self) -> list[str]:
+        """The command line of a module with the executable's name that is run with `python -m`, for tools that are not installed."""
+        return [sys.executable, "-m", f"{self.package}.{self.executable}", *self.arguments()]
+
+    def arguments(self) -> list[str]:
+        """The ROS arguments: parameters, remappings and namespace."""
         arguments = []
         for key, value in self.parameters.items():
             # JSON is YAML: texts are quoted, floats keep their point.
@@ -49,7 +58,7 @@ class NodeSpec:
             arguments += ["-r", f"{key}:={value}"]
         if self.namespace:
             arguments += ["-r", f"__ns:={self.namespace}"]
-        return [find_executable(self.package, self.executable), *(["--ros-args", *arguments] if arguments else [])]
+        return ["--ros-args", *arguments] if arguments else []
 
 
 def find_executable(package: str, executable: str) -> str:
