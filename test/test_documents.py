@@ -4,6 +4,7 @@ import argparse
 import ast
 import importlib
 import importlib.util
+import pkgutil
 import re
 import shlex
 
@@ -11,8 +12,7 @@ import pytest
 from documents import COMMAND_LINES, NAMES, PACKAGES, ROOT, code_of, inline_of
 
 from gravcomp.commands import COMMANDS
-from gravcomp.config import load_yaml
-from gravcomp.config.parameters import declared_parameters
+from gravcomp.config import declared_parameters, load_yaml
 from gravcomp.description import shipped_robots
 from gravcomp.description.hardware import Hardware
 from gravcomp.graph.nodes import NODES, node
@@ -196,11 +196,49 @@ def test_modules_exist(name):
 
 
 def exists(dotted: str) -> bool:
-    """Whether it is a module, or a name in one."""
+    """Whether `dotted` is a module, a name in a module, or an attribute of such a name."""
     try:
         if importlib.util.find_spec(dotted):
             return True
     except ModuleNotFoundError:
         pass
-    module, _, attribute = dotted.rpartition(".")
-    return hasattr(importlib.import_module(module), attribute)
+    try:
+        pkgutil.resolve_name(dotted)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def keys_of(section: object) -> set[str]:
+    """All keys of a YAML file, at any depth."""
+    if isinstance(section, dict):
+        return set(section) | {key for value in section.values() for key in keys_of(value)}
+    return {key for value in section for key in keys_of(value)} if isinstance(section, list) else set()
+
+
+GLOSSARY = "src/doc/glossary.md"
+# Frames and words of ROS, and the name of the shipped robot.
+OTHER_NAMES = {"soft_base", "soft_tip", "soft_rest", "imu_link", "__ns", "stamp", "article"}
+# Keys with a default that no shipped robot file gives.
+DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time"}
+
+
+def glossary_names() -> list[str]:
+    """The names in the third column of the glossary's tables."""
+    rows = [line for line in (ROOT / GLOSSARY).read_text().splitlines() if line.startswith("| ")]
+    return sorted({word for row in rows for word in re.findall(r"`([^`]+)`", row.split(" | ")[2])})
+
+
+@pytest.mark.parametrize("name", glossary_names())
+def test_a_name_of_the_glossary_exists(name):
+    if name.startswith("gravcomp."):
+        assert exists(name), f"no module or name {name}"
+    elif re.match(r"[A-Z]\w+\.", name):
+        message, field = name.split(".")
+        assert re.search(rf"^\S+ {field}\b", (ROOT / f"gravcomp_msgs/msg/{message}.msg").read_text(), re.MULTILINE)
+    elif name.startswith(("robot.", "hardware.")):
+        pass  # test_parameters_and_keys_exist
+    else:
+        keys = {key for path in shipped_robots().values() for key in keys_of(load_yaml(path))} | DEFAULT_KEYS
+        topics = {topic.lstrip("/") for topic in ports("gives", "takes", "services")}
+        assert name in keys | topics | NODE_PARAMETERS | set(EXECUTABLES) | OTHER_NAMES
