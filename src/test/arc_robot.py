@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gravcomp.description.robot import Cable, Limits, Robot, Segment
+from gravcomp.description import Cable, Limits, Robot, Segment
 
 SEGMENT = 0.05
 LENGTH = 2 * SEGMENT

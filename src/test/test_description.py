@@ -8,6 +8,7 @@ import yaml
 
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
+from gravcomp.description.hardware import parse_hardware
 
 
 @pytest.fixture
@@ -38,7 +39,7 @@ def test_sections_of_others_are_handed_on(document, tmp_path):
     document["hardware"] = {"motors": [1, 2]}
     file = load(document, tmp_path)
     assert file.section("hardware") == {"motors": [1, 2]}
-    with pytest.raises(ConfigError, match="no section 'motor'"):
+    with pytest.raises(ConfigError, match="there is no section 'motor'"):
         file.section("motor")
 
 
@@ -77,6 +78,7 @@ MISTAKES = [
     (change(["cables", 1, "angle_deg"], None), ["cables[1]", "angle_deg"]),
     (change(["cables", 1, "name"], "s1c1"), ["cables", "'s1c1'", "2 times"]),
     (change(["limits", "tension_min"], 9.0), ["robot.limits", "tension_min is 9 N", "below tension_max = 5 N"]),
+    (change(["cables", 1, "via_points_mm"], [[0, 2, 0], [0, 2, 50]]), ["cables[1]", "via_points_mm and also"]),
     (change(["body"], {"file": "a.stl", "length_mm": 100.0}), ["both of segments and body"]),
     (change(["segments"], None), ["neither of segments and body"]),
 ]
@@ -95,5 +97,14 @@ def test_unknown_sections_and_missing_files_are_named(document, tmp_path):
     document["motors"] = {}
     with pytest.raises(ConfigError, match="unknown key 'motors'; allowed: robot, hardware, virtual_robot, nodes"):
         load(document, tmp_path)
-    with pytest.raises(ConfigError, match="does not exist; give the path of a robot's YAML or a shipped robot: article"):
+    with pytest.raises(ConfigError, match="does not exist; give the path of a robot file or the name of a shipped robot: article"):
         load_robot_file("artikle")
+
+
+def test_a_renamed_key_is_refused_and_the_error_names_the_new_one(document, tmp_path):
+    document["hardware"]["drive"]["displacement_minimum_mm"] = -20.0
+    section = load(document, tmp_path).section("hardware")
+    with pytest.raises(ConfigError) as error:
+        parse_hardware(section, source="robot.yaml")
+    for word in ["robot.yaml", "hardware.drive.displacement_minimum_mm", "renamed", "'displacement_min_mm'"]:
+        assert word in str(error.value)

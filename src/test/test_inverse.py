@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from arc_robot import LENGTH, LIMITS, STATIONS, ArcRobot, effector
 
-from gravcomp.description import load_robot_file
-from gravcomp.description.robot import Limits
+from gravcomp.description import Limits, load_robot_file
 from gravcomp.inverse import (
     ControllerCode,
     InverseController,

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gravcomp.description import load_robot_file
-from gravcomp.description.robot import Elements
+from gravcomp.description import Elements, load_robot_file
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError
 from gravcomp.reduction import ReducedServing, load, path_of, why_not

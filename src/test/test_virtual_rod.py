@@ -11,7 +11,7 @@ from virtual_article import article, horizontal, reference_robot, with_body
 
 import gravcomp
 from gravcomp.config import ConfigError
-from gravcomp.description.robot import MeshBody
+from gravcomp.description import MeshBody
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import advance, equilibrium
 from gravcomp.virtual.parameters import VirtualRobotParameters

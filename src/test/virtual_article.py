@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware, parse_hardware
-from gravcomp.description.robot import Robot
 from gravcomp.description.robot_file import load_robot_file
 from gravcomp.virtual.parameters import Body, VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot

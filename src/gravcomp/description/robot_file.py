@@ -1,4 +1,4 @@
-"""Reading a robot's YAML: its sections, and the robot itself."""
+"""Reading a robot file (YAML): its sections, and the robot."""
 
 import dataclasses
 from importlib import resources
@@ -12,34 +12,37 @@ SECTIONS = ("robot", "hardware", "virtual_robot", "nodes")
 
 @dataclasses.dataclass(frozen=True)
 class RobotFile:
-    """A robot's file: `source` is its path, `sections` the document as read."""
+    """A robot file: `source` is its path, `robot` the section `robot`, `sections` the whole document as read."""
 
     source: str
     robot: Robot
     sections: dict
 
     def section(self, name: str) -> dict:
-        """A top-level section as a plain mapping of edge keys; empty when the file has none."""
+        """Return a top-level section as a plain mapping of edge keys; empty when the file does not have it.
+
+        Raises ConfigError when no section has this name.
+        """
         if name not in SECTIONS:
-            raise ConfigError(f"{self.source}: no section '{name}' is known; allowed: {', '.join(SECTIONS)}")
+            raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
         return dict(self.sections.get(name) or {})
 
 
 def shipped_robots() -> dict[str, Path]:
-    """The robots that come with the product: name and path."""
+    """Return name and path of every shipped robot file."""
     folder = Path(str(resources.files("gravcomp") / "robots"))
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
 def load_robot_file(name_or_path: str | Path) -> RobotFile:
-    """Read and check a robot: a shipped one by its bare name ('article'), any other by its path.
+    """Read and check a robot file: a shipped one by its name ('article'), any other by its path.
 
-    Raises ConfigError naming file, key, value and what is allowed.
+    Raises ConfigError, which names file and key and says what was found and what is allowed.
     """
     path = _resolve(name_or_path)
     document = load_yaml(path)
     if not isinstance(document, dict):
-        raise ConfigError(f"{path}: is empty or not a mapping; the top-level keys are {', '.join(SECTIONS)}")
+        raise ConfigError(f"{path}: is empty or not a mapping; allowed top-level keys: {', '.join(SECTIONS)}")
     for key in document:
         if key not in SECTIONS:
             raise ConfigError(f"{path}: unknown key '{key}'; allowed: {', '.join(SECTIONS)}")
@@ -64,4 +67,4 @@ def _resolve(name_or_path: str | Path) -> Path:
     if path.is_file():
         return path
     kind = "is a folder" if path.is_dir() else "does not exist"
-    raise ConfigError(f"{path}: {kind}; give the path of a robot's YAML or a shipped robot: {', '.join(shipped)}")
+    raise ConfigError(f"{path}: {kind}; give the path of a robot file or the name of a shipped robot: {', '.join(shipped)}")

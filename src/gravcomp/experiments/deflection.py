@@ -5,8 +5,7 @@ import time
 
 import numpy as np
 
-from gravcomp.description import Elements, Robot, Segment
-from gravcomp.description.robot import Material
+from gravcomp.description import Elements, Material, Robot, Segment
 from gravcomp.mesh.tube import tube_mesh
 from gravcomp.references import calculix
 from gravcomp.references.beams import Tube, elastica, euler_bernoulli

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from gravcomp.description.robot import Robot
+from gravcomp.description import Robot
 from gravcomp.inverse.command import Command, cable_displacement
 from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.errors import backbone_missed, tip_errors

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from gravcomp.description.robot import Limits
+from gravcomp.description import Limits
 
 
 class StepBounds(NamedTuple):

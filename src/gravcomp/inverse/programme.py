@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
-from gravcomp.description.robot import Limits
+from gravcomp.description import Limits
 from gravcomp.inverse.limits import step_bounds
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.scaling import Programme, ScaledProgramme, scaled

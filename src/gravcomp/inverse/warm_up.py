@@ -4,7 +4,7 @@ motors would be sent nothing but stale commands.
 
 import numpy as np
 
-from gravcomp.description.robot import Robot
+from gravcomp.description import Robot
 from gravcomp.full_model.shape import Response
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions

@@ -114,7 +114,7 @@ class Bridge:
             return done, "no current; the cables were not paid out because the motors were not driving or have no zero"
         self._enter(State.HOLDING, "paying the cables out")
         self._releasing = True
-        self._target = [self._hardware.drive.displacement_minimum] * len(self._target)
+        self._target = [self._hardware.drive.displacement_min] * len(self._target)
         self._tension = [0.0] * len(self._tension)
         return True, self.message
 
@@ -196,7 +196,7 @@ class Bridge:
                 self.message = f"command refused: {reason}"
             return reason
         drive = self._hardware.drive
-        self._target = [min(max(x, drive.displacement_minimum), drive.displacement_maximum) for x in displacement]
+        self._target = [min(max(x, drive.displacement_min), drive.displacement_max) for x in displacement]
         self._tension = list(tension) or [0.0] * len(self._target)
         # When its sample was taken: what comes late out of queues behind a dead node does not keep the bridge going.
         self._command_time, self._stamp = now - max(age, 0.0), stamp
@@ -422,7 +422,7 @@ class Bridge:
             return f"{len(displacement)} displacements and {len(tension)} tensions for {n} cables"
         if not all(map(math.isfinite, displacement)) or not all(map(math.isfinite, tension)):
             return "it contains a value that is not a number"
-        low, high = drive.displacement_minimum, drive.displacement_maximum
+        low, high = drive.displacement_min, drive.displacement_max
         for motor, x in zip(self._hardware.motors, displacement):
             if not low - _MARGIN <= x <= high + _MARGIN:
                 return f"{motor.cable} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from gravcomp.config import ConfigError
-from gravcomp.description.robot import Cable, Robot
+from gravcomp.description import Cable, Robot
 from gravcomp.virtual.dynamics import RodMaterial, TendonFriction
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.rod import RodModel

@@ -17,8 +17,8 @@ import numpy as np
 from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
 from gravcomp.canbus.codec import FrameError, decode, encode
 from gravcomp.config import ConfigError
+from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
-from gravcomp.description.robot import Robot
 from gravcomp.virtual.board import SAMPLE_PERIOD, STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.dynamics import MovingRod

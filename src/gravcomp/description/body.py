@@ -1,0 +1,82 @@
+"""The robot's body: tubes from base to tip, or one mesh from a file, with their materials."""
+
+import dataclasses
+
+from gravcomp.config import parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class Material:
+    """An isotropic soft material."""
+
+    law: str = parameter("svk", choices=("svk", "neo_hookean"), description="St. Venant-Kirchhoff, or compressible neo-Hookean")
+    youngs_modulus: float = parameter(0.8, edge="MPa", minimum=1e-3, maximum=1e6, description="Young's modulus")
+    poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.495, description="Poisson's ratio")
+    density: float = parameter(1145.0, unit="kg/m^3", minimum=0.0, maximum=30000.0, description="density")
+    damping_time: float = parameter(
+        20.0, edge="ms", minimum=0.0, maximum=10000.0, description="Kelvin-Voigt damping: viscosity over stiffness"
+    )
+    creep_ratio: float = parameter(
+        0.0,
+        minimum=0.0,
+        maximum=10.0,
+        description="additional stiffness that relaxes under load, over the long-term stiffness; used in dynamics only",
+    )
+    creep_time: float = parameter(
+        0.5, unit="s", minimum=1e-3, maximum=1e4, description="relaxation time of the additional stiffness"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Cap:
+    """A disc at the distal end of a segment, of its own material; it adds to the robot's length."""
+
+    length: float = parameter(edge="mm", minimum=0.1, maximum=500.0, description="thickness along the axis")
+    material: Material = parameter(description="material of the cap")
+
+
+@dataclasses.dataclass(frozen=True)
+class Segment:
+    """A tube of constant cross-section."""
+
+    name: str = parameter(description="name, unique in the robot")
+    length: float = parameter(edge="mm", minimum=1.0, maximum=5000.0, description="length at rest, without its cap")
+    outer_diameter: float = parameter(edge="mm", minimum=0.5, maximum=1000.0, description="outer diameter")
+    lumen_diameter: float = parameter(edge="mm", minimum=0.1, maximum=999.0, description="diameter of the working channel")
+    material: Material = parameter(default_factory=Material, description="material of the tube")
+    cap: Cap | None = parameter(None, description="cap at the distal end")
+
+    def __post_init__(self) -> None:
+        if self.lumen_diameter >= 0.98 * self.outer_diameter:
+            raise ValueError(
+                f"lumen_diameter_mm is {self.lumen_diameter * 1e3:g}; allowed: below 0.98 x outer_diameter_mm"
+                f" = {self.outer_diameter * 980:g}"
+            )
+
+    @property
+    def full_length(self) -> float:
+        """Length with the cap (m)."""
+        return self.length + (self.cap.length if self.cap else 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshBody:
+    """A body from a file: a closed surface (.stl, .ply, .obj), which is meshed, or a volume mesh (.msh, .vtk, .vtu)."""
+
+    file: str = parameter(description="path of the mesh, relative to the robot file")
+    length: float = parameter(
+        edge="mm", minimum=1.0, maximum=5000.0, description="length along z, checks unit and axis of the file"
+    )
+    file_unit: float = parameter(1.0, edge="mm", minimum=1e-6, maximum=1e6, description="length of one unit of the file")
+    element_size: float = parameter(3.0, edge="mm", minimum=0.05, maximum=500.0, description="edge length of the elements")
+    material: Material = parameter(default_factory=Material, description="material of the body")
+
+
+@dataclasses.dataclass(frozen=True)
+class Elements:
+    """Division of the tubes into 20-node hexahedra."""
+
+    around: int = parameter(6, minimum=4, maximum=48, description="elements around the axis")
+    along: int = parameter(10, minimum=2, maximum=500, description="elements along the robot, shared out by length")
+    radial: int = parameter(1, minimum=1, maximum=8, description="elements through the wall")
+    grading: float = parameter(8.0, minimum=1.0, maximum=50.0, description="ratio of the last element's length to the first's")
