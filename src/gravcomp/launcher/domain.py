@@ -1,13 +1,35 @@
-"""A ROS domain of its own, so that a demo never speaks to a robot that runs on the same machine."""
+"""ROS domains that no other run on this host uses, so that a demo never speaks to a robot that runs on the same machine."""
 
 import os
 import random
+import socket
 
-# Above 101 the ports of a domain may meet those that Linux hands out by itself.
+# Above 101 the ports of a domain overlap the range that Linux hands out by itself.
 _DOMAINS = range(1, 100)
+
+_RESERVED: list[socket.socket] = []  # the names of the domains that this process holds
 
 
 def private_domain() -> dict[str, str]:
-    """The environment variable ROS_DOMAIN_ID: the user's where it is set, otherwise one by chance."""
+    """Return the environment variable ROS_DOMAIN_ID: the user's where it is set, otherwise a domain that this process reserves."""
     given = os.environ.get("ROS_DOMAIN_ID")
-    return {"ROS_DOMAIN_ID": given or str(random.SystemRandom().choice(_DOMAINS))}
+    return {"ROS_DOMAIN_ID": given or reserve_domain()}
+
+
+def reserve_domain() -> str:
+    """Return a domain that no other process of this host has reserved; it stays reserved until this process ends.
+
+    The reservation is an abstract Unix socket, which the kernel releases even when the process is killed. With all domains
+    reserved, one is chosen at random.
+    """
+    domains = random.SystemRandom().sample(_DOMAINS, len(_DOMAINS))
+    for domain in domains:
+        name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            name.bind(f"\0gravcomp-ros-domain-{domain}")
+        except OSError:
+            name.close()
+            continue
+        _RESERVED.append(name)
+        return str(domain)
+    return str(domains[0])
