@@ -1,4 +1,4 @@
-"""Configuration errors name the file, the key, what was found and what is allowed; units convert at the edge."""
+"""Configuration errors name the file, the key, what was found and what is allowed; units are converted when a file is read."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ def test_edge_units_become_si_and_come_back():
 
 
 @pytest.mark.parametrize(
-    "mapping, words",
+    ("mapping", "words"),
     [
         ({"tubes": [{"length_mm": -5}]}, ["f.yaml", "tubes[0].length_mm", "-5", "1 to 2000 mm"]),
         ({"tubes": [{"lenght_mm": 5}]}, ["f.yaml", "tubes[0].lenght_mm", "did you mean 'length_mm'"]),
@@ -60,7 +60,7 @@ def test_declared_parameters_list_edge_defaults():
     assert declared["angle_deg"].parameter.edge_unit == "deg"
 
 
-@pytest.mark.parametrize("text, words", [("a: [1", ["line"]), ("a: 1\na: 2", ["line 2", "twice"]), ("\tb: 1", ["line 1"])])
+@pytest.mark.parametrize(("text", "words"), [("a: [1", ["line"]), ("a: 1\na: 2", ["line 2", "twice"]), ("\tb: 1", ["line 1"])])
 def test_broken_yaml_names_the_line(tmp_path, text, words):
     path = tmp_path / "robot.yaml"
     path.write_text(text)

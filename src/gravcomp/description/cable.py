@@ -46,7 +46,10 @@ class Cable:
             raise ValueError(f"cable '{self.name}' needs one of segment and end_mm")
 
     def points(self, end: float) -> tuple[tuple[float, float, float], ...]:
-        """Return the via points (m, soft_base), or both ends of a straight cable that is fixed at z = `end`, as if its angle were 0."""
+        """Return the points (m, soft_base) that the cable runs through: its via points, or both ends of a straight cable.
+
+        `end` is the z where a straight cable is fixed; its points are returned as if its angle were 0.
+        """
         if self.via_points is not None:
             return self.via_points
         assert self.radius is not None  # __post_init__
