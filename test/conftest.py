@@ -2,14 +2,18 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from documents import documented
+from shell import mirror
 
 ROOT = Path(__file__).resolve().parents[1]
+WRITTEN_BY_LINES = ("src/README.md", "src/doc/figures.md")
 
 
 @dataclass
@@ -79,3 +83,37 @@ def broad():
         if sorted(folder.glob("*.npz")):
             return folder
     pytest.skip("no BROAD recordings: set GRAVCOMP_DATA to their folder")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """What the reader's folder looks like: the repository, but what is written into it stays here."""
+    folder = tmp_path_factory.mktemp("repository")
+    mirror(ROOT, folder, [Path(path) for path in WRITTEN_BY_LINES] + [Path("src/doc/pictures/none")])
+    for name in ("ROBOT", "my_robot", "left", "right", "robot"):
+        shutil.copy(ROOT / "src/gravcomp/robots/article.yaml", folder / f"{name}.yaml")
+    return folder
+
+
+@pytest.fixture
+def type_in(folder):
+    """Types a documented line, `shorter` behind it, and gives the exit code and what was printed."""
+
+    def run(line: str, shorter: str = "", timeout: float = 600.0, **given: object) -> tuple[int, str]:
+        done = subprocess.run(
+            [*documented(line, **given), *shorter.split()],
+            cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout)  # fmt: skip
+        return done.returncode, done.stdout
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def recording():
+    """An IMU stream with ground truth: BROAD's where there is one; the bag in the repository has none."""
+    from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
+
+    files = broad_files()
+    if not files:
+        pytest.skip(f"no recordings with ground truth. {WHERE}")
+    return files[0]

@@ -2,22 +2,22 @@
 
 import functools
 import importlib
-import os
 import time
 
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="it looks at the running graph: ./gravcomp test")
 
-from gravcomp.graph.nodes import NODES, node  # noqa: E402
-from gravcomp.launcher import Graph  # noqa: E402
-from gravcomp.launcher.robot_graph import LOOP, RobotGraph  # noqa: E402
+from gravcomp.graph.nodes import NODES, node
+from gravcomp.launcher import Graph
+from gravcomp.launcher.domain import reserve_domain
+from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
 pytestmark = pytest.mark.timeout(600)
 
 # A namespace, because nothing may depend on there being none.
 NAMESPACE = "/left"
-DOMAIN = str(20 + os.getpid() % 40)
+DOMAIN = reserve_domain()
 START = 300.0  # s; a machine that has never run the graph compiles first
 # What every node has: rclpy's own topics, those of the parameters and of the lifecycle.
 COMMON_TOPICS = {"/rosout", "/parameter_events", "/clock"}
@@ -114,7 +114,7 @@ def test_the_doctor_names_a_subscription_that_cannot_be_served(gravcomp, robot, 
 
 
 def test_the_doctor_says_when_nothing_runs(gravcomp):
-    answer = gravcomp("doctor", "--graph", "--json", ROS_DOMAIN_ID=str(60 + os.getpid() % 30))
+    answer = gravcomp("doctor", "--graph", "--json", ROS_DOMAIN_ID=reserve_domain())
     assert answer.code == 1
     silent = {f["subject"] for f in answer.json["findings"] if f["found"] == "nothing is published"}
     assert silent == set(RATED)

@@ -1,19 +1,17 @@
 """Nodes as users of ros2cli meet them: lifecycle to its end, what is told of nodes that do not work, parameters out and in again."""
 
-import os
-import random
 import time
 
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="it starts nodes: ./gravcomp test")
 
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from ros2_line import Ros2  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray
+from ros2_line import Ros2
+from std_srvs.srv import SetBool, Trigger
 
-from gravcomp.launcher import NodeProcess, NodeSpec  # noqa: E402
-from gravcomp_msgs.msg import ControllerStatus, ImuStatus  # noqa: E402
+from gravcomp.launcher import NodeProcess, NodeSpec
+from gravcomp_msgs.msg import ControllerStatus, ImuStatus
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -33,12 +31,9 @@ class Observer(Ros2):
 
 @pytest.fixture(scope="module")
 def observer():
-    before = os.environ.get("ROS_DOMAIN_ID")
-    os.environ["ROS_DOMAIN_ID"] = str(random.SystemRandom().randrange(1, 100))
     observer = Observer()
     yield observer
     observer.close()
-    os.environ.pop("ROS_DOMAIN_ID") if before is None else os.environ.update(ROS_DOMAIN_ID=before)
 
 
 @pytest.fixture

@@ -7,8 +7,9 @@ import sys
 import pytest
 
 from gravcomp.environment.middleware import middleware, reach
+from gravcomp.launcher.domain import reserve_domain
 
-DOMAIN = str(100 + os.getpid() % 100)
+DOMAIN = reserve_domain()
 # Says what it hears of the other, and how its participant is connected, in one process each.
 NODE = """
 import os, sys, time, rclpy

@@ -21,7 +21,7 @@ class Pair:
 
     def __init__(self):
         self.context = rclpy.Context()
-        rclpy.init(context=self.context, domain_id=97)
+        rclpy.init(context=self.context)
         self.node, self.peer = (rclpy.create_node(name, context=self.context) for name in ("streaming", "peer"))
         self.executor = StreamExecutor(self.node)
         self._peers = SingleThreadedExecutor(context=self.context)
@@ -129,12 +129,12 @@ def test_an_error_of_a_callback_ends_the_spinning(pair, kind):
     if kind == "message":
         pair.node.create_subscription(Int32, "numbers", fail, QOS)
         provoke = pair.connected("numbers")
-        call = lambda: provoke.publish(Int32())  # noqa: E731
+        call = lambda: provoke.publish(Int32())
     else:
         pair.node.create_service(Trigger, "serve", fail)
         client = pair.peer.create_client(Trigger, "serve")
         pair.until(client.service_is_ready)
-        call = lambda: client.call_async(Trigger.Request())  # noqa: E731
+        call = lambda: client.call_async(Trigger.Request())
     call()
     with pytest.raises(ValueError, match="of the callback"):
         pair.until(lambda: False)

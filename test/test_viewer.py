@@ -1,7 +1,6 @@
 """The viewer in a real browser, headless: it renders, follows the graph, a control changes the robot, nothing leaves the machine."""
 
 import io
-import os
 import socket
 import threading
 import time
@@ -69,11 +68,10 @@ class Robot:
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """The page of a viewer beside simulator and controller, in a ROS domain of their own."""
+    """The page of a viewer beside simulator and controller, in the ROS domain of this process."""
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph
 
-    os.environ["ROS_DOMAIN_ID"] = str(60 + os.getpid() % 40)
     graph = RobotGraph("article")
     viewer = graph.node("gravcomp_fem", "viewer", port=8800, rate=10.0, graphics="light")
     specs = [graph.node("gravcomp_fem", "fem_simulator"), graph.node("gravcomp_fem", "inverse_controller"), viewer]

@@ -1,7 +1,6 @@
 """The node gives for a replayed recording what the offline estimator gives, bit for bit, with the stamps of the samples."""
 
 import gc
-import os
 
 import numpy as np
 import pytest
@@ -35,9 +34,8 @@ SURELY = [
 
 
 @pytest.fixture
-def graph(monkeypatch):
-    """Starts nodes of this package in one executor, in a domain of their own."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(101 + os.getpid() % 90))
+def graph():
+    """Starts nodes of this package in one executor."""
     graph = Graph()
     yield graph
     graph.close()

@@ -1,0 +1,51 @@
+"""Typing what the documents tell the reader to type: commands that run until Ctrl-C, and a folder that looks like the reader's."""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+START = 300.0  # s; a machine that has never run the graph compiles first
+
+
+def mirror(source: Path, target: Path, written: list[Path]) -> None:
+    """Links to all that is in `source`; the files `written` and the folders that lead to them are the target's own."""
+    target.mkdir(exist_ok=True)
+    for path in source.iterdir():
+        below = [Path(*w.parts[1:]) for w in written if w.parts[0] == path.name and len(w.parts) > 1]
+        if below:
+            mirror(path, target / path.name, below)
+        elif Path(path.name) in written:
+            shutil.copy(path, target / path.name)
+        elif path.name not in (".git", "__pycache__"):
+            (target / path.name).symlink_to(path)
+
+
+class Shell:
+    """A command that runs until Ctrl-C."""
+
+    def __init__(self, words: list[str], cwd: Path, environment: dict[str, str]):
+        handle, name = tempfile.mkstemp(prefix="output_", dir=cwd)
+        os.close(handle)
+        self.output = Path(name)
+        with open(self.output, "w") as output:
+            self.process = subprocess.Popen(
+                words, cwd=cwd, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, env=environment,
+                start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # fmt: skip
+
+    def wait_for(self, sentence: str) -> None:
+        end = time.monotonic() + START
+        while sentence not in self.output.read_text():
+            assert self.process.poll() is None and time.monotonic() < end, self.output.read_text()
+            time.sleep(0.1)
+
+    def ctrl_c(self) -> int:
+        self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(60.0)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            raise

@@ -1,0 +1,104 @@
+"""The documented lines that talk to a live graph: one virtual robot that runs as the tutorial says."""
+
+import os
+import re
+import subprocess
+import time
+
+import pytest
+from documents import documented
+
+pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
+
+from ros2_line import Ros2
+from shell import START, Shell
+
+pytestmark = pytest.mark.timeout(900)
+
+
+@pytest.fixture(scope="module")
+def live(folder):
+    """A virtual robot that runs as the tutorial says."""
+    shell = Shell(documented("./gravcomp up --virtual --viewer"), folder, dict(os.environ))
+    try:
+        shell.wait_for("The live page: http://")
+        yield shell
+    finally:
+        if shell.process.poll() is None:
+            assert shell.ctrl_c() == 130
+
+
+@pytest.fixture(scope="module")
+def ros2():
+    ros2 = Ros2()
+    yield ros2
+    ros2.close()
+
+
+SAID_ONCE = (
+    "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, tip_position_weight: 1.0}'"
+)
+
+# A line, and what it prints. In this order: what one line disables, the next enables.
+ROS2_LINES = (
+    ("ros2 lifecycle get /can_bridge", "active"),
+    ("ros2 param describe /inverse_controller inverse.tolerance_mm", "inverse.tolerance_mm"),
+    ("ros2 param set /inverse_controller inverse.tolerance_mm 3.0", "successful"),
+    ("ros2 param set /inverse_controller inverse.axial_weight 0.1", "successful"),
+    ("ros2 topic hz /cable/command", "average rate: 9|average rate: 10"),
+    ("ros2 topic echo /controller/status --field message", "target"),
+    (SAID_ONCE, "publishing"),
+    (
+        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, bend_plane: 1.57, tip_position_weight: 1.0}'",
+        "publishing",
+    ),
+    ("ros2 service call /inverse_controller/relax std_srvs/srv/Trigger", "success=True"),
+    ("ros2 service call /inverse_controller/enable std_srvs/srv/SetBool '{data: true}'", "success=True"),
+    ("ros2 lifecycle set /inverse_controller deactivate", "successful"),
+    ("ros2 lifecycle set /inverse_controller activate", "successful"),
+    ("ros2 service call /can_bridge/home std_srvs/srv/Trigger", "success=True"),
+    ("ros2 service call /can_bridge/stop std_srvs/srv/Trigger", "success=True"),
+)
+
+
+def test_the_doctor_sees_the_live_graph(live, ros2, type_in):
+    end = time.monotonic() + START
+    while "target" not in (said := ros2.run("ros2 topic echo /controller/status --field message")):
+        assert time.monotonic() < end, said
+        time.sleep(0.5)
+    code, output = type_in("./gravcomp doctor --graph")
+    assert code == 0 and "cable/command" in output, output
+
+
+def test_the_live_graph_is_recorded_and_judged(live, ros2, type_in, folder):
+    from gravcomp.commands.record import describe
+
+    words = [*documented("./gravcomp record --out my_bag --duration 60"), "--duration", "10"]
+    recorder = subprocess.Popen(
+        words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    time.sleep(5.0)
+    ros2.run(SAID_ONCE)
+    output, _ = recorder.communicate(timeout=60.0)
+    assert recorder.returncode == 0, output
+    # What was said there once, by somebody who came and went, is in it as well.
+    topics = describe(folder / "my_bag")["topics"]
+    assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 500
+    code, output = type_in("./gravcomp reproduce all --bag my_bag")
+    assert code in (0, 1) and "Keeping the shape, recorded" in output and "cables commanded, median" in output, output
+
+
+def test_an_imu_is_calibrated_from_a_recording(live, type_in, folder):
+    code, output = type_in("./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 8")
+    assert code == 0, output
+    # The robot's base stands still: one pose, which is too few for the scale but enough for the offset of the gyroscope.
+    code, output = type_in("./gravcomp calibrate-imu poses --write my_robot.yaml", "--robot article")
+    assert code == 0 and "gyroscope" in (folder / "my_robot.yaml").read_text(), output
+
+
+def test_each_ros2_line_does_what_it_says(live, ros2):
+    for line, printed in ROS2_LINES:
+        documented(line)
+        assert re.search(printed, ros2.run(line)), line
+    # The last line stopped the bridge, which the other tests need.
+    ros2.run("ros2 service call /can_bridge/resume std_srvs/srv/Trigger")

@@ -1,0 +1,134 @@
+"""Every line that the documents tell the reader to type is run: as it stands, or shortened by the options next to it in a test.
+
+A value replaces what the reader puts in (FILE, ROBOT.yaml), and what a line writes goes into a folder of the test. Lines for
+a CAN device are held to the error that a machine without one gives; those that start other programmes are not run.
+
+Here: lines that need no running graph. `test_documented_graph`, `test_documented_nodes` and `test_documented_figures` run the others.
+"""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from documents import TYPED, documented
+
+pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
+
+from ros2_line import run_node
+
+pytestmark = pytest.mark.timeout(900)
+
+# Not installed by this project.
+FOREIGN = ("ros2 launch foxglove_bridge", "ros2 run plotjuggler", "ros2 run robot_state_publisher")
+RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
+
+
+def test_every_line_is_run_by_a_test():
+    """A line that a document gains is missing here until a test runs it."""
+    sources = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
+    run = set(re.findall(r"""["']((?:\./gravcomp|ros2) [^"\n]*?)["'](?=[,)\]\s])""", sources))
+    missing = [line for line in TYPED if line not in run and not line.startswith(FOREIGN)]
+    assert not missing, "\n".join(missing)
+
+
+MODEL_LINES = (
+    "./gravcomp model info article",
+    "./gravcomp model solve article --gravity -9.81 0 0",
+    "./gravcomp model solve article --gravity -9.81 0 0 --target 0 0 100",
+    "./gravcomp model view article --tension 0 0 0 0.3 0 0 --out bent.png",
+    "./gravcomp model info src/examples/own_robot.yaml",
+    "./gravcomp model build src/examples/own_robot.yaml",
+)
+
+
+@pytest.mark.parametrize("line", MODEL_LINES)
+def test_a_model_is_asked_and_built(type_in, folder, line):
+    code, output = type_in(line)
+    assert code == 0, output
+    assert "--out" not in line or (folder / "bent.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("line", ["./gravcomp doctor", "./gravcomp doctor --robot src/examples/own_robot.yaml"])
+def test_the_doctor_looks_at_the_machine(type_in, line):
+    code, output = type_in(line)
+    # 1 where this machine lacks something that it needs; that is an answer.
+    assert code in (0, 1) and "Python" in output
+
+
+ESTIMATES = ("./gravcomp estimate FILE", "./gravcomp estimate FILE --json", "./gravcomp estimate FILE --out gravity.npz")
+
+
+@pytest.mark.parametrize("line", ESTIMATES)
+def test_gravity_is_estimated_offline(type_in, folder, line):
+    code, output = type_in(line, FILE=RECORDED)
+    assert code == 0, output
+    assert "--out" not in line or (folder / "gravity.npz").exists()
+
+
+def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
+    from gravcomp.description import load_robot_file
+    from gravcomp.simulation import Simulator
+
+    robot = load_robot_file("article").robot.with_material(youngs_modulus=330e3)
+    simulator = Simulator(robot)
+    rows = [
+        "trial,time_s,gravity_x,gravity_y,gravity_z,"
+        + ",".join(f"{name}_mm" for name in robot.cable_names)
+        + ",tip_x_mm,tip_y_mm,tip_z_mm"
+    ]
+    for trial, gravity in enumerate(([-9.81, 0.0, 0.0], [0.0, -9.81, 0.0], [-6.9, 0.0, -6.9], [0.0, 6.9, -6.9])):
+        tip = 1e3 * simulator.solve(gravity).tip_position
+        rows += [",".join(map(str, [trial, 0.05 * k, *gravity, *[""] * len(robot.cables), *tip.round(4)])) for k in range(30)]
+    (folder / "measured.csv").write_text("\n".join(rows))
+    line = "./gravcomp calibrate DATA.csv --robot ROBOT.yaml --write CALIBRATED.yaml"
+    code, output = type_in(line, DATA="measured.csv", ROBOT="ROBOT.yaml", CALIBRATED="calibrated.yaml")
+    assert code == 0, output
+    # Without cables the tips tell the modulus alone, to within the rounding of a tenth of a micrometre.
+    modulus = load_robot_file(str(folder / "calibrated.yaml")).robot.segments[0].material.youngs_modulus
+    assert modulus == pytest.approx(330e3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "line, shorter",
+    [
+        ("./gravcomp test", "--collect-only -q"),
+        ("./gravcomp test --fast", "--collect-only -q"),
+        ("./gravcomp test src/test/test_inverse.py -x", "-k straight"),
+    ],
+)
+def test_tests_are_found(type_in, line, shorter):
+    code, output = type_in(line, shorter)
+    assert code == 0 and re.search(r"\d+ (tests collected|passed|/)", output), output[-2000:]
+
+
+@pytest.mark.skipif(Path("/sys/class/net/can0").exists(), reason="there is a can0: motors may hang on it")
+@pytest.mark.parametrize(
+    "line",
+    [
+        "./gravcomp up ROBOT.yaml --interface socketcan --channel can0 --viewer",
+        "./gravcomp up left.yaml --namespace /left --interface socketcan --channel can0",
+        "./gravcomp up right.yaml --namespace /right --interface socketcan --channel can1",
+        "./gravcomp up robot.yaml --namespace /soft --interface socketcan --channel can0",
+        "./gravcomp doctor --robot ROBOT.yaml --interface socketcan --channel can0",
+    ],
+)
+def test_without_the_can_device_it_is_named(type_in, line):
+    code, output = type_in(line, ROBOT="ROBOT.yaml")
+    assert code == (1 if "doctor" in line else 2) and re.search(r"can[01]", output), output
+    assert "Traceback" not in output
+
+
+@pytest.mark.skipif(Path("/sys/class/net/can0").exists(), reason="there is a can0: motors may hang on it")
+@pytest.mark.parametrize(
+    "line",
+    [
+        "ros2 run gravcomp_hw can_bridge --ros-args -p robot:=my_robot.yaml -p interface:=socketcan -p channel:=can0",
+        "ros2 run gravcomp_hw can_bridge --ros-args -p interface:=socketcan -p channel:=can0 -p zero:=home",
+    ],
+)
+def test_a_bridge_without_its_device_names_it(folder, monkeypatch, line):
+    documented(line)
+    monkeypatch.chdir(folder)
+    code, output = run_node(line, dict(os.environ), None)
+    assert code == 2 and "can0" in output and "Traceback" not in output

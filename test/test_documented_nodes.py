@@ -1,0 +1,82 @@
+"""The documented lines that start graphs and nodes of their own: your own robot, replayed bags, single nodes, two robots."""
+
+import os
+import re
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from documents import documented
+
+pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
+
+from ros2_line import run_node
+from shell import START, Shell
+
+from gravcomp.launcher.domain import reserve_domain
+
+pytestmark = pytest.mark.timeout(900)
+
+APART = reserve_domain()
+RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
+
+
+def test_an_own_robot_is_demonstrated(type_in):
+    code, output = type_in("./gravcomp demo --robot src/examples/own_robot.yaml", "--duration 12")
+    assert code == 0 and "sag without compensation" in output, output
+
+
+@pytest.fixture
+def apart(monkeypatch):
+    """A domain in which no other node speaks."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", APART)
+
+
+@pytest.mark.parametrize("line", ["./gravcomp replay my_bag --speed 2 --viewer", "./gravcomp replay BAG --speed 4 --viewer"])
+def test_a_bag_is_replayed(type_in, folder, apart, line):
+    if not (folder / "my_bag").exists():
+        shutil.copytree(RECORDED, folder / "my_bag")
+    code, output = type_in(line, BAG="my_bag")
+    assert code == 0 and "played to the end" in output, output
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "ros2 run gravcomp_estimation imu_estimator",
+        "ros2 run gravcomp_estimation imu_estimator --ros-args -p use_sim_time:=true",
+        "ros2 run gravcomp_fem fem_simulator",
+        "ros2 run gravcomp_fem inverse_controller",
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",
+        "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",
+    ],
+)
+def test_a_node_runs_until_ctrl_c(folder, apart, monkeypatch, line):
+    documented(line)
+    if not (folder / "my_bag").exists():
+        shutil.copytree(RECORDED, folder / "my_bag")
+    monkeypatch.chdir(folder)
+    code, output = run_node(line, dict(os.environ), 6.0)
+    if "source:=tf" in line and code == 2:
+        assert "tf2_msgs" in output  # comes with an installed ROS alone
+        return
+    assert code == 0 and "Traceback" not in output, output
+
+
+def test_two_robots_run_side_by_side(folder, apart, type_in):
+    lines = ("./gravcomp up --virtual --namespace /left --viewer", "./gravcomp up --virtual --namespace /right --viewer")
+    shells = [Shell(documented(line), folder, dict(os.environ)) for line in lines]
+    try:
+        for shell in shells:
+            shell.wait_for("The live page: http://")
+        pages = {re.search(r"http://\S+", shell.output.read_text()).group() for shell in shells}
+        assert len(pages) == 2
+        end = time.monotonic() + START
+        while (answer := type_in("./gravcomp doctor --graph --namespace /left"))[0] != 0:
+            assert time.monotonic() < end, answer[1]
+        assert "cable/command" in answer[1]
+    finally:
+        codes = [shell.ctrl_c() for shell in shells]
+    assert codes == [130, 130]
