@@ -242,3 +242,28 @@ def test_a_name_of_the_glossary_exists(name):
         keys = {key for path in shipped_robots().values() for key in keys_of(load_yaml(path))} | DEFAULT_KEYS
         topics = {topic.lstrip("/") for topic in ports("gives", "takes", "services")}
         assert name in keys | topics | NODE_PARAMETERS | set(EXECUTABLES) | OTHER_NAMES
+
+
+def tree_of_the_core() -> list[list[str]]:
+    """The packages and modules of the core, line by line as src/README.md has them; without robots/, which holds data."""
+    rows = re.findall(r"^\| (`\S.*?) \|", (ROOT / "src/README.md").read_text(), re.MULTILINE)
+    lines = [[name.strip("`/").removesuffix(".py") for name in row.split(", ")] for row in rows]
+    return [[name for name in line if name != "robots"] for line in lines]
+
+
+def test_the_tree_of_the_core_is_whole():
+    folder = ROOT / "src/gravcomp"
+    packages = {path.parent.name for path in folder.glob("*/__init__.py")}
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    assert {name for line in tree_of_the_core() for name in line} == packages | modules
+
+
+def test_no_import_goes_up():
+    allowed: set[str] = set()
+    for line in tree_of_the_core():
+        allowed |= set(line) | {"__version__"}
+        for name in line:
+            folder = ROOT / "src/gravcomp" / name
+            for path in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]:
+                imported = re.findall(r"^\s*(?:from|import) gravcomp(?:\.| import )(\w+)", path.read_text(), re.MULTILINE)
+                assert set(imported) <= allowed, f"{path.relative_to(ROOT)} imports {sorted(set(imported) - allowed)}"
