@@ -121,7 +121,7 @@ def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkey
         (["missing.npz"], "missing.npz: does not exist"),
         (["poses.npz", "--up", "0", "0", "1"], "holds 6 distinct resting pose(s); 1 direction(s)"),
         (["poses.npz", "--up", "0", "0", "0"], "other than zero"),
-        (["poses.npz", "--bias-model", "b.json"], "holds no imu/temperature"),
+        (["poses.npz", "--bias-model", "b.json"], "contains no imu/temperature"),
         (["poses.npz", "--write", "nowhere/robot.yaml"], "cannot be written"),
         (["in_g.npz"], "a wrong unit (m/s^2 are needed)"),
         (["hand.npz"], "never rests"),

@@ -1,17 +1,14 @@
 """`gravcomp estimate`: figures as JSON, arrays in a file, and one sentence for what cannot be used."""
 
-import argparse
 import json
 
 import numpy as np
 
-from gravcomp.commands import estimate
+from gravcomp.commands.__main__ import main
 
 
 def run(*arguments):
-    parser = argparse.ArgumentParser()
-    estimate.add_arguments(parser)
-    return estimate.run(parser.parse_args([str(a) for a in arguments]))
+    return main(["estimate", *map(str, arguments)])
 
 
 def write_trial(path, count=600):

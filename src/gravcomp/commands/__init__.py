@@ -1,26 +1,34 @@
-"""The commands of ./gravcomp, one module each: `add_arguments(parser)` and `run(args) -> int`; a dash in a name is an underscore in its module's.
+"""The commands of ./gravcomp, one module per command with `add_arguments(parser)` and `run(args) -> int`.
 
-This list is read before anything is installed, so it imports nothing.
+This package is imported before anything is installed, so it imports nothing itself.
 """
 
 COMMANDS = {
-    "demo": "the main job on a virtual robot: sag, compensate, tilt; ends with the figures",
-    "up": "the graph for real hardware or as the robot's YAML says, until Ctrl-C",
-    "test": "all tests",
-    "bench": "the performance figures",
-    "reproduce": "the article's experiments, with report pages",
+    "demo": "run the loop on a virtual robot: sag, compensate, tilt; print the figures",
+    "up": "start the graph on real hardware, or as the robot file says, until Ctrl-C",
+    "test": "run all tests",
+    "check": "check style and types of the source: ruff and mypy",
+    "bench": "measure the performance figures",
+    "reproduce": "reproduce the article's experiments, with report pages",
     "calibrate": "fit the robot's model to measured tip positions",
-    "calibrate-imu": "the IMU's scale, offsets, mount and bias over temperature from a recording at rest",
-    "estimate": "orientation and gravity from a recorded IMU stream, offline",
+    "calibrate-imu": "fit the IMU's scale, offsets, mount and bias over temperature to a recording at rest",
+    "estimate": "estimate orientation and gravity from a recorded IMU stream, offline",
     "model": "build, inspect, solve and view a robot's model",
-    "record": "write the graph's topics into a bag",
-    "replay": "the graph on a recorded IMU stream",
-    "arm": "a seven-axis arm carries the virtual robot through five poses",
-    "doctor": "what is installed, what is missing, and the line that mends it",
+    "record": "record the graph's topics into a bag",
+    "replay": "run the graph on a recorded IMU stream",
+    "arm": "move the virtual robot through five poses on a seven-axis arm",
+    "doctor": "print what is installed, what is missing, and the command that installs it",
+    "docs": "build the documentation of the Python interface",
+    "completion": "print the completion script for bash or zsh",
 }
 
 
 def overview() -> str:
-    """The text of `./gravcomp --help`."""
+    """Return the text of `./gravcomp --help`."""
     lines = [f"  {name:<13} {summary}" for name, summary in COMMANDS.items()]
-    return "usage: ./gravcomp COMMAND [OPTIONS]\n\n" + "\n".join(lines) + "\n\n./gravcomp COMMAND --help explains a command."
+    return (
+        "usage: ./gravcomp COMMAND [OPTIONS]\n\n"
+        + "\n".join(lines)
+        + "\n\nEach command has --json (the result as one line of JSON on stdout) and --quiet (no notes, no progress)."
+        + "\n./gravcomp COMMAND --help explains a command, ./gravcomp --version prints the version."
+    )

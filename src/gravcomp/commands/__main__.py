@@ -1,34 +1,46 @@
 """`python -m gravcomp.commands COMMAND ...`: what `./gravcomp` runs inside the environment."""
 
-import argparse
-import importlib
 import sys
 
-from gravcomp.commands import COMMANDS, overview
+from gravcomp.commands import COMMANDS, output, overview
+from gravcomp.commands.parsers import module_of, parse, parser_of
 from gravcomp.environment.interrupt import run_interruptible
 
 
 def main(arguments: list[str]) -> int:
-    """Run one command; returns the exit code, 2 for a mistake in what was given."""
+    """Run one command. Returns the exit code (gravcomp.commands.parsers.EXIT_CODES)."""
     if not arguments or arguments[0] not in COMMANDS:
         print(overview(), file=sys.stderr)
         return 2
     name, *rest = arguments
-    module = importlib.import_module(f"gravcomp.commands.{name.replace('-', '_')}")
-    parser = argparse.ArgumentParser(prog=f"gravcomp {name}", description=COMMANDS[name], allow_abbrev=False)
-    module.add_arguments(parser)
+    parser = parser_of(name)
+    module = module_of(name)
     if own := getattr(module, "OWN", ()):
-        # argparse would take options that it does not know for mistakes.
+        # The other words go to another program; argparse would reject options that it does not know.
         count = next((i for i, word in enumerate(rest) if word not in own), len(rest))
         rest.insert(count, "--")
+    args = parse(parser, rest)
+    output.configure(json=args.json, quiet=args.quiet)
+    try:
+        return module.run(args)
+    except Exception as error:
+        code = _exit_code(error)
+        if code is None:
+            raise
+        print(f"gravcomp {name}: {error}", file=sys.stderr)
+        return code
+
+
+def _exit_code(error: Exception) -> int | None:
+    """Return the exit code for an error whose text is meant for the user, or None for a defect, which shows its traceback."""
+    # Imported here, because the fast commands do without.
     from gravcomp.config import ConfigError
+    from gravcomp.environment.errors import SetupError
     from gravcomp.launcher import LaunchError, NodeDied
 
-    try:
-        return module.run(parser.parse_args(rest))
-    except (ConfigError, LaunchError, NodeDied, TimeoutError) as error:
-        print(f"gravcomp {name}: {error}", file=sys.stderr)
-        return 2
+    if isinstance(error, SetupError):
+        return 3
+    return 2 if isinstance(error, (ConfigError, LaunchError, NodeDied, TimeoutError)) else None
 
 
 if __name__ == "__main__":

@@ -1,44 +1,61 @@
-"""`gravcomp calibrate DATA`: fit the robot's model to measured tips, with intervals, warnings and a before/after page; writes the robot's YAML."""
+"""`gravcomp calibrate DATA`: fit the robot's model to measured tip positions.
+
+Prints the fitted parameters with their intervals and warnings, writes a robot file with them and a report page with the
+model's error before and after.
+"""
 
 import argparse
-import json
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from gravcomp.config import ConfigError
+from gravcomp.commands import output
 
-_MOVING = 3e-3  # m within half a second: a trial with motion, that tells the damping
-_LONGEST = 4.0  # s of a trial that the damping is fitted to
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import RenderableType
+
+    from gravcomp.calibration.measured import Measured
+    from gravcomp.closed_loop.setup import Setup
+    from gravcomp.report.result import Result
+    from gravcomp.sweep import Sweep
+
+_MOVING = 3e-3  # m within half a second: a trial that moves this far shows the damping
+_LONGEST = 4.0  # s of such a trial are used to fit the damping
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstans' radius, and on demand creep, to measured tips. DATA is a CSV file with the columns trial, time_s,"
-        " gravity_x, gravity_y, gravity_z (m/s^2), CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity,"
-        " cable/state and measured/tip (geometry_msgs/PoseStamped in soft_base)."
+        "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
+        " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
+        " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and measured/tip"
+        " (geometry_msgs/PoseStamped in soft_base)."
     )
     parser.add_argument(
-        "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual': measure the virtual robot of the robot's file"
+        "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual' measures the virtual robot of the robot file"
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
-    parser.add_argument("--write", metavar="YAML", help="where the calibrated robot goes (default: NAME-calibrated.yaml here)")
-    parser.add_argument("--out", metavar="DIR", default="reports", help="where the page and its JSON go (default: reports)")
-    parser.add_argument("--tip-topic", help="the tip's topic, for a bag (default: measured/tip or truth/tip)")
-    parser.add_argument("--no-damping", action="store_true", help="leave the damping as it is")
+    parser.add_argument("--write", metavar="YAML", help="calibrated robot file to write (default: NAME-calibrated.yaml)")
     parser.add_argument(
-        "--creep", action="store_true", help="fit creep besides; it takes a free fall or the like, at 50 Hz or more"
+        "--out", metavar="DIR", default="reports", help="folder for the report page and its JSON (default: reports)"
     )
-    parser.add_argument("--no-offsets", action="store_true", help="leave the cables' offsets as they are")
-    parser.add_argument("--no-compliance", action="store_true", help="leave the cables' elasticity as it is")
-    parser.add_argument("--no-winding", action="store_true", help="leave the capstans' radius as it is")
-    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, last line of the output")
+    parser.add_argument(
+        "--tip-topic", metavar="TOPIC", help="topic of the measured tip in a bag (default: measured/tip or truth/tip)"
+    )
+    parser.add_argument("--no-damping", action="store_true", help="keep the damping of the robot file")
+    parser.add_argument(
+        "--creep", action="store_true", help="also fit creep; needs a fast motion, e.g. a free fall, at 50 Hz or more"
+    )
+    parser.add_argument("--no-offsets", action="store_true", help="keep the cable offsets of the robot file")
+    parser.add_argument("--no-compliance", action="store_true", help="keep the cable elasticity of the robot file")
+    parser.add_argument("--no-winding", action="store_true", help="keep the capstan radius of the robot file")
+    parser.add_argument("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: written. Raises ConfigError."""
-    from rich.console import Console
+    """Fit and write. Returns 0: the robot file is written. Raises ConfigError."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
@@ -48,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.calibration.report import calibration_result
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.commands.model.build import prepare_model
+    from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
     from gravcomp.report.page import write_report
     from gravcomp.sweep import Sweep
@@ -56,34 +74,31 @@ def run(args: argparse.Namespace) -> int:
     setup = Setup.of(file)
     prepare_model(args.robot)
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
-    console = Console(stderr=True)
     started = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Sweep(args.workers) as sweep, Progress(*columns, console=console, transient=True) as progress:
+    with Sweep(args.workers) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("reading")
 
-        def tell(sentence: str) -> None:
-            progress.update(task, description=sentence)
+        def show(stage: str) -> None:
+            progress.update(task, description=stage)
 
         try:
-            measured = _measured(args, setup, sweep, tell)
+            measured = _measured(args, setup, sweep, show)
             statics = fit_statics(
                 setup.robot,
                 still_windows(measured),
                 offsets=not args.no_offsets,
                 compliance=not args.no_compliance,
                 winding=not args.no_winding,
-                progress=tell,
+                progress=show,
             )
-            robot, hardware = (
-                calibrated_robot(setup.robot, statics.parameters),
-                calibrated_hardware(setup.hardware, statics.parameters),
-            )
+            robot = calibrated_robot(setup.robot, statics.parameters)
+            hardware = calibrated_hardware(setup.hardware, statics.parameters)
             courses = [] if args.no_damping else _moving(measured, statics.parameters)
             motion = None
             if courses:
                 motion = fit_motion(
-                    robot, courses, modulus=False, creep=args.creep, mapper=sweep.map, progress=lambda s: tell(f"damping: {s}")
+                    robot, courses, modulus=False, creep=args.creep, mapper=sweep.map, progress=lambda s: show(f"damping: {s}")
                 )
                 if motion.damping_seen:
                     robot = motion.robot
@@ -94,17 +109,15 @@ def run(args: argparse.Namespace) -> int:
         measured.source, str(target), statics, motion, courses, setup.robot.segments[0].material.damping_time
     )
     if not courses and not args.no_damping:
-        result.notes.insert(0, "damping time: no trial holds fast motion, so it stays as it is")
+        result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
     result.seconds = time.perf_counter() - started
     page = write_report(result, Path(args.out).expanduser())
-    _tell(console, result)
-    console.print(f"written: [bold]{target}[/bold]\n[dim]{page}[/dim]")
-    if args.json:
-        print(json.dumps({**result.to_mapping(), "written": str(target)}))
+    output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))
     return 0
 
 
-def _measured(args: argparse.Namespace, setup, sweep, tell):
+def _measured(args: argparse.Namespace, setup: "Setup", sweep: "Sweep", show: "Callable[[str], None]") -> "Measured":
+    """Return the measurements: from the given file, or of the virtual robot. Raises MeasurementError."""
     from gravcomp.calibration.files import read_measured
 
     if args.data != "virtual":
@@ -112,11 +125,11 @@ def _measured(args: argparse.Namespace, setup, sweep, tell):
     from gravcomp.trials.calibration_run import measure
     from gravcomp.trials.context import Context
 
-    return measure(Context(setup, sweep, tell))
+    return measure(Context(setup, sweep, show))
 
 
-def _moving(measured, parameters) -> list:
-    """The beginnings of the trials with fast motion, offsets and winding ratio put in."""
+def _moving(measured: "Measured", parameters: Any) -> "list[Measured]":
+    """Return the first seconds of the trials with fast motion, with the fitted offsets and winding ratio applied."""
     import dataclasses
 
     import numpy as np
@@ -132,15 +145,20 @@ def _moving(measured, parameters) -> list:
     return found
 
 
-def _tell(console, result) -> None:
+def _readable(result: "Result", target: Path, page: Path) -> "RenderableType":
+    """Return the table of parameters, the notes and the written files for the terminal."""
+    from rich.console import Group
+    from rich.markup import escape
     from rich.table import Table as RichTable
 
+    from gravcomp.report.result import Table
+
     parameters = result.parts[0]
+    assert isinstance(parameters, Table)
     table = RichTable(box=None, pad_edge=False)
     for column in parameters.header:
         table.add_column(column)
     for row in parameters.rows:
         table.add_row(*(str({True: "yes", False: "no"}.get(cell, cell)) for cell in row))
-    console.print(table)
-    for note in result.notes:
-        console.print(f"[yellow]-[/yellow] {note}")
+    notes = [f"[yellow]-[/yellow] {escape(note)}" for note in result.notes]
+    return Group(table, *notes, f"written: [bold]{escape(str(target))}[/bold]", f"[dim]{escape(str(page))}[/dim]")

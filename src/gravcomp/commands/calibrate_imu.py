@@ -1,41 +1,47 @@
-"""`gravcomp calibrate-imu FILE`: what a recording of the resting IMU tells of it, written into the robot's YAML and a bias model."""
+"""`gravcomp calibrate-imu FILE`: calibrate the IMU from a recording at rest; write a robot file and a bias model."""
 
 import argparse
-import json
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from gravcomp.commands import output
 
-from gravcomp.config import ConfigError, from_mapping
+if TYPE_CHECKING:
+    from gravcomp.orientation import EstimatorOptions
+    from gravcomp.orientation.calibration import RestCalibration
+    from gravcomp.recordings.imu import Recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Record imu/data_raw and imu/temperature while the IMU lies still in several poses, each for 5 s: at best with every axis once up and once"
-        " down. From that: scale and offset of the accelerometer, offset of the gyroscope; with --up the IMU's mount; with --bias-model the"
-        " gyroscope's bias over temperature, learned while the chip warms."
+        "Calibrate the IMU. Record imu/data_raw and imu/temperature while the IMU is at rest in several poses, each for 5 s,"
+        " ideally with every axis once up and once down. Fitted are scale and offset of the accelerometer and the offset of"
+        " the gyroscope; with --up also the mount of the IMU, with --bias-model also the gyroscope's bias over"
+        " temperature while the chip warms up."
     )
     parser.add_argument(
         "file", metavar="FILE", help="a rosbag2 folder, or an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz)"
     )
-    parser.add_argument("--topic", help="the IMU topic, for a bag with several")
+    parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
     parser.add_argument(
         "--up", nargs=3, type=float, action="append", metavar=("X", "Y", "Z"),
-        help="direction in soft_base that pointed up in a pose; once for each pose, in their order: fits the mount",
+        help="direction in soft_base that pointed up in a pose; give it once per pose, in order: fits the mount",
     )  # fmt: skip
     parser.add_argument(
-        "--bias-model", metavar="FILE", help="write the bias over temperature there; needs imu/temperature in the bag"
+        "--bias-model", metavar="FILE", help="file to write the bias over temperature to; needs imu/temperature in the bag"
     )
-    parser.add_argument("--write", metavar="YAML", help="where the calibrated robot goes (default: NAME-calibrated.yaml here)")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, last line of the output")
+    parser.add_argument("--write", metavar="YAML", help="calibrated robot file to write (default: NAME-calibrated.yaml)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: written. Raises ConfigError."""
+    """Calibrate and write. Returns 0: the robot file is written. Raises ConfigError."""
+    import numpy as np
+
     from gravcomp.calibration.apply import write_imu_calibration
+    from gravcomp.config import ConfigError, from_mapping
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
     from gravcomp.orientation.calibration import CalibrationError, calibrate
@@ -56,38 +62,44 @@ def run(args: argparse.Namespace) -> int:
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
     write_imu_calibration(file.source, target, found, Path(args.bias_model).expanduser() if args.bias_model else None)
     figures = _figures(args, found, span, target)
-    _tell(figures)
-    if args.json:
-        print(json.dumps(figures))
+    output.result(figures, _text(figures))
     return 0
 
 
-def _learn_bias(recording, options, found, path: Path) -> tuple[float, float]:
-    """Write the bias over temperature beyond the offset found; returns the temperatures (degC) that it covers."""
+def _learn_bias(recording: "Recording", options: "EstimatorOptions", found: "RestCalibration", path: Path) -> tuple[float, float]:
+    """Learn and write the bias over temperature, relative to the fitted offset. Returns the lowest and highest temperature, degC.
+
+    Raises ConfigError when the recording has no temperature, when the IMU is not at rest, and when `path` cannot be written.
+    """
     from dataclasses import replace
 
+    from gravcomp.config import ConfigError
     from gravcomp.orientation import GravityEstimator, estimate_recording
 
     if recording.temperature is None:
-        raise ConfigError(f"{recording.source}: holds no imu/temperature; without it no bias over temperature can be learned")
+        raise ConfigError(f"{recording.source}: contains no imu/temperature, which is needed to learn the bias over temperature")
     estimator = GravityEstimator(replace(options, calibration=found.correction))
     estimate_recording(recording, estimator)
     if estimator.learned.span is None:
         raise ConfigError(
-            f"{recording.source}: the IMU did not rest while its temperature was told; no bias over temperature was learned"
+            f"{recording.source}: the IMU was never at rest while its temperature was recorded; no bias model was learned"
         )
     try:
-        # Written anew: what an older model holds is relative to the older offset.
+        # An existing file is replaced: its biases are relative to the previous offset.
         estimator.learned.save(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
     return estimator.learned.span
 
 
-def _figures(args: argparse.Namespace, found, span: tuple[float, float] | None, target: Path) -> dict:
+def _figures(
+    args: argparse.Namespace, found: "RestCalibration", span: tuple[float, float] | None, target: Path
+) -> dict[str, Any]:
+    import numpy as np
+
     fit, correction = found.accelerometer, found.correction
     notes = [
-        f"the poses hardly show the accelerometer's {axis} axis; let it point up once and down once"
+        f"the poses hardly excite the accelerometer's {axis} axis; add a pose with this axis up and one with it down"
         for axis, known in zip("xyz", found.known_axes)
         if not known
     ]
@@ -115,29 +127,24 @@ def _figures(args: argparse.Namespace, found, span: tuple[float, float] | None, 
     }
 
 
-def _tell(figures: dict) -> None:
-    from rich.console import Console
-
-    console = Console(stderr=True, highlight=False)
-
-    def row(name: str, values: list, unit: str, stds: list | None = None) -> None:
+def _text(figures: dict[str, Any]) -> str:
+    def row(name: str, values: list, unit: str, stds: list | None = None) -> str:
         numbers = "  ".join(f"{v:+.4f}" + (f" ±{s:.4f}" if stds else "") for v, s in zip(values, stds or values))
-        console.print(f"  {name:<22}{numbers} {unit}")
+        return f"  {name:<22}{numbers} {unit}"
 
-    console.print(f"{figures['file']}: {len(figures['poses'])} resting pose(s)")
-    row("accelerometer scale", figures["accel_scale"], "", figures["accel_scale_std"])
-    row("accelerometer offset", figures["accel_offset_m_s2"], "m/s^2", figures["accel_offset_std_m_s2"])
-    row("gyroscope offset", figures["gyro_offset_deg_s"], "deg/s")
-    console.print(
-        f"  | |a| - g | at rest    {figures['norm_error_before_m_s2']:.4f} before, {figures['norm_error_after_m_s2']:.4f} m/s^2 after, RMS"
-    )
+    before, after = figures["norm_error_before_m_s2"], figures["norm_error_after_m_s2"]
+    lines = [
+        f"{figures['file']}: {len(figures['poses'])} resting pose(s)",
+        row("accelerometer scale", figures["accel_scale"], "", figures["accel_scale_std"]),
+        row("accelerometer offset", figures["accel_offset_m_s2"], "m/s^2", figures["accel_offset_std_m_s2"]),
+        row("gyroscope offset", figures["gyro_offset_deg_s"], "deg/s"),
+        f"  | |a| - g | at rest   {before:.4f} before, {after:.4f} m/s^2 after, RMS",
+    ]
     if figures["mount_rpy_deg"] is not None:
-        row("mount roll pitch yaw", figures["mount_rpy_deg"], "deg")
+        lines.append(row("mount roll pitch yaw", figures["mount_rpy_deg"], "deg"))
     if figures["bias_model"] is not None:
         model = figures["bias_model"]
-        console.print(
-            f"  bias model            {model['from_degc']:.1f} to {model['to_degc']:.1f} degC: [bold]{model['file']}[/bold]"
-        )
-    for note in figures["notes"]:
-        console.print(f"[yellow]-[/yellow] {note}")
-    console.print(f"written: [bold]{figures['written']}[/bold]")
+        lines.append(f"  bias model            {model['from_degc']:.1f} to {model['to_degc']:.1f} degC: {model['file']}")
+    lines += [f"- {note}" for note in figures["notes"]]
+    lines.append(f"written: {figures['written']}")
+    return "\n".join(lines)

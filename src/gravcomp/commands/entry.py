@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from gravcomp.commands import COMMANDS, overview
-from gravcomp.environment.ready import enter
+from gravcomp.commands.version import version_text
 
 
 def start(root: Path, arguments: "list[str]") -> int:
@@ -15,7 +15,12 @@ def start(root: Path, arguments: "list[str]") -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(overview())
         return 0
+    if arguments[0] in ("-V", "--version"):
+        print(version_text(root))
+        return 0
     if arguments[0] not in COMMANDS:
         print(f"gravcomp: unknown command '{arguments[0]}'\n\n{overview()}", file=sys.stderr)
         return 2
+    from gravcomp.environment.ready import enter
+
     return enter(root, arguments)

@@ -1,40 +1,43 @@
-"""`gravcomp estimate FILE`: the orientation filter offline over a recording, as the node would give it."""
+"""`gravcomp estimate FILE`: run the orientation filter offline over a recording; the result is that of the node imu_estimator."""
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from gravcomp.commands import output
 
-from gravcomp.orientation import BiasModelError, BiasTemperatureModel, EstimatorOptions, GravityEstimator, estimate_recording
-from gravcomp.orientation import quaternion as quat
-from gravcomp.orientation.inclination import inclination_rmse
-from gravcomp.recordings.imu import RecordingError, read_recording
+if TYPE_CHECKING:
+    from gravcomp.orientation import EstimatedRecording, EstimatorOptions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "file", help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder"
+        "file",
+        metavar="FILE",
+        help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder",
     )
     parser.add_argument(
         "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
     )
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.add_argument("--topic", help="the IMU topic, for a bag with several")
+    parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument("--average", type=int, default=1, metavar="N", help="average every N samples (3: 95.2 Hz in BROAD)")
     parser.add_argument(
-        "--average", type=int, default=1, metavar="N", help="take the mean of every N samples (3: 95.2 Hz in BROAD)"
+        "--robot", default="article", help="shipped robot or robot file with the IMU's mount and the parameters of imu_estimator"
     )
-    parser.add_argument(
-        "--robot", default="article", help="shipped robot or YAML: its mount and its imu_estimator parameters are taken"
-    )
-    parser.add_argument("--bias-model", metavar="FILE", help="bias over temperature as kept by imu_estimator")
+    parser.add_argument("--bias-model", metavar="FILE", help="bias over temperature as written by imu_estimator")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: done, 2: the recording or an option cannot be used."""
+    """Estimate. Returns 0: done, 2: the recording or an option cannot be used. Raises ConfigError."""
+    import numpy as np
+
+    from gravcomp.config import ConfigError
+    from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
+    from gravcomp.orientation.inclination import inclination_rmse
+    from gravcomp.recordings.imu import RecordingError, read_recording
+
     try:
         if args.average < 1:
             raise RecordingError(f"--average is {args.average}; 1 or more is needed")
@@ -45,13 +48,11 @@ def run(args: argparse.Namespace) -> int:
         options, mount = _of_robot(args.robot)
         estimator = GravityEstimator(options, mount, model)
     except (RecordingError, BiasModelError, ValueError) as error:
-        print(f"gravcomp estimate: {error}", file=sys.stderr)
-        return 2
+        raise ConfigError(str(error)) from error
 
-    from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=output.console(), transient=True) as progress:
         task = progress.add_task("estimating", total=1.0)
         begin = time.perf_counter()
         result = estimate_recording(recording, estimator, lambda done: progress.update(task, completed=done))
@@ -77,18 +78,18 @@ def run(args: argparse.Namespace) -> int:
         try:
             _write(Path(args.out), result)
         except OSError as error:
-            print(f"gravcomp estimate: {args.out}: cannot be written: {error.strerror}", file=sys.stderr)
-            return 2
+            raise ConfigError(f"{args.out}: cannot be written: {error.strerror}") from error
         figures["out"] = str(args.out)
-    print(json.dumps(figures, indent=2) if args.json else _text(figures))
+    output.result(figures, _text(figures))
     return 0
 
 
-def _of_robot(robot: str) -> tuple[EstimatorOptions, tuple]:
-    """The estimator's options and the IMU's mount (w x y z) that the robot's file gives."""
+def _of_robot(robot: str) -> "tuple[EstimatorOptions, tuple]":
+    """Return the estimator's options and the IMU's mount (quaternion w x y z) of a robot file. Raises ConfigError."""
     from gravcomp.config import from_mapping
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
+    from gravcomp.orientation import quaternion as quat
 
     file = load_robot_file(robot)
     section = file.section("nodes").get("imu_estimator")
@@ -96,7 +97,9 @@ def _of_robot(robot: str) -> tuple[EstimatorOptions, tuple]:
     return parameters.estimator, quat.from_roll_pitch_yaw(*file.robot.imu_mount.rpy)
 
 
-def _write(path: Path, result) -> None:
+def _write(path: Path, result: "EstimatedRecording") -> None:
+    import numpy as np
+
     with path.open("wb") as file:
         np.savez_compressed(
             file,
@@ -109,7 +112,7 @@ def _write(path: Path, result) -> None:
         )
 
 
-def _text(figures: dict) -> str:
+def _text(figures: dict[str, Any]) -> str:
     lines = [
         f"{figures['file']}: {figures['samples']} samples, {figures['duration_s']:.1f} s at {figures['rate_hz']:.1f} Hz",
         f"  at rest             {100 * figures['rest_fraction']:.0f} % of the time",
@@ -117,10 +120,10 @@ def _text(figures: dict) -> str:
         f"  expected error      {figures['inclination_std_deg']:.2f} deg of inclination, mean standard deviation",
     ]
     if figures["inclination_rmse_deg"] is not None:
-        lines.append(f"  inclination RMSE    {figures['inclination_rmse_deg']:.3f} deg against the recording's truth")
+        lines.append(f"  inclination RMSE    {figures['inclination_rmse_deg']:.3f} deg against the recording's ground truth")
     lines.append(f"  rejected samples    {figures['rejected']}")
     lines += [f"    {count} x {problem}" for problem, count in figures["problems"].items()]
-    lines.append(f"  cost                {figures['us_per_sample']:.0f} us a sample")
+    lines.append(f"  computing time      {figures['us_per_sample']:.0f} us per sample")
     if "out" in figures:
         lines.append(f"  written             {figures['out']}")
     return "\n".join(lines)

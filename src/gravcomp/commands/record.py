@@ -1,31 +1,32 @@
-"""`gravcomp record`: the graph's topics into a bag (MCAP, rosbag2 version 9) until Ctrl-C."""
+"""`gravcomp record`: record the graph's topics into a bag (MCAP, rosbag2 version 9) until Ctrl-C."""
 
 import argparse
-import json
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
-# How long the recorder may take to write the bag's end.
-_PATIENCE = 20.0
+from gravcomp.commands import output
+
+_RECORDER_TIMEOUT = 20.0  # s that the recorder has to write the end of the bag
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Record the graph that runs on this machine into a bag that `ros2 bag` reads; a kill loses at most a second."
+        "Record the graph that runs on this machine into a bag that `ros2 bag` reads. "
+        "At most the last second is lost when the process is killed."
     )
-    parser.add_argument("--out", metavar="DIR", help="folder of the bag, which must not exist (default: gravcomp_DATE_TIME here)")
-    parser.add_argument("--topics", nargs="+", default=[], metavar="TOPIC", help="only these (default: all)")
-    parser.add_argument("--namespace", default="", metavar="NS", help="of the robot, for one of several (default: /)")
-    parser.add_argument("--duration", type=float, metavar="S", help="end after so many seconds (default: at Ctrl-C)")
-    parser.add_argument("--json", action="store_true", help="print what was recorded as one JSON object, the last line")
+    parser.add_argument("--out", metavar="DIR", help="new folder for the bag (default: gravcomp_DATE_TIME in the current folder)")
+    parser.add_argument("--topics", nargs="+", default=[], metavar="TOPIC", help="record these topics only (default: all)")
+    parser.add_argument("--namespace", default="", metavar="NS", help="record the robot in this namespace (default: /)")
+    parser.add_argument("--duration", type=float, metavar="S", help="stop after this time in seconds (default: at Ctrl-C)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: a bag was written, 2: it could not be."""
+    """Record. Returns 0: the bag is written, 2: it could not be written."""
     from datetime import datetime
 
     from gravcomp.config import ConfigError
@@ -36,25 +37,23 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"gravcomp_{datetime.now():%Y%m%d_%H%M%S}").resolve()
     parameters = {"out": str(out), **({"topics": args.topics} if args.topics else {})}
     spec = NodeSpec("gravcomp_fem", "recorder", parameters, args.namespace)
-    # Its own session: Ctrl-C comes here first and is handed on once.
-    recorder = subprocess.Popen(spec.command(), start_new_session=True)
+    # In a session of its own: Ctrl-C reaches this process only, which passes it on once.
+    recorder = subprocess.Popen(spec.command(), start_new_session=True, stdout=subprocess.DEVNULL if args.quiet else sys.stderr)
     try:
         _wait(recorder, out, args.duration)
     finally:
         if recorder.poll() is None:
             recorder.send_signal(signal.SIGINT)
-        code = recorder.wait(_PATIENCE)
+        code = recorder.wait(_RECORDER_TIMEOUT)
     if code:
         return 2
     figures = describe(out)
-    _print_summary(figures)
-    if args.json:
-        print(json.dumps(figures), flush=True)
+    output.result(figures, _text(figures))
     return 0
 
 
-def describe(path: Path) -> dict:
-    """What is in a bag: duration and messages by topic."""
+def describe(path: Path) -> dict[str, Any]:
+    """Return the duration of a bag and the number of messages of each topic."""
     from rosbags.rosbag2 import Reader
 
     with Reader(path) as bag:
@@ -63,7 +62,7 @@ def describe(path: Path) -> dict:
 
 
 def _wait(recorder: subprocess.Popen, out: Path, duration: float | None) -> None:
-    """Until the recorder ends, Ctrl-C, or `duration` s after the bag has begun."""
+    """Wait until the recorder ends, Ctrl-C is pressed, or `duration` s have passed since the bag was begun."""
     end = None
     try:
         while recorder.poll() is None and (end is None or time.monotonic() < end):
@@ -74,7 +73,7 @@ def _wait(recorder: subprocess.Popen, out: Path, duration: float | None) -> None
         pass
 
 
-def _print_summary(figures: dict) -> None:
-    print(f"{figures['bag']}: {figures['messages']} messages, {figures['duration_s']:.1f} s", file=sys.stderr)
-    for topic, count in figures["topics"].items():
-        print(f"  {count:8d}  {topic}", file=sys.stderr)
+def _text(figures: dict[str, Any]) -> str:
+    lines = [f"{figures['bag']}: {figures['messages']} messages, {figures['duration_s']:.1f} s"]
+    lines += [f"  {count:8d}  {topic}" for topic, count in figures["topics"].items()]
+    return "\n".join(lines)

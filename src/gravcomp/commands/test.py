@@ -4,37 +4,67 @@ import argparse
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
-OWN = ("--fast", "-h", "--help")
-"""Arguments of the command's own, which come first; all others are pytest's."""
+from gravcomp.commands import output
+
+OWN = ("--fast", "--json", "--quiet", "-h", "--help")
+"""Options of the command itself, which come first; all other words are passed to pytest."""
 
 FOLDERS = ("src/test", "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
-# What only tests need, and what it is for.
-_BROWSER = {"chromium": "the viewer's tests"}
+# System packages that only tests need, and their use.
+_BROWSER = {"chromium": "tests of the viewer"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "All tests. Further arguments go to pytest, e.g. -k viewer -x."
-    parser.add_argument("--fast", action="store_true", help="without the tests of the running graph (folder test/)")
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="for pytest; a path in place of all tests")
+    parser.usage = "gravcomp test [--fast] [--json] [--quiet] [PATH ...] [OPTIONS OF PYTEST]"
+    parser.description = "Run all tests, or those in the given paths. Further arguments are passed to pytest, e.g. -k viewer -x."
+    parser.add_argument("--fast", action="store_true", help="leave out the tests of the running graph (folder test/)")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="paths in place of all tests, and options of pytest")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; pytest's exit code."""
+    """Run pytest. Returns its exit code."""
+    from gravcomp.environment.packages import provide_extra
+
     root = Path(os.environ["GRAVCOMP_ROOT"])
+    for extra in ("development", "reports"):
+        provide_extra(extra, root)
     if not args.fast:
         _provide_browser()
     folders = [f for f in FOLDERS if (root / f).is_dir() and not (args.fast and f == "test")]
     given = [a for a in args.arguments if a != "--"]
     targets = [] if any((root / a.split("::")[0]).exists() for a in given if not a.startswith("-")) else folders
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-ra", "--durations=10", *targets, *given]
-    return subprocess.run(command, cwd=root).returncode
+    how = ["-q", "--no-header"] if args.quiet else ["-ra", "--durations=10"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
+    if not args.json:
+        return subprocess.run(command, cwd=root).returncode
+    with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
+        report = Path(scratch) / "report.xml"
+        code = subprocess.run(
+            [*command, f"--junitxml={report}"], cwd=root, stdout=subprocess.DEVNULL if args.quiet else sys.stderr
+        ).returncode
+        figures = {"exit_code": code, **_counts(report)}
+    output.result(figures, f"{figures['tests']} tests, {figures['failures'] + figures['errors']} failed")
+    return code
+
+
+def _counts(report: Path) -> dict[str, int]:
+    """Return the numbers of tests, failures, errors and skipped tests in pytest's JUnit report; zeros where there is none."""
+    from xml.etree import ElementTree
+
+    suites = ElementTree.parse(report).getroot().iter("testsuite") if report.exists() else ()
+    total = dict.fromkeys(("tests", "failures", "errors", "skipped"), 0)
+    for suite in suites:
+        for name in total:
+            total[name] += int(suite.get(name, 0))
+    return total
 
 
 def _provide_browser() -> None:
-    """Chromium, where it may be installed without asking; the tests that need it skip themselves otherwise."""
+    """Install Chromium when running as root; otherwise the tests that need it are skipped."""
     from gravcomp.environment import system_packages
     from gravcomp.environment.errors import SetupError
     from gravcomp.view.browser import find_chromium
@@ -43,9 +73,9 @@ def _provide_browser() -> None:
         return
     names = ", ".join(f"{name} ({use})" for name, use in _BROWSER.items())
     if os.geteuid() != 0:
-        print(f"Left out: {names}; to include it: sudo apt-get install -y {' '.join(_BROWSER)}", file=sys.stderr)
+        output.note(f"Skipped: {names}; to include them: sudo apt-get install -y {' '.join(_BROWSER)}")
         return
     try:
         system_packages.install(list(_BROWSER), names)
     except SetupError as error:
-        print(f"Left out: {names}: {error}", file=sys.stderr)
+        output.note(f"Skipped: {names}: {error}")

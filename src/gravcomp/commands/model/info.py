@@ -1,22 +1,27 @@
-"""`gravcomp model info ROBOT`: what the model of a robot is, and how exact its mesh."""
+"""`gravcomp model info ROBOT`: mass, lengths, natural frequencies and reach of a robot's model, and the error of its mesh."""
 
 import argparse
 import dataclasses
-import json
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from gravcomp.commands import output
+
+if TYPE_CHECKING:
+    from gravcomp.description import Robot
+    from gravcomp.simulation import Shape, Simulator
 
 _GRAVITY = 9.81
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
-    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument(
+        "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the subcommand; 0: done."""
+    """Run the subcommand. Returns 0. Raises ConfigError, MeshError."""
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.mesh.quality import mesh_quality
@@ -39,13 +44,15 @@ def run(args: argparse.Namespace) -> int:
         "reach": _reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
     }
-    print(json.dumps(figures) if args.json else _table(figures))
+    output.result(figures, _text(figures))
     return 0
 
 
-def _reach(simulator) -> list[dict]:
-    """Where each cable alone brings the weightless robot: with growing tension, up to the limits or a half turn."""
-    from gravcomp.full_model.statics import CableInput
+def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
+    """Return how far each cable alone moves the weightless robot: with growing tension, up to the limits or a half turn."""
+    import numpy as np
+
+    from gravcomp.full_model.cable_input import CableInput
 
     robot, reach = simulator.robot, []
     for index, name in enumerate(robot.cable_names):
@@ -54,7 +61,7 @@ def _reach(simulator) -> list[dict]:
         for tension in np.linspace(0.0, robot.limits.tension_max, 41)[1:]:
             tensions = np.zeros(len(robot.cables))
             tensions[index] = tension
-            # Where following ends, so does the reach: no need to search for how much of this last part is carried.
+            # The reach ends where tracking ends; the load step is not divided further.
             if not simulator.solver.track(np.zeros(3), CableInput(tension=tensions), iterations=10).converged:
                 break
             shape = simulator.step(np.zeros(3), tension=tensions)
@@ -73,12 +80,14 @@ def _reach(simulator) -> list[dict]:
     return reach
 
 
-def _mesh_error(robot, sag) -> dict:
-    """How far the horizontal robot's tip moves when the mesh is refined; bodies from files say how to refine them."""
+def _mesh_error(robot: "Robot", sag: "Shape") -> dict[str, Any]:
+    """Return how far the horizontal robot's tip moves when the mesh is refined; for a body from a file return advice only."""
+    import numpy as np
+
     from gravcomp.simulation import Simulator
 
     if robot.body is not None:
-        return {"refinement": "mesh the file finer (or lower element_size_mm) and compare horizontal_tip_mm"}
+        return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
     elements = robot.elements
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
     change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve([-_GRAVITY, 0.0, 0.0])
@@ -92,7 +101,7 @@ def _mesh_error(robot, sag) -> dict:
     }
 
 
-def _table(figures: dict) -> str:
+def _text(figures: dict[str, Any]) -> str:
     mesh = figures["mesh"]
     lines = [
         f"{figures['robot']} ({figures['file']})",
@@ -100,10 +109,10 @@ def _table(figures: dict) -> str:
         "  cables " + ", ".join(f"{name} {cable['length_mm']:.1f} mm" for name, cable in figures["cables"].items()),
         "  natural frequencies " + ", ".join(f"{f:.2f}" for f in figures["natural_frequency_hz"]) + " Hz",
         "  tip when horizontal, cables released: " + ", ".join(f"{x:.2f}" for x in figures["horizontal_tip_mm"]) + " mm",
-        "  reach without gravity, each cable alone:",
+        "  reach of each cable alone, without gravity:",
     ]
     lines += [
-        f"    {r['cable']}: {r['lateral_mm']:.1f} mm to the side, tip turned {r['tilt_deg']:.0f} deg,"
+        f"    {r['cable']}: {r['lateral_mm']:.1f} mm lateral, tip tilted by {r['tilt_deg']:.0f} deg,"
         f" at {r['tension_n']:.2f} N and {r['displacement_mm']:.1f} mm"
         for r in figures["reach"]
     ]
@@ -113,7 +122,8 @@ def _table(figures: dict) -> str:
     )
     if "tip_change_when_refined_mm" in mesh:
         lines.append(
-            f"  refined twice, the horizontal tip moves {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"
+            f"  with twice the elements along and around the horizontal tip moves by"
+            f" {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"
         )
     else:
         lines.append(f"  refinement: {mesh['refinement']}")

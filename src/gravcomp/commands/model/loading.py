@@ -1,40 +1,52 @@
-"""What `solve` and `view` have in common: a robot and its load from the command line, and the shape."""
+"""Arguments that `solve` and `view` share, a robot and its load, and the shape that they give."""
 
 import argparse
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gravcomp.inverse import Command
+    from gravcomp.simulation import Shape, Simulator
 
 
 def add_load_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare robot, gravity and what is done to the cables."""
-    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
+    """Declare the robot, gravity and the input to the cables."""
+    parser.add_argument(
+        "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
+    )
     parser.add_argument(
         "--gravity", nargs=3, type=float, default=[-9.81, 0.0, 0.0], metavar=("X", "Y", "Z"),
         help="m/s^2 in soft_base, z along the robot (default: -9.81 0 0, the robot horizontal)",
     )  # fmt: skip
     cables = parser.add_mutually_exclusive_group()
-    cables.add_argument("--tension", nargs="+", type=float, metavar="N", help="tension of every cable")
+    cables.add_argument("--tension", nargs="+", type=float, metavar="N", help="tension of every cable, N")
     cables.add_argument(
         "--displacement",
         nargs="+",
         type=float,
         metavar="MM",
-        help="displacement of every cable, pulled in is positive; nan: released",
+        help="displacement of every cable, mm, positive: pulled in; nan: released",
     )
     cables.add_argument(
         "--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to reach with the cables, mm"
     )
     parser.add_argument("--direction", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip direction to reach, with --target")
-    parser.add_argument("--full", action="store_true", help="the full model even where a reduced one is built")
+    parser.add_argument("--full", action="store_true", help="use the full model even when a reduced model exists")
 
 
-def loaded_shape(args: argparse.Namespace):
-    """Simulator, shape and, with a target, the controller's last command (else None). Raises ValueError, MeshError."""
+def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command | None]":
+    """Return the simulator, the shape and, with a target, the controller's last command (else None).
+
+    Raises ConfigError, ValueError, MeshError when the robot or an argument cannot be used.
+    """
+    import numpy as np
+
     from gravcomp.description import load_robot_file
     from gravcomp.simulation import Simulator
 
     if args.direction is not None and args.target is None:
-        raise ValueError("--direction is given without --target")
+        raise ValueError("--direction needs --target, which is not given")
     simulator = Simulator(load_robot_file(args.robot).robot, reduced=not args.full)
     gravity = np.array(args.gravity)
     if args.target is not None:
@@ -43,13 +55,17 @@ def loaded_shape(args: argparse.Namespace):
     displacement = None if args.displacement is None else 1e-3 * np.array(args.displacement)
     shape = simulator.solve(gravity, displacement, args.tension)
     if not args.full and not shape.status:
-        # Where a reduced model is built it serves the shape, from the full model's solution on.
+        # Where a reduced model exists it gives the shape, starting from the full model's solution.
         shape = simulator.step(gravity, displacement, args.tension)
     return simulator, shape, None
 
 
-def _reached(simulator, gravity: np.ndarray, target, direction):
-    """The closed loop of model and inverse problem, run until neither moves any more."""
+def _reached(
+    simulator: "Simulator", gravity: "np.ndarray", target: list[float], direction: list[float] | None
+) -> "tuple[Shape, Command]":
+    """Run the closed loop of model and inverse problem until the tip is at rest. `target` in mm."""
+    import numpy as np
+
     from gravcomp.inverse import InverseController, Target
 
     weight = 0.01 if direction is not None else 0.0

@@ -1,21 +1,21 @@
-"""`gravcomp model solve ROBOT`: one equilibrium, its shape and its cables."""
+"""`gravcomp model solve ROBOT`: one equilibrium, with its shape and cables."""
 
 import argparse
-import json
+from typing import Any
 
-import numpy as np
-
+from gravcomp.commands import output
 from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
     add_load_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the subcommand; 0: solved, 1: no equilibrium was found."""
+    """Run the subcommand. Returns 0: solved, 1: no equilibrium was found. Raises ConfigError, ValueError, MeshError."""
+    import numpy as np
+
     simulator, shape, command = loaded_shape(args)
     figures = {
         "robot": simulator.robot.name,
@@ -43,11 +43,11 @@ def run(args: argparse.Namespace) -> int:
             "controller": command.code.name.lower(),
             "controller_message": command.message,
         }
-    print(json.dumps(figures) if args.json else _table(figures))
+    output.result(figures, _text(figures))
     return 1 if figures["status"] in ("not_converged", "failed") else 0
 
 
-def _table(figures: dict) -> str:
+def _text(figures: dict[str, Any]) -> str:
     def row(values: list, digits: int = 3) -> str:
         return ", ".join(f"{value:.{digits}f}" for value in values)
 

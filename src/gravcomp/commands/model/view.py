@@ -1,10 +1,15 @@
-"""`gravcomp model view ROBOT`: a picture of the straight and of the deformed robot."""
+"""`gravcomp model view ROBOT`: draw the straight and the deformed robot."""
 
 import argparse
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from gravcomp.commands import output
 from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gravcomp.mesh import Mesh
 
 # Corners of an element's faces, in VTK's node order.
 _FACES = {
@@ -18,13 +23,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
     add_load_arguments(parser)
     parser.add_argument(
-        "--out", default="robot.png", metavar="FILE", help="picture to write: .png, .svg or .pdf (default: robot.png)"
+        "--out", default="robot.png", metavar="FILE", help="image to write: .png, .svg or .pdf (default: robot.png)"
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the subcommand; 0: written."""
+    """Run the subcommand. Returns 0: the image is written. Raises ConfigError, ValueError, MeshError."""
+    from gravcomp.environment.packages import provide_extra
+
+    provide_extra("reports")
     import matplotlib
+    import numpy as np
 
     matplotlib.use("Agg")
     from matplotlib.figure import Figure
@@ -48,12 +57,15 @@ def run(args: argparse.Namespace) -> int:
     tip = ", ".join(f"{value:.1f}" for value in 1e3 * shape.tip_position)
     axes.set_title(f"{simulator.robot.name}: tip at {tip} mm")
     figure.savefig(args.out, dpi=150)
-    print(f"{args.out}: tip at {tip} mm, residual {shape.residual:.1e} N")
+    figures = {"file": args.out, "tip_position_mm": 1e3 * shape.tip_position, "residual_n": shape.residual}
+    output.result(figures, f"{args.out}: tip at {tip} mm, residual {shape.residual:.1e} N")
     return 0
 
 
-def _surface(mesh) -> np.ndarray:
-    """(f, 3 or 4) corner nodes of the faces that belong to one element only."""
+def _surface(mesh: "Mesh") -> "np.ndarray":
+    """Return the corner nodes (f, 3 or 4) of the faces that belong to a single element."""
+    import numpy as np
+
     faces = mesh.elements[:, np.array(_FACES[mesh.kind])].reshape(-1, len(_FACES[mesh.kind][0]))
     _, index, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[index[count == 1]]

@@ -1,0 +1,62 @@
+"""`gravcomp docs`: build the documentation of the Python interface, with the repository's pages, as HTML."""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from gravcomp.commands import output
+
+CONFIGURATION = Path("src/doc/api")
+"""Folder of Sphinx's conf.py and of the index page, relative to the repository."""
+
+_LEFT_OUT = (".*", "build", "install", "log", "reports", "__pycache__", "*.egg-info")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.description = "Build the documentation of the Python interface with Sphinx. A warning counts as an error."
+    parser.add_argument("--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Build. Returns 0: built without warnings, 1: not. Raises ConfigError, and SetupError when Sphinx cannot be installed."""
+    from gravcomp.config import ConfigError
+    from gravcomp.environment.packages import provide_extra
+
+    provide_extra("development")
+    root = Path(os.environ["GRAVCOMP_ROOT"])
+    out = Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out is {out}: cannot be created: {error.strerror}") from error
+    output.note("sphinx ...")
+    built, text = build(root, out)
+    if not built:
+        print(text, file=sys.stderr, flush=True)
+    pages = sorted(out.rglob("*.html"))
+    output.result({"built": built, "out": str(out), "pages": len(pages)}, f"{out / 'index.html'}: {len(pages)} pages")
+    return 0 if built else 1
+
+
+def build(root: Path, out: Path) -> tuple[bool, str]:
+    """Run Sphinx on the repository `root`, HTML into `out`. Returns whether there was no warning, and the warnings.
+
+    Sphinx reads a copy of the repository, because it writes the pages of the modules next to their index.
+    """
+    with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
+        source = Path(scratch) / "source"
+        shutil.copytree(root, source, ignore=shutil.ignore_patterns(*_LEFT_OUT), symlinks=True)
+        done = subprocess.run(
+            [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", f"{scratch}/doctrees", "-c",
+             str(source / CONFIGURATION), str(source), str(out)],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(source / "src"), os.environ.get("PYTHONPATH", "")])},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )  # fmt: skip
+    return done.returncode == 0, done.stdout.replace(f"{source}/", "").strip()

@@ -1,0 +1,58 @@
+"""Output of the commands: the result on stdout; progress, notes and errors on stderr.
+
+With --json the result is exactly one line on stdout, a JSON object. With --quiet nothing but errors is printed on stderr.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_options = argparse.Namespace(json=False, quiet=False)
+
+
+def configure(*, json: bool, quiet: bool) -> None:
+    """Set what --json and --quiet ask for; once per process, before the command runs."""
+    _options.json, _options.quiet = json, quiet
+
+
+def note(text: str) -> None:
+    """Print a note on stderr unless --quiet was given."""
+    if not _options.quiet:
+        print(text, file=sys.stderr, flush=True)
+
+
+def console() -> "Console":
+    """Return a console for progress, notes and tables beside the result: stderr, silent with --quiet."""
+    return _console(sys.stderr, quiet=_options.quiet)
+
+
+def result(figures: Mapping[str, Any], readable: Any) -> None:
+    """Print the result of a command.
+
+    Without --json `readable` (text or a rich renderable) is printed on stdout. With --json `figures` is printed there as one
+    line, numbers that are not finite as null, and `readable` goes to stderr unless --quiet was given.
+    """
+    out = console() if _options.json else _console(sys.stdout)
+    if isinstance(readable, str):
+        # Plain text is neither wrapped nor read as markup.
+        out.print(readable, markup=False, soft_wrap=True)
+    else:
+        out.print(readable)
+    if _options.json:
+        from gravcomp.report.result import plain
+
+        print(json.dumps(plain(figures), default=str), flush=True)
+
+
+def _console(stream: TextIO, *, quiet: bool = False) -> "Console":
+    from rich.console import Console
+
+    # Rich takes 80 columns where there is no terminal, which would wrap the tables in logs and pipes.
+    width = None if stream.isatty() or "COLUMNS" in os.environ else 160
+    return Console(file=stream, quiet=quiet, highlight=False, width=width)
