@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
         " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
-        " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and measured/tip"
-        " (geometry_msgs/PoseStamped in soft_base)."
+        " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
+        " measured/tip (geometry_msgs/PoseStamped in soft_base)."
     )
     parser.add_argument(
         "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual' measures the virtual robot of the robot file"
