@@ -24,7 +24,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
-from gravcomp.motors.guard import GuardError
+from gravcomp.motors.guard_client import GuardError
 from gravcomp.motors.state import CableSnapshot, State
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run

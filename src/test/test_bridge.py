@@ -51,7 +51,7 @@ def test_the_first_commands_after_activation_do_not_jump():
 
 # Each: what happens, the state it leads to, within what time (s), what the message says.
 CAUSES = {
-    "stale command": (lambda b: b.run(0.3), State.HOLDING, 0.25, "no command by an IMU sample of the last 200 ms"),
+    "stale command": (lambda b: b.run(0.3), State.HOLDING, 0.25, "no command from an IMU sample of the last 200 ms"),
     "stale imu": (lambda b: (setattr(b, "imu", False), b.run(0.3, lambda t: GOAL)), State.HOLDING, 0.25, "no good IMU samples"),
     "nan": (lambda b: b.run(0.1, lambda t: [math.nan] * 6), State.HOLDING, 0.05, "not a number"),
     "infinite": (lambda b: b.run(0.1, lambda t: [math.inf] * 6), State.HOLDING, 0.05, "not a number"),
@@ -63,7 +63,7 @@ CAUSES = {
         lambda b: (b.bridge.command(GOAL, [], b.now, age=-3.0), b.run(0.01)),
         State.HOLDING,
         0.05,
-        "of the future",
+        "in the future",
     ),
     "one motor silent": (
         lambda b: (setattr(b.motors[4], "silent", True), b.run(0.3, lambda t: GOAL)),
@@ -213,7 +213,7 @@ def test_a_bridge_that_was_held_up_looks_before_it_drives():
     for motor in bench.motors:
         bench.bridge.on_frame(motor.feedback(), bench.now)
     bench.deliver(bench.bridge.tick(bench.now))
-    assert bench.bridge.state is State.FAULT and "held up for 50" in bench.bridge.message
+    assert bench.bridge.state is State.FAULT and "delayed by 50" in bench.bridge.message
     assert all(motor.current == 0.0 for motor in bench.motors)
     bench.run(1.0, lambda t: GOAL)
     assert bench.bridge.state is State.ACTIVE
@@ -293,7 +293,7 @@ def test_homing_finds_where_the_cables_become_taut():
     bench.run(40.0)
     assert bench.bridge.state is State.HOLDING, bench.bridge.message
     assert [m.displacement for m in bench.motors] == pytest.approx([0.004] * 6, abs=1e-4)
-    assert bench.bridge.report.count("of slack taken out") == 6 and "c1: +4.0" in bench.bridge.report
+    assert bench.bridge.report.count("of slack removed") == 6 and "c1: +4.0" in bench.bridge.report
     assert bench.bridge.snapshot().displacement == pytest.approx([0.0] * 6, abs=2e-5)
 
 

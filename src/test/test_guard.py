@@ -16,19 +16,20 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.multicast import private_channel
 from gravcomp.description.hardware import CanInterface, Hardware, Motor
-from gravcomp.motors.guard import ANSWER_TIMEOUT, GuardClient, GuardError, GuardSettings
+from gravcomp.motors.guard_client import GuardClient, GuardError
+from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT, GuardSettings
 
 # A stand-in for the bridge: beats until it is ended.
 BRIDGE = """
 import sys, time
 from gravcomp.description.hardware import CanInterface, Hardware, Motor
-from gravcomp.motors.guard import GuardClient
+from gravcomp.motors.guard_client import GuardClient
 from gravcomp.motors.state import RotorRecord
 can = CanInterface(channel=sys.argv[1])
 def record():
     now = time.monotonic()
     return {1: RotorRecord(10_000, 5, float(sys.argv[2]), now), 5: RotorRecord(20, 6, 0.0, now)}
-guard = GuardClient.connect(can, Hardware(motors=(Motor("a", 1), Motor("b", 5)), can=can), record())
+guard = GuardClient.connect(Hardware(motors=(Motor("a", 1), Motor("b", 5)), can=can), record())
 print("ready", flush=True)
 while guard.beat(record()):
     time.sleep(0.01)
@@ -56,7 +57,7 @@ def bridge(hardware, bus):
     process.send_signal(signal.SIGCONT)
     process.kill()
     process.wait()
-    GuardClient.connect(hardware.can, hardware).close()  # so that the guard ends soon
+    GuardClient.connect(hardware).close()  # so that the guard ends soon
 
 
 def start_bridge(hardware, rpm=0, **options):
@@ -101,7 +102,7 @@ def test_a_bridge_that_hangs_leaves_no_current_and_may_go_on(bridge, bus):
 
 def test_a_second_bridge_on_the_bus_is_refused(bridge, hardware):
     with pytest.raises(GuardError, match=f"another bridge .process {bridge.pid}. already drives"):
-        GuardClient.connect(hardware.can, hardware)
+        GuardClient.connect(hardware)
 
 
 def turn_on(hardware, rpm):
@@ -125,7 +126,7 @@ def test_the_next_bridge_gets_the_turns_counted_meanwhile(bridge, hardware):
     bridge.wait()
     count = turn_on(hardware, 70)
     time.sleep(0.05)
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     kept = {can_id: (rotor.count, rotor.zero, rotor.certain) for can_id, rotor in client.record.items()}
     assert kept == {1: (count, 5, True), 5: (20, 6, True)}
     client.close()
@@ -138,13 +139,13 @@ def test_turns_that_nobody_counted_are_told_to_the_next_bridge(hardware, bus):
     process.wait()
     time.sleep(0.1)
     turn_on(hardware, 2750)
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     assert not client.record[1].certain and client.record[5].certain
     client.close()
 
 
 def test_a_guard_that_hangs_is_ended_so_that_a_new_one_can_be_started(hardware, bus):
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     (guard,) = guards(hardware)
     guard.suspend()
     begin = time.monotonic()
@@ -152,11 +153,11 @@ def test_a_guard_that_hangs_is_ended_so_that_a_new_one_can_be_started(hardware, 
         assert time.monotonic() - begin < ANSWER_TIMEOUT + 1.0
         time.sleep(0.01)
     psutil.wait_procs([guard], timeout=5.0)
-    GuardClient.connect(hardware.can, hardware).close()
+    GuardClient.connect(hardware).close()
 
 
 def test_a_bridge_that_hung_itself_does_not_blame_the_guard(hardware, bus):
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     assert client.beat(None)
     time.sleep(ANSWER_TIMEOUT + 0.2)
     assert client.beat(None)
@@ -173,13 +174,13 @@ def test_turns_are_not_trusted_after_silence(bridge, hardware):
     bridge.kill()
     bridge.wait()
     time.sleep(hardware.watchdog.zero_timeout + 0.3)
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     assert client.record is None
     client.close()
 
 
 def test_a_clean_end_ends_the_guard(hardware, bus):
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     (guard,) = guards(hardware)
     client.close()
     psutil.wait_procs([guard], timeout=5.0)
@@ -193,7 +194,7 @@ def test_the_guard_outlives_the_bridges_process_group(hardware, bus):
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     assert zeros(bus, 1.0) == {0x200, 0x1FF}
-    GuardClient.connect(hardware.can, hardware).close()
+    GuardClient.connect(hardware).close()
 
 
 # The bridge itself, with two motors that hold a tension: commands as from a controller.
@@ -239,7 +240,7 @@ def driven(hardware, bus):
     process.send_signal(signal.SIGCONT)
     process.kill()
     process.wait()
-    GuardClient.connect(hardware.can, hardware).close()
+    GuardClient.connect(hardware).close()
     motors.close()
 
 
@@ -277,7 +278,7 @@ def test_a_guard_that_was_killed_or_hung_is_replaced_and_the_new_one_does_the_sa
     time.sleep(0.05)
     drain_now(bus)
     assert zeros(bus, 0.5) == {0x200, 0x1FF}
-    client = GuardClient.connect(hardware.can, hardware)
+    client = GuardClient.connect(hardware)
     assert {can_id: (rotor.count - rotor.zero, rotor.certain) for can_id, rotor in client.record.items()} == {
         1: (0, True),
         5: (0, True),

@@ -109,6 +109,11 @@ class Motor:
         0.0, edge="mm", minimum=-20, maximum=20, description="calibrated displacement of the cable at the motor's zero position"
     )
 
+    @property
+    def label(self) -> str:
+        """Name of the motor in messages: CAN id and cable."""
+        return f"motor {self.can_id} ({self.cable})"
+
 
 @dataclasses.dataclass(frozen=True)
 class Homing:

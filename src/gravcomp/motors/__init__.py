@@ -1,1 +1,1 @@
-"""Motors: from rotor counts to cable displacement, the position loop, its limits, homing, and the bridge's states."""
+"""Motors: encoders, position loops, current limits, homing, the state machine of the bridge, and its guard process."""

@@ -1,14 +1,15 @@
-"""The bridge at work: one thread that receives, controls at a fixed rate and sends, whatever the rest of the process does.
+"""The thread that runs the bridge: it receives, controls at a fixed rate and sends, independently of the rest of the process.
 
     bus --frames--> Bridge (states, loops) --currents--> bus          every control period
         --frames--> ImuStream --samples--> queue                      as they come
-    command() --> Bridge --currents--> bus                            at once, not at the next period
+    command() --> Bridge --currents--> bus                            immediately, not at the next period
 
-What others shall know (IMU samples, cable states) goes into a queue that is never waited for: a reader that hangs loses
-the oldest entries, not the control.
+IMU samples and cable states for the caller go into a queue that the thread never waits for: a caller that hangs loses the oldest
+entries, and the control goes on.
 """
 
 import collections
+import contextlib
 import dataclasses
 import queue
 import sys
@@ -16,56 +17,60 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
+import can
+
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.link import CanLink, lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import MOTOR_IDS, Hardware
 from gravcomp.motors.bridge import Bridge
-from gravcomp.motors.guard import GuardClient
+from gravcomp.motors.guard_client import GuardClient
 from gravcomp.motors.state import CableSnapshot, State, ZeroRecord
 
 RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
-"""Ids that the bridge takes from the bus."""
+"""Ids of the frames that the bridge uses."""
 
 HEATER_TIMEOUT = 0.5
-"""s without a heater command after which the duty is zero."""
+"""s without a heater command after which the duty becomes zero."""
 
-_NEAR = 0.15  # of a control period
-_BEAT_PERIOD = (
-    0.01  # s; at 25 mm/s a rotor makes a third of a turn in it, and the guard shall know the turns when the bridge dies
-)
+_NEAR = 0.15  # of a control period: frames that come so near to its end, end it
+# s; a rotor makes a third of a turn in it at 25 mm/s, so the guard's record has the right turns when the bridge dies.
+_BEAT_PERIOD = 0.01
 _HEATER_PERIOD = 0.1  # s
 _LONGEST_QUEUE = 256
-_SWITCH_INTERVAL = 5e-4  # s; Python's default of 5 ms would let another thread delay the control by that
-_ZEROS_AT_END = 5
+_SWITCH_INTERVAL = 5e-4  # s; with Python's default of 5 ms another thread could delay the control by as much
+_ZEROS_AT_END = 5  # frames
+_JOIN_TIMEOUT = 2.0  # s
 _PAUSE_AFTER_ERROR = 0.01  # s
 
 
 @dataclasses.dataclass(frozen=True)
 class DriverOptions:
-    """rate: control periods a second; state_rate: snapshots a second, beside one at every change of the state; guard: a guard process
-    is required.
-    """
+    """Options of the driver."""
 
-    rate: float = 250.0
-    state_rate: float = 100.0
-    zero: str = "start"
-    require_imu: bool = True
-    guard: bool = True
-    trace: bool = True
+    rate: float = 250.0  # Hz, of the control
+    state_rate: float = 100.0  # Hz, of the snapshots; every change of the state gives an additional one
+    zero: str = "start"  # one of ZERO_POLICIES
+    require_imu: bool = True  # hold the cables while no IMU samples come
+    guard: bool = True  # drive only with a guard process
+    trace: bool = True  # send CommandTrace frames
 
 
 class BridgeDriver:
-    """Runs a Bridge on its bus. Entries of `queue` are ImuSample and CableSnapshot; None ends it."""
+    """Runs a Bridge on its bus.
+
+    Attributes: bridge; imu (ImuStream); link; queue of ImuSample and CableSnapshot (None at the end); overruns (control periods
+    that were late by more than one period); delay (s, from IMU sample to current frame, of the last command followed).
+    """
 
     def __init__(self, hardware: Hardware, options: DriverOptions = DriverOptions(), *, link: CanLink | None = None):
         self.bridge = Bridge(hardware, zero=options.zero, require_imu=options.require_imu)
         self.imu = ImuStream()
         self.link = link or CanLink(hardware.can, RECEIVED_FRAMES)
         self.queue: queue.SimpleQueue[ImuSample | CableSnapshot | None] = queue.SimpleQueue()
-        self.overruns = 0  # control periods that came late by more than one
-        self.delay = 0.0  # s, of the last command followed: from IMU sample to current frame
+        self.overruns = 0
+        self.delay = 0.0
         self._hardware, self._options = hardware, options
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -74,12 +79,12 @@ class BridgeDriver:
         self._samples: collections.OrderedDict[int, ImuSample] = collections.OrderedDict()
         self._heater = (0.0, -float("inf"))
         self._heater_sequence = 0
-        self._told: State | None = None  # the last state in the queue
+        self._queued_state: State | None = None  # state of the last snapshot in the queue
 
     def open(self) -> None:
-        """Open the bus and begin to receive; no motor is driven. Raises BusError."""
+        """Open the bus and start to receive; no motor is driven. Raises BusError when the bus cannot be opened."""
         self.link.open()
-        # The calling thread too, and what it starts later: commands and samples shall not wait longer than the control does.
+        # For the calling thread and those that it starts: commands and samples must not wait longer than the control does.
         take_precedence()
         sys.setswitchinterval(_SWITCH_INTERVAL)
         with self._lock:
@@ -89,9 +94,9 @@ class BridgeDriver:
         self._thread.start()
 
     def activate(self) -> None:
-        """Drive. Raises GuardError when no guard process watches, or another bridge drives this bus."""
+        """Start to drive the motors. Raises GuardError when there is no guard process, or another bridge drives this bus."""
         if self._options.guard and self._guard is None:
-            self._guard = GuardClient.connect(self._hardware.can, self._hardware)
+            self._guard = GuardClient.connect(self._hardware)
             if self._guard.record:
                 with self._lock:
                     self.bridge.restore(self._guard.record)
@@ -99,16 +104,16 @@ class BridgeDriver:
             self.bridge.activate(time.monotonic())
 
     def deactivate(self) -> None:
-        """Zero current."""
+        """Send zero current and stop driving."""
         with self._lock:
             self.bridge.deactivate()
             self._send_zeros()
 
     def close(self) -> None:
-        """Zero current, close the bus, end the thread."""
+        """Send zero current, close the bus, and end the thread and the guard."""
         self._ending.set()
         if self._thread is not None:
-            self._thread.join(2.0)
+            self._thread.join(_JOIN_TIMEOUT)
             self._thread = None
         with self._lock:
             if self.link.is_open:
@@ -121,7 +126,10 @@ class BridgeDriver:
         self.queue.put(None)
 
     def command(self, displacement: Sequence[float], tension: Sequence[float], stamp_ns: int) -> str | None:
-        """As Bridge.command; `stamp_ns` is that of the IMU sample behind it on the host's clock, 0 for none. Sends at once."""
+        """Take a command as `Bridge.command` does, and send the currents immediately.
+
+        `stamp_ns` (host clock) is the stamp of the IMU sample from which the command was computed, 0 for none.
+        """
         age = time.time() - 1e-9 * stamp_ns if stamp_ns else 0.0
         with self._lock:
             now = time.monotonic()
@@ -135,7 +143,7 @@ class BridgeDriver:
         return reason
 
     def request(self, action: Callable[[Bridge, float], tuple[bool, str]]) -> tuple[bool, str]:
-        """Call `action(bridge, now)` and send what follows from it at once."""
+        """Call `action(bridge, now)`, send the resulting currents immediately, and return its answer."""
         with self._lock:
             now = time.monotonic()
             answer = action(self.bridge, now)
@@ -143,10 +151,11 @@ class BridgeDriver:
         return answer
 
     def heater(self, duty: float) -> None:
-        """The heater's duty 0..1; anything else counts as 0."""
+        """Set the heater's duty, 0..1; any other value counts as 0."""
         self._heater = (duty if 0.0 <= duty <= 1.0 else 0.0, time.monotonic())
 
     def snapshot(self) -> CableSnapshot:
+        """Return the present state of the bridge and the cables."""
         with self._lock:
             return self.bridge.snapshot()
 
@@ -156,17 +165,15 @@ class BridgeDriver:
         while not self._ending.is_set():
             try:
                 self._cycle()
-            except (
-                Exception
-            ) as error:  # nothing known; but a thread that ended would leave the motors to the guard, and no way back
+            except Exception as error:  # if the thread ended, only the guard would zero the motors, and resume would fail
                 self.bridge.stop(f"error in the bridge: {error!r}")
                 self.link.send(self.bridge.zero_frames())
                 time.sleep(_PAUSE_AFTER_ERROR)
 
     def _cycle(self) -> None:
-        """Receive until the next control period, or until frames come; then do what is due.
+        """Receive until the next control period or until frames come; then do what is due.
 
-        Frames that come near the end of a period end it: currents follow fresh feedback, and the thread wakes once for both.
+        Frames that come near the end of a period end it: the currents use the newest feedback, and the thread wakes once for both.
         """
         period, state_period = 1.0 / self._options.rate, 1.0 / self._options.state_rate
         near = _NEAR * period
@@ -181,20 +188,20 @@ class BridgeDriver:
                 self.overruns += now > self._next_tick + 2 * period
                 self._next_tick = now + period if frames else max(self._next_tick + period, now)
             record = self.bridge.zero_record() if now >= self._next_beat else None
-            changed = self.bridge.state is not self._told
+            changed = self.bridge.state is not self._queued_state
             snapshot = self.bridge.snapshot() if changed or now >= self._next_state else None
         if now >= self._next_beat:
             self._next_beat = now + _BEAT_PERIOD
             self._beat(record)
         if snapshot is not None:
             self._next_state = now + state_period if changed else max(self._next_state + state_period, now)
-            self._told = snapshot.state
+            self._queued_state = snapshot.state
             self._emit(snapshot)
         if now >= self._next_heater:
             self._next_heater = now + _HEATER_PERIOD
             self._send_heater(now)
 
-    def _take(self, frames: list, now: float) -> None:
+    def _take(self, frames: list[can.Message], now: float) -> None:
         wall = time.time()
         for frame in frames:
             late = lateness(frame, wall)
@@ -217,10 +224,8 @@ class BridgeDriver:
 
     def _emit(self, entry: ImuSample | CableSnapshot) -> None:
         if self.queue.qsize() > _LONGEST_QUEUE:
-            try:
+            with contextlib.suppress(queue.Empty):
                 self.queue.get_nowait()
-            except queue.Empty:
-                pass
         self.queue.put(entry)
 
     def _beat(self, record: ZeroRecord | None) -> None:
@@ -229,11 +234,11 @@ class BridgeDriver:
             threading.Thread(target=self._new_guard, args=[record], name="guard", daemon=True).start()
 
     def _new_guard(self, record: ZeroRecord | None) -> None:
-        """The guard died: start another; without one, hold no motor."""
+        """Start another guard after the last one died; stop the motors when that fails."""
         try:
-            guard = GuardClient.connect(self._hardware.can, self._hardware, record)
+            guard = GuardClient.connect(self._hardware, record)
         except Exception as error:
-            why = f"the guard is gone: {error}"  # the name `error` ends with this block, before the request runs
+            why = f"the guard is gone: {error}"
             self.request(lambda bridge, now: bridge.stop(why))
             return
         self._guard = guard

@@ -1,61 +1,64 @@
-"""Counting turns of a C610's rotor over the wrap at 8192, telling a jump from motion, and knowing when turns cannot be told.
+"""Counting the turns of a C610's rotor: its angle wraps at 8192, and feedback may be late, lost or wrong.
 
-The angle names the count up to whole turns. How far the rotor can have turned since the last feedback, by the speeds that it
-reported then and now, is an interval:
+The angle gives the count up to whole turns. The speeds in the last feedback (v_last) and in this one (v) bound how far the
+rotor can have turned in between:
 
     low  = min(0, v, v_last) (dt + TIME_UNCERTAINTY) - TOLERANCE - a dt^2 / 4
     high = max(0, v, v_last) (dt + TIME_UNCERTAINTY) + TOLERANCE + a dt^2 / 4
 
-It begins at none, since feedbacks come late: a rotor that seems to have had dt to turn may have had less. `a dt^2 / 4` is how
-far it gets beside a steady motion when it speeds up and slows down again in between. Of the counts with this angle
+The interval contains 0 because feedback may come late: the rotor may have had less time than dt. `a dt^2 / 4` is the additional
+distance of a rotor that accelerates and decelerates again in between. The number of counts with this angle in the interval
+decides:
 
-- none is in the interval: a jump. A corrupted frame, or two controllers with the same id;
-- one is: it is the count;
-- several are: the one nearest to (v + v_last) / 2 x dt is taken, and the count is `certain` no more. It may be off by whole turns.
+- none: the angle jumped. The frame is corrupted, or two controllers have the same id;
+- one: it is the count;
+- several: the one nearest to (v + v_last) / 2 x dt is taken. The count is no longer `certain`: it may be off by whole turns.
 
-What comes next may tell: when a receiver was held up, its frames come all at once, and for a count that has a turn too many there was
-no time since the doubt began. A distance d needs at least the t of |d| - tolerance = v t + a t^2 / 4, with the greater speed v of its two
-ends; all of them have to fit between the arrivals. Until this is known, or SETTLING_TIME is over, the encoder is `settling`.
+Later feedback may decide between several counts. When a receiver was delayed, its frames come all at once, and a count with a
+turn too many would have needed more time than has passed since the doubt began. A distance d takes at least the time t of
+|d| - tolerance = v t + a t^2 / 4, where v is the larger speed of its two ends; the sum of these times must fit between the
+arrivals. Until the turns are decided, or SETTLING_TIME is over, the encoder is `settling`.
 
-A rotor that stood before and stands now at the same angle has not moved, however long the silence.
+A rotor that was at rest before and is at rest now at the same angle has not moved, however long the silence was.
 """
 
 import dataclasses
 import math
 
 from gravcomp.description.hardware import COUNTS_PER_TURN
+from gravcomp.motors.state import RotorRecord
 
 JUMPS = 4
-"""So many implausible feedbacks are an encoder fault, two plausible ones making up for one implausible: four in a row, or
-every other one, as from two controllers with the same id."""
+"""Implausible feedbacks that make an encoder fault. Two plausible ones cancel one implausible, so that the fault needs four in a
+row, or every other one, as from two controllers with the same id."""
 
 SETTLING_TIME = 0.2
-"""s of feedback after which turns in doubt stay so: a receiver that was held up may be so again before it has caught up."""
+"""s of feedback after which undecided turns stay uncertain. A receiver may be delayed again before it has caught up."""
 
-_COUNTS_PER_S = COUNTS_PER_TURN / 60.0  # a rpm
-_TOLERANCE = 400.0  # counts, at standstill
-_STEP_TOLERANCE = 20.0  # counts, between two feedbacks whose turns are certain
-_TIME_UNCERTAINTY = 0.008  # s, of the frames' arrival
-_ACCELERATION = 2e6  # counts/s^2 of a; 0.2 m/s^2 of the cable
-_REST_SPEED, _REST_ANGLE = 30.0, 200.0  # rpm, counts (0.02 mm of cable): it stands, and where it stood
-_SPEED_LIMIT = 20_000  # rpm of the rotor: beyond what the motor can do
-_SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current: beyond what it can do between two feedbacks
+_COUNTS_PER_S = COUNTS_PER_TURN / 60.0  # per rpm
+_TOLERANCE = 400.0  # counts, at rest
+_STEP_TOLERANCE = 20.0  # counts, between two feedbacks with certain turns
+_TIME_UNCERTAINTY = 0.008  # s, of the arrival of a frame
+_ACCELERATION = 2e6  # counts/s^2, the `a` above; 0.2 m/s^2 of the cable
+_REST_SPEED, _REST_ANGLE = 30.0, 200.0  # rpm, counts (0.02 mm of cable): at rest, at the same angle
+_SPEED_LIMIT = 20_000  # rpm of the rotor; more than the motor reaches
+_SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current; more than the speed can change between two feedbacks
 
 
 @dataclasses.dataclass
 class _Doubt:
-    """The arrival of the last feedback before the doubt and of the first in it (s); by which whole turns the count may be off, and the
-    least time (s) that the rotor needs for what it has then turned since.
-    """
+    """An undecided number of turns."""
 
-    begin: float
-    since: float
-    needed: dict[int, float]
+    begin: float  # s, arrival of the last feedback before the doubt
+    since: float  # s, arrival of the first feedback in doubt
+    needed: dict[int, float]  # possible error of the count (turns) -> least time (s) for the distance turned since then
 
 
 class Encoder:
-    """The rotor's count (not wrapped) since its first feedback. Attributes: count (counts), speed (rpm), current (A), time (s), jumps
-    (implausible feedbacks less half the plausible ones since), rejected (since start).
+    """Counts the turns of one rotor.
+
+    Attributes: count (counts, not wrapped; None before the first feedback); speed (rpm), current (A) and time (s) of the last
+    feedback; jumps (implausible feedbacks minus half of the plausible ones since then); rejected (implausible ones in total).
     """
 
     def __init__(self) -> None:
@@ -67,82 +70,89 @@ class Encoder:
 
     @property
     def certain(self) -> bool:
-        """Whether the whole turns of the count are."""
+        """Whether the number of whole turns in the count is certain."""
         return not self._unsure and self._doubt is None
 
     @property
     def settling(self) -> bool:
-        """Whether the next feedbacks will tell the whole turns, or that they cannot be told."""
+        """Whether the number of turns is in doubt and the next feedbacks may still decide it."""
         return not self._unsure and self._doubt is not None
 
     def update(self, angle: int, speed: float, current: float, now: float) -> bool:
-        """Take a feedback: angle in counts, rotor speed in rpm, current in A, arrival in s. False when it is implausible."""
+        """Take a feedback: angle (counts), rotor speed (rpm), current (A), arrival (s). Return False when it is implausible."""
         if not 0 <= angle < COUNTS_PER_TURN or abs(speed) > _SPEED_LIMIT:
             return self._reject()
         if self.count is None:
             self.count = angle
         elif self._take_any:
             self.count += round(_wrap(angle - self.count))
-        elif not self._follow(angle, speed, now):
+        elif not self._follow(self.count, angle, speed, now):
             return self._reject()
         self.speed, self.current, self.time, self._take_any = speed, current, now, False
         self.jumps = max(0.0, self.jumps - 0.5)
         return True
 
     def resynchronise(self) -> None:
-        """Take the next feedback whatever its angle, at the nearest turn."""
+        """Accept any angle in the next feedback, at the nearest turn. The turns are uncertain from then on."""
         self.jumps, self._take_any = 0.0, True
         self._give_up()
 
     def trust(self) -> None:
-        """The count is right: somebody says so, or the zero was found anew."""
+        """Take the count as certain: the user has confirmed it, or homing has found the zero position."""
         self._unsure, self._doubt = False, None
 
     def forget(self) -> None:
-        """The turns are lost: count anew from the next feedback."""
+        """Begin to count again with the next feedback."""
         self.count, self.jumps, self._take_any = None, 0.0, False
         self.trust()
 
-    def restore(self, count: int, speed: float, time: float, certain: bool) -> None:
-        """Go on from what someone else kept: the count and the speed (rpm) at `time` (s)."""
-        self.count, self.speed, self.time = count, speed, time
-        self.jumps, self._take_any = 0.0, False
-        self._unsure, self._doubt = not certain, None
+    def record(self, zero: int) -> RotorRecord | None:
+        """Return what is needed to continue counting, with the zero position (counts); None before the first feedback."""
+        return None if self.count is None else RotorRecord(self.count, zero, self.speed, self.time, self.certain)
 
-    def _follow(self, angle: int, speed: float, now: float) -> bool:
-        """Move the count to `angle`; False when the rotor cannot have got there."""
+    def restore(self, rotor: RotorRecord) -> None:
+        """Continue counting from a record."""
+        self.count, self.speed, self.time = rotor.count, rotor.speed, rotor.time
+        self.jumps, self._take_any = 0.0, False
+        self._unsure, self._doubt = not rotor.certain, None
+
+    def _follow(self, count: int, angle: int, speed: float, now: float) -> bool:
+        """Move from `count` to `angle`. Return False when the rotor cannot have got there."""
         elapsed = max(0.0, now - self.time)
         if abs(speed - self.speed) > _SPEED_JUMP + _SPEED_RATE * elapsed:
             return False
         slowest, fastest = min(0.0, speed, self.speed) * _COUNTS_PER_S, max(0.0, speed, self.speed) * _COUNTS_PER_S
-        beside = 0.25 * _ACCELERATION * elapsed * elapsed
-        low = slowest * (elapsed + _TIME_UNCERTAINTY) - beside - _TOLERANCE
-        high = fastest * (elapsed + _TIME_UNCERTAINTY) + beside + _TOLERANCE
-        turned = _wrap(angle - self.count)
+        detour = 0.25 * _ACCELERATION * elapsed * elapsed
+        low = slowest * (elapsed + _TIME_UNCERTAINTY) - detour - _TOLERANCE
+        high = fastest * (elapsed + _TIME_UNCERTAINTY) + detour + _TOLERANCE
+        turned = _wrap(angle - count)
         if abs(speed) < _REST_SPEED and abs(self.speed) < _REST_SPEED and abs(turned) < _REST_ANGLE:
             turns = [0]
         else:
             predicted = 0.5 * (speed + self.speed) * _COUNTS_PER_S * elapsed
-            first = low + (angle - self.count - low) % COUNTS_PER_TURN
+            first = low + (angle - count - low) % COUNTS_PER_TURN
             if first > high:
                 return False
-            turned = predicted + _wrap(angle - self.count - predicted)
+            turned = predicted + _wrap(angle - count - predicted)
             if not low <= turned <= high:
                 turned = first
             before = round((turned - first) / COUNTS_PER_TURN)
             turns = [k - before for k in range(1 + int((high - first) // COUNTS_PER_TURN))]
-        self.count += round(turned)
+        self.count = count + round(turned)
         if self._doubt is None and len(turns) > 1:
             self._doubt = _Doubt(self.time, now, {0: 0.0})
         if self._doubt is not None:
             tolerance = _TOLERANCE if len(turns) > 1 else _STEP_TOLERANCE
             needed = {k: _least_time(turned + k * COUNTS_PER_TURN, slowest, fastest, tolerance) for k in turns}
-            self._settle(needed, now)
+            self.count += self._settle(self._doubt, needed, now) * COUNTS_PER_TURN
         return True
 
-    def _settle(self, needed: dict[int, float], now: float) -> None:
-        """Leave out the counts that the rotor had no time for; `needed`: what the last feedback may be off by, and the least time for it."""
-        doubt, room = self._doubt, now - self._doubt.begin + _TIME_UNCERTAINTY
+    def _settle(self, doubt: _Doubt, needed: dict[int, float], now: float) -> int:
+        """Exclude the counts that the rotor had no time to reach. Return the correction (turns) when one count remains, else 0.
+
+        `needed`: the possible errors (turns) of the step to the last feedback, and the least time (s) for each.
+        """
+        room = now - doubt.begin + _TIME_UNCERTAINTY
         together: dict[int, float] = {}
         for before, spent in doubt.needed.items():
             for turns, time in needed.items():
@@ -152,8 +162,9 @@ class Encoder:
         if not together or now - doubt.since > SETTLING_TIME:
             self._give_up()
         elif len(together) == 1:
-            self.count += next(iter(together)) * COUNTS_PER_TURN
             self._doubt = None
+            return next(iter(together))
+        return 0
 
     def _give_up(self) -> None:
         self._unsure, self._doubt = True, None
@@ -165,12 +176,12 @@ class Encoder:
 
 
 def _least_time(distance: float, slowest: float, fastest: float, tolerance: float) -> float:
-    """s that the rotor needs for the distance (counts) between two feedbacks with these speeds (counts/s; at most, at least 0)."""
+    """Return the least time (s) for a distance (counts), with speeds at its ends in [slowest, fastest] (counts/s)."""
     speed = fastest if distance > 0.0 else -slowest
     distance = max(0.0, abs(distance) - tolerance)
     return (math.sqrt(speed * speed + _ACCELERATION * distance) - speed) * 2.0 / _ACCELERATION
 
 
 def _wrap(counts: float) -> float:
-    """Into [-4096, 4096)."""
+    """Wrap into [-4096, 4096)."""
     return (counts + COUNTS_PER_TURN // 2) % COUNTS_PER_TURN - COUNTS_PER_TURN // 2

@@ -1,12 +1,12 @@
 """The cascaded position loop of one cable: setpoint within velocity and acceleration limits, position, velocity, current.
 
     setpoint:   |x_s'| <= v_max, |x_s''| <= a_max, and it stops on the target
-    velocity:   v_ref = x_s' + K_p (x_s - x), clipped to the velocity limit
+    velocity:   v_ref = x_s' + K_p (x_s - x), clamped to the velocity limit
     current:    i = K_v (v_ref - v) + K_i integral(v_ref - v) dt + T r / k_t
 
-T is the tension expected by the model, a feed-forward. The integral finds what friction takes. It stops growing while
-the current is at its limit, and rests while the cable stands within REST_ERROR of its setpoint: gears stick,
-and an integral that hunts below the friction makes them creep to and fro.
+T is the tension that the controller's model expects; it is a feed-forward. The integral compensates the friction. It does not
+grow while the current is at its limit. It is frozen while the cable is at rest within REST_ERROR of its setpoint: gears stick, and an
+integral that moves below the friction makes them creep back and forth (hunting).
 """
 
 import math
@@ -14,24 +14,28 @@ import math
 from gravcomp.description.hardware import Drive
 
 REST_ERROR = 4e-6
-"""m; the integral rests within it (a fifth of the accuracy asked of the loop)."""
+"""m; the integral is frozen within it (a fifth of the accuracy required of the loop)."""
 
 
 class PositionLoop:
-    """State of one cable's loop. Attributes: setpoint (m), setpoint_velocity (m/s)."""
+    """Position loop of one cable. Attributes: setpoint (m), setpoint_velocity (m/s)."""
 
     def __init__(self, drive: Drive):
         self._drive = drive
         self.reset(0.0)
 
     def reset(self, displacement: float) -> None:
-        """Begin at rest at the measured displacement (m)."""
+        """Start at rest at the measured displacement (m)."""
         self.setpoint, self.setpoint_velocity, self._integral = displacement, 0.0, 0.0
 
     def step(
         self, target: float, tension: float, displacement: float, velocity: float, dt: float, velocity_limit: float | None = None
     ) -> float:
-        """The current (A) that moves the cable toward `target` (m); `displacement` (m) and `velocity` (m/s) are measured."""
+        """Return the current (A) that moves the cable toward `target` (m).
+
+        `tension` (N) is the expected one, `displacement` (m) and `velocity` (m/s) are measured, `dt` (s) is the time since the
+        last step, `velocity_limit` (m/s) replaces the drive's.
+        """
         drive = self._drive
         limit = drive.velocity_limit if velocity_limit is None else velocity_limit
         self._advance(target, limit, dt)
@@ -39,8 +43,8 @@ class PositionLoop:
         wanted = min(max(self.setpoint_velocity + drive.position_gain * error, -limit), limit)
         feed_forward = min(max(tension, drive.pretension), drive.tension_limit) / drive.tension_per_ampere
         proportional = drive.velocity_gain * (wanted - velocity) + feed_forward
-        rests = abs(error) < REST_ERROR and self.setpoint_velocity == 0.0
-        integral = self._integral if rests else self._integral + drive.velocity_integral * (wanted - velocity) * dt
+        at_rest = abs(error) < REST_ERROR and self.setpoint_velocity == 0.0
+        integral = self._integral if at_rest else self._integral + drive.velocity_integral * (wanted - velocity) * dt
         current = proportional + integral
         if abs(current) < drive.current_limit or abs(integral) < abs(self._integral):
             self._integral = min(max(integral, -drive.current_limit), drive.current_limit)
@@ -50,7 +54,7 @@ class PositionLoop:
         if dt <= 0.0:
             return
         remaining, change = target - self.setpoint, self._drive.acceleration_limit * dt
-        # From v the setpoint can still stop on the target after this step: v dt + v^2 / (2 a_max) <= |remaining|.
+        # Largest v from which the setpoint can still stop on the target after this step: v dt + v^2 / (2 a_max) <= |remaining|.
         reachable = math.sqrt(change * change + 2 * self._drive.acceleration_limit * abs(remaining)) - change
         wanted = math.copysign(min(limit, reachable), remaining)
         self.setpoint_velocity += min(max(wanted - self.setpoint_velocity, -change), change)

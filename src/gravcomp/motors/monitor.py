@@ -1,14 +1,14 @@
-"""Faults of one motor that its own numbers tell: stall, runaway, a wrong sign.
+"""Detection of motor faults from feedback and command: stall, runaway, wrong sign.
 
-A condition must last before it counts: a gear that breaks away passes through all of them for some milliseconds. It lasts in
-the time of the motor's feedback, of which no pause counts for more than LONGEST_STEP: what nobody saw does not last, and a
-control that came late judges no motor by what it saw before.
+A condition must last before it counts as a fault, because a gear that breaks away meets all of them for some milliseconds. The
+duration is measured between feedback frames, and no interval counts for more than LONGEST_STEP: a condition that was not observed
+does not last, and a delayed control loop does not report a fault from old feedback.
 """
 
 from gravcomp.description.hardware import Drive, Watchdog
 
 LONGEST_STEP = 0.01
-"""s"""
+"""s; largest duration that an interval between two feedback frames counts for."""
 
 _STANDSTILL = 0.0005  # m/s
 _RUNAWAY_TIME = 0.04  # s
@@ -16,19 +16,22 @@ _NEAR_LIMIT = 0.95  # of the current limit
 
 
 class MotorMonitor:
-    """Watches one motor; `update` returns what is wrong, or None."""
+    """Watches one motor."""
 
     def __init__(self, drive: Drive, watchdog: Watchdog):
         self._drive, self._watchdog = drive, watchdog
         self.reset()
 
     def reset(self) -> None:
+        """Forget all conditions."""
         self._seen: float | None = None
-        self._lasted: dict[str, float | None] = dict.fromkeys(("stall", "lag", "overspeed", "sign"))
+        self._durations: dict[str, float] = {}  # s, of the conditions that are met now
 
     def update(self, seen: float, current: float, velocity: float, lag: float) -> str | None:
-        """`seen` (s): when the feedback came; `current` (A) as commanded, `velocity` (m/s) measured, `lag` (m) setpoint minus
-        measured displacement.
+        """Return what is wrong with the motor, or None.
+
+        `seen` (s) is the arrival of the feedback, `current` (A) the commanded one, `velocity` (m/s) the measured one, `lag` (m)
+        the setpoint minus the measured displacement.
         """
         self._step = 0.0 if self._seen is None else min(max(seen - self._seen, 0.0), LONGEST_STEP)
         self._seen = seen
@@ -37,7 +40,7 @@ class MotorMonitor:
         if self._lasts("stall", saturated and abs(velocity) < _STANDSTILL, watchdog.stall_time):
             return f"stalled: {current:.2f} A without motion"
         if self._lasts("lag", abs(lag) > watchdog.following_error, _RUNAWAY_TIME):
-            return f"is {1e3 * abs(lag):.1f} mm away from where it shall be"
+            return f"is {1e3 * abs(lag):.1f} mm away from its setpoint"
         if self._lasts("overspeed", abs(velocity) > watchdog.overspeed * drive.velocity_limit, _RUNAWAY_TIME):
             return f"runs away: {1e3 * velocity:.0f} mm/s"
         against = saturated and velocity * current < 0 and abs(velocity) > 0.5 * drive.velocity_limit
@@ -47,7 +50,7 @@ class MotorMonitor:
 
     def _lasts(self, what: str, condition: bool, duration: float) -> bool:
         if not condition:
-            self._lasted[what] = None
+            self._durations.pop(what, None)
             return False
-        self._lasted[what] = 0.0 if self._lasted[what] is None else self._lasted[what] + self._step
-        return self._lasted[what] >= duration
+        self._durations[what] = self._durations[what] + self._step if what in self._durations else 0.0
+        return self._durations[what] >= duration

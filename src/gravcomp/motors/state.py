@@ -1,11 +1,11 @@
-"""What others see of the bridge: its state, what its cables do, and the record by which rotors go on being counted."""
+"""State of the bridge as it is reported, and the record from which the counting of rotor turns continues."""
 
 import dataclasses
 import enum
 
 
 class State(enum.IntEnum):
-    """As in gravcomp_msgs/msg/CableState."""
+    """State of the bridge, with the numbers of gravcomp_msgs/msg/CableState."""
 
     UNCONFIGURED = 0
     INACTIVE = 1
@@ -17,12 +17,15 @@ class State(enum.IntEnum):
 
 
 DRIVING = frozenset({State.HOMING, State.ACTIVE, State.HOLDING})
-"""The states in which motors get current."""
+"""States in which the motors get current."""
 
 
 @dataclasses.dataclass(frozen=True)
 class CableSnapshot:
-    """What the cables are doing; one entry a cable. SI: m, m/s, A, N. `stamp` is that of the followed command, or None."""
+    """State of the bridge and of the cables at one time; lists have one entry per cable. SI: m, m/s, A, N.
+
+    `stamp` is that of the command which the bridge follows, or None.
+    """
 
     state: State
     message: str
@@ -36,8 +39,10 @@ class CableSnapshot:
 
 @dataclasses.dataclass(frozen=True)
 class RotorRecord:
-    """What another process or a later run needs to go on counting a rotor: its count and zero (counts), its speed (rpm) at `time`
-    (s, monotonic: the same in all processes of a host), and whether its whole turns are certain.
+    """Rotor of one motor: what another process or a later run needs to continue counting its turns.
+
+    `count` and `zero` are in counts, `speed` in rpm, `time` in s (monotonic, the same in all processes of a host);
+    `certain` says whether the number of whole turns in `count` is certain.
     """
 
     count: int
@@ -48,4 +53,4 @@ class RotorRecord:
 
 
 ZeroRecord = dict[int, RotorRecord]
-"""By CAN id."""
+"""Rotor records by CAN id."""

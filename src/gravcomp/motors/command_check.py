@@ -1,0 +1,43 @@
+"""Checks of a cable command before the bridge follows it."""
+
+import math
+from collections.abc import Sequence
+
+from gravcomp.description.hardware import Hardware
+
+_MARGIN = 5e-5  # m beyond a displacement limit that is taken as rounding
+_LEAST_AGE = -0.1  # s; clocks of two processes may differ by this
+
+
+class CommandCheck:
+    """Checks commands one after another; remembers the last one to find jumps."""
+
+    def __init__(self, hardware: Hardware):
+        self._motors, self._drive, self._watchdog = hardware.motors, hardware.drive, hardware.watchdog
+        self._last: list[float] | None = None
+        self._last_time = -math.inf
+
+    def objection(self, displacement: Sequence[float], tension: Sequence[float], now: float, age: float) -> str | None:
+        """Return why the command must not be followed, or None.
+
+        Checked in this order: number of values, finite values, displacement limits, age of the IMU sample, jump.
+        `displacement` in m, `tension` in N (may be empty), `now` and `age` in s.
+        """
+        n, watchdog = len(self._motors), self._watchdog
+        if len(displacement) != n or len(tension) not in (0, n):
+            return f"{len(displacement)} displacements and {len(tension)} tensions for {n} cables"
+        if not all(map(math.isfinite, displacement)) or not all(map(math.isfinite, tension)):
+            return "it contains a value that is not a number"
+        low, high = self._drive.displacement_min, self._drive.displacement_max
+        for motor, x in zip(self._motors, displacement):
+            if not low - _MARGIN <= x <= high + _MARGIN:
+                return f"{motor.cable} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
+        if not _LEAST_AGE <= age <= watchdog.command_timeout:
+            return f"its IMU sample is older than {1e3 * watchdog.command_timeout:.0f} ms or in the future"
+        last, last_time = self._last, self._last_time
+        self._last, self._last_time = list(displacement), now
+        if last is not None and now - last_time < watchdog.command_timeout:
+            jump = max(abs(x - y) for x, y in zip(displacement, last))
+            if jump > watchdog.command_jump:
+                return f"it jumps by {1e3 * jump:.1f} mm; allowed: {1e3 * watchdog.command_jump:g} mm"
+        return None
