@@ -17,10 +17,10 @@ import can
 
 from gravcomp.canbus import codec
 from gravcomp.description.hardware import MOTOR_IDS, Hardware
+from gravcomp.motors.cable_loops import CableLoops
 from gravcomp.motors.command_check import CommandCheck
 from gravcomp.motors.fault_watch import FaultWatch
 from gravcomp.motors.homing import HomingProcedure, Phase
-from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.output import CurrentOutput
 from gravcomp.motors.rotors import Rotors
 from gravcomp.motors.state import DRIVING, CableSnapshot, State, ZeroRecord
@@ -54,13 +54,11 @@ class Bridge:
         self.report = ""
         self._hardware, self._zero_policy, self._require_imu = hardware, zero, require_imu
         self._index = {motor.can_id: i for i, motor in enumerate(hardware.motors)}
-        n = len(hardware.motors)
         self._rotors = Rotors(hardware)
         self._faults = FaultWatch(hardware, self._rotors)
         self._check = CommandCheck(hardware)
-        self._loops = [PositionLoop(hardware.drive) for _ in range(n)]
+        self._loops = CableLoops(hardware, self._rotors, self._faults)
         self._output = CurrentOutput([m.can_id for m in hardware.motors], hardware.drive.current_limit)
-        self._target, self._tension, self._currents = [0.0] * n, [0.0] * n, [0.0] * n
         self._stamp: object | None = None
         self._command_time = self._imu_time = -math.inf
         self._good_commands = 0
@@ -117,8 +115,7 @@ class Bridge:
             return done, "no current; the cables were not paid out because the motors were not driving or have no zero"
         self._enter(State.HOLDING, "paying the cables out")
         self._releasing = True
-        self._target = [self._hardware.drive.displacement_min] * len(self._target)
-        self._tension = [0.0] * len(self._tension)
+        self._loops.pay_out()
         return True, self.message
 
     def home(self, now: float) -> tuple[bool, str]:
@@ -194,9 +191,7 @@ class Bridge:
             else:
                 self.message = f"command refused: {reason}"
             return reason
-        drive = self._hardware.drive
-        self._target = [min(max(x, drive.displacement_min), drive.displacement_max) for x in displacement]
-        self._tension = list(tension) or [0.0] * len(self._target)
+        self._loops.follow(displacement, tension)
         # Time of the IMU sample: commands that still wait in queues after a node has died do not keep the bridge active.
         self._command_time, self._stamp = now - max(age, 0.0), stamp
         self._good_commands += 1
@@ -222,8 +217,8 @@ class Bridge:
         if self.state in DRIVING:
             self._drive(now, min(elapsed, _LONGEST_STEP))
         if self.state not in DRIVING:
-            self._currents = [0.0] * len(self._currents)
-        return self._output.frames(self._currents, enabled=self.state in DRIVING)
+            self._loops.no_current()
+        return self._output.frames(self._loops.currents, enabled=self.state in DRIVING)
 
     def zero_frames(self) -> list[can.Message]:
         """Return frames with zero current, for the end of the bridge."""
@@ -234,7 +229,7 @@ class Bridge:
         return CableSnapshot(
             state=self.state,
             message=self.message,
-            command=list(self._target),
+            command=list(self._loops.target),
             displacement=self._rotors.displacement(),
             velocity=self._rotors.velocity(),
             current=self._rotors.current(),
@@ -260,12 +255,12 @@ class Bridge:
     def _fault(self, message: str, *, latched: bool) -> None:
         self._latched = self._latched or latched
         self._complete_since = None
-        self._currents = [0.0] * len(self._currents)
+        self._loops.no_current()
         self._enter(State.FAULT, message + (_RECOVERY if latched else ""))
 
     def _hold(self, message: str) -> None:
         """Keep the cables where their setpoints are now."""
-        self._target = [loop.setpoint for loop in self._loops]
+        self._loops.hold()
         self._enter(State.HOLDING, message)
 
     def _watch(self, now: float) -> None:
@@ -318,16 +313,16 @@ class Bridge:
                 self._start_homing(now)
                 return
             self._rotors.zeros.fill(self._rotors.counts())
-        self._reset_loops()
+        self._loops.reset()
         self._hold("waiting for commands")
 
     def _start_homing(self, now: float) -> None:
         self._rotors.zeros.begin_homing(self._rotors.counts())
-        self._reset_loops()
+        self._loops.reset()
         self._homing = HomingProcedure(
             self._hardware.homing, self._hardware.drive, self._hardware.cables, self._rotors.displacement(), now
         )
-        self._tension = [0.0] * len(self._tension)
+        self._loops.expect_no_tension()
         self._enter(State.HOMING, self._homing.progress)
 
     def _end_homing(self, homing: HomingProcedure) -> None:
@@ -337,14 +332,9 @@ class Bridge:
             return
         self._rotors.set_homed(homing.zeros)
         self._rotors.trust_turns()
-        self._reset_loops()
+        self._loops.reset()
         self._hold(f"homed: {homing.report}")
-        self._target = [0.0] * len(self._target)
-
-    def _reset_loops(self) -> None:
-        for loop, displacement in zip(self._loops, self._rotors.displacement()):
-            loop.reset(displacement)
-        self._faults.reset_monitors()
+        self._loops.follow([0.0] * len(self._hardware.motors), [])
 
     def _clear_faults(self) -> None:
         self._latched = self._turns_reported = False
@@ -354,25 +344,20 @@ class Bridge:
         return self._require_imu and now - self._imu_time > self._hardware.watchdog.imu_timeout
 
     def _drive(self, now: float, dt: float) -> None:
-        """Compute the currents of this period (A, in the motors' own direction)."""
+        """Compute the currents of this period, and end homing or release when they are done."""
         if self._rotors.settling:  # the displacement may be wrong by a turn, and the loops must not correct that
-            self._currents = [0.0] * len(self._currents)
+            self._loops.no_current()
             return
-        displacement, velocity = self._rotors.displacement(), self._rotors.velocity()
-        targets, limit = self._target, None
         if self._homing:
-            targets = self._homing.step(displacement, self._rotors.current(), now)
-            limit = self._hardware.homing.velocity
+            targets = self._homing.step(self._rotors.displacement(), self._rotors.current(), now)
             if self._homing.phase in (Phase.DONE, Phase.FAILED):
                 self._end_homing(self._homing)
                 return
             self.message = self._homing.progress
-        for i, loop in enumerate(self._loops):
-            current = loop.step(targets[i], self._tension[i], displacement[i], velocity[i], dt, limit)
-            fault = self._faults.motor_fault(i, current, velocity[i], loop.setpoint - displacement[i])
-            if fault:
-                self._fault(fault, latched=True)
-                return
-            self._currents[i] = self._hardware.motors[i].direction * current
-        if self._releasing and all(loop.setpoint == self._target[i] for i, loop in enumerate(self._loops)):
+            fault = self._loops.step(dt, targets, self._hardware.homing.velocity)
+        else:
+            fault = self._loops.step(dt)
+        if fault:
+            self._fault(fault, latched=True)
+        elif self._releasing and self._loops.arrived:
             self._enter(State.STOPPED, f"cables paid out, no current{_RECOVERY}")

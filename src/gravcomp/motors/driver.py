@@ -165,7 +165,7 @@ class BridgeDriver:
         while not self._ending.is_set():
             try:
                 self._cycle()
-            except Exception as error:  # if the thread ended, only the guard would zero the motors, and resume would fail
+            except Exception as error:  # without the thread only the guard would zero the motors, and resume would fail
                 self.bridge.stop(f"error in the bridge: {error!r}")
                 self.link.send(self.bridge.zero_frames())
                 time.sleep(_PAUSE_AFTER_ERROR)

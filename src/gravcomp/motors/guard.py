@@ -1,9 +1,9 @@
 """The guard: a process that zeroes the motor currents when the bridge dies or hangs.
 
 A C610 holds the last current that it received, so another process must send zeros when the bridge cannot. The bridge keeps a
-local connection to the guard and sends heartbeats over it. The connection ends when the bridge dies, and a bridge that hangs stops
-sending heartbeats; in both cases the guard sends zeros every PERIOD. The guard answers every heartbeat, so that the bridge can
-replace a guard that hangs. It also
+local connection to the guard and sends heartbeats over it. The connection ends when the bridge dies, and a bridge that hangs
+stops sending heartbeats; in both cases the guard sends zeros every PERIOD. The guard answers every heartbeat, so that the bridge
+can replace a guard that hangs. It also
 
 - admits one bridge per bus and refuses a second one,
 - counts the rotors' turns while no bridge does, so that the next bridge knows the zero positions,

@@ -5,8 +5,8 @@
     current:    i = K_v (v_ref - v) + K_i integral(v_ref - v) dt + T r / k_t
 
 T is the tension that the controller's model expects; it is a feed-forward. The integral compensates the friction. It does not
-grow while the current is at its limit. It is frozen while the cable is at rest within REST_ERROR of its setpoint: gears stick, and an
-integral that moves below the friction makes them creep back and forth (hunting).
+grow while the current is at its limit. It is frozen while the cable is at rest within REST_ERROR of its setpoint: gears stick,
+and an integral that moves below the friction makes them creep back and forth (hunting).
 """
 
 import math

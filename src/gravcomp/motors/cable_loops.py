@@ -1,0 +1,70 @@
+"""Position loops of all cables: from targets and expected tensions to motor currents."""
+
+from collections.abc import Sequence
+
+from gravcomp.description.hardware import Hardware
+from gravcomp.motors.fault_watch import FaultWatch
+from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.rotors import Rotors
+
+
+class CableLoops:
+    """The loops of the cables of `hardware`, with the measured state from `rotors`.
+
+    Attributes: target (m), currents (A, in the motors' own direction); one entry per cable.
+    """
+
+    def __init__(self, hardware: Hardware, rotors: Rotors, faults: FaultWatch):
+        self._hardware, self._rotors, self._faults = hardware, rotors, faults
+        n = len(hardware.motors)
+        self._loops = [PositionLoop(hardware.drive) for _ in range(n)]
+        self._tension = [0.0] * n
+        self.target, self.currents = [0.0] * n, [0.0] * n
+
+    @property
+    def arrived(self) -> bool:
+        """Whether every setpoint is on its target."""
+        return all(loop.setpoint == target for loop, target in zip(self._loops, self.target))
+
+    def reset(self) -> None:
+        """Start at rest at the measured displacements."""
+        for loop, displacement in zip(self._loops, self._rotors.displacement()):
+            loop.reset(displacement)
+        self._faults.reset_monitors()
+
+    def follow(self, displacement: Sequence[float], tension: Sequence[float]) -> None:
+        """Set targets (m), clamped to the displacement limits, and expected tensions (N; none: 0)."""
+        drive = self._hardware.drive
+        self.target = [min(max(x, drive.displacement_min), drive.displacement_max) for x in displacement]
+        self._tension = list(tension) or [0.0] * len(self.target)
+
+    def hold(self) -> None:
+        """Keep the cables where their setpoints are now; the expected tensions stay."""
+        self.target = [loop.setpoint for loop in self._loops]
+
+    def pay_out(self) -> None:
+        """Move all cables to `displacement_min`."""
+        self.follow([self._hardware.drive.displacement_min] * len(self.target), [])
+
+    def expect_no_tension(self) -> None:
+        """Set the expected tensions to 0."""
+        self._tension = [0.0] * len(self._tension)
+
+    def no_current(self) -> None:
+        """Set all currents to zero."""
+        self.currents = [0.0] * len(self.currents)
+
+    def step(self, dt: float, targets: Sequence[float] | None = None, velocity_limit: float | None = None) -> str | None:
+        """Compute the currents of one control period of `dt` s. Return the fault of a motor, or None.
+
+        `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing.
+        """
+        targets = self.target if targets is None else targets
+        displacement, velocity = self._rotors.displacement(), self._rotors.velocity()
+        for i, loop in enumerate(self._loops):
+            current = loop.step(targets[i], self._tension[i], displacement[i], velocity[i], dt, velocity_limit)
+            fault = self._faults.motor_fault(i, current, velocity[i], loop.setpoint - displacement[i])
+            if fault:
+                return fault
+            self.currents[i] = self._hardware.motors[i].direction * current
+        return None
