@@ -1,1 +1,1 @@
-"""CAN: the frames (gravcomp.dbc, FRAMES.md), their codec, and buses that come back after an error."""
+"""CAN: the frames (gravcomp.dbc, FRAMES.md), their codec, IMU samples from frames, and buses that are reopened after an error."""

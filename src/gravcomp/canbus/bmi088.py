@@ -1,4 +1,4 @@
-"""Scales of the Bosch BMI088: raw counts of the board's IMU frames to SI, by the range codes in BoardStatus [BMI088 data sheet].
+"""Scales of the Bosch BMI088 [BMI088 data sheet]: from counts to SI, by the range codes in BoardStatus.
 
 specific force [m/s^2] = counts / (LSB per g) x 9.80665        angular rate [rad/s] = counts x range / 32767
 """
@@ -14,10 +14,10 @@ GYROSCOPE_RANGE_DEG_S = (2000, 1000, 500, 250, 125)
 
 
 def accelerometer_scale(code: int) -> float:
-    """m/s^2 a count for the range code 0 to 3."""
+    """Return m/s^2 per count for the range code 0 to 3."""
     return STANDARD_GRAVITY / _LSB_PER_G[code]
 
 
 def gyroscope_scale(code: int) -> float:
-    """rad/s a count for the range code 0 to 4."""
+    """Return rad/s per count for the range code 0 to 4."""
     return math.radians(GYROSCOPE_RANGE_DEG_S[code]) / 32767.0

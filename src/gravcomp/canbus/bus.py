@@ -1,28 +1,31 @@
-"""Opening a CAN bus by interface and channel, with errors that say what to do."""
+"""Opening a CAN bus by interface and channel, with errors that say what the user can do."""
 
 import can
+from can.typechecking import CanFilters
 
 from gravcomp.canbus.multicast import LoopbackMulticastBus, enlarge_receive_buffer
 from gravcomp.description.hardware import CanInterface
 
 
 class BusError(Exception):
-    """The bus cannot be opened or used; the text is for people."""
+    """The bus cannot be opened. The text is shown to the user."""
 
 
 def open_bus(settings: CanInterface, frame_ids: list[int] | None = None) -> can.BusABC:
-    """Open the bus; with `frame_ids`, only these standard frames (and error frames) are received.
+    """Open the bus. With `frame_ids`, only these standard frames (and error frames) are received.
 
-    Raises BusError. `udp_multicast` with hop_limit 0 stays on this host, see `gravcomp.canbus.multicast`.
+    `udp_multicast` with hop_limit 0 stays on this host, see `gravcomp.canbus.multicast`. Raises BusError.
     """
-    filters = frame_ids and [{"can_id": i, "can_mask": 0x7FF, "extended": False} for i in frame_ids]
+    filters: CanFilters | None = None
+    if frame_ids:
+        filters = [{"can_id": i, "can_mask": 0x7FF, "extended": False} for i in frame_ids]
     name = f"{settings.interface} {settings.channel}".strip()
     try:
         if settings.interface == "udp_multicast" and settings.hop_limit == 0:
             return LoopbackMulticastBus(settings.channel, can_filters=filters)
         bus = can.Bus(interface=settings.interface, can_filters=filters, **_options(settings))
         if settings.interface == "socketcan":
-            enlarge_receive_buffer(bus.socket)
+            enlarge_receive_buffer(bus.socket)  # type: ignore[attr-defined]  # can.Bus returns a SocketcanBus here
         return bus
     except can.CanInterfaceNotImplementedError as error:
         known = ", ".join(sorted(can.VALID_INTERFACES))
@@ -34,7 +37,7 @@ def open_bus(settings: CanInterface, frame_ids: list[int] | None = None) -> can.
 
 
 def _options(settings: CanInterface) -> dict:
-    """The keyword arguments that this interface of python-can takes."""
+    """Return the keyword arguments for this interface of python-can."""
     if settings.interface == "udp_multicast":
         group, _, port = settings.channel.partition(":")
         return {"channel": group, "hop_limit": settings.hop_limit, "fd": False} | ({"port": int(port)} if port else {})
@@ -50,5 +53,5 @@ def _advice(settings: CanInterface) -> str:
             " restart-ms 100, and sudo ip link set " + (settings.channel or "can0") + " txqueuelen 1000"
         )
     if settings.interface == "slcan":
-        return "; is the adapter plugged in, and may this user open it (group dialout)?"
+        return "; is the adapter plugged in, and does this user have access to it (group dialout)?"
     return ""

@@ -1,16 +1,17 @@
-"""From the board's frames to IMU samples: put together, checked for gaps, repeats and order, stamped by the board's clock.
+"""IMU samples from the board's frames: assembled, checked for gaps, repeats and order, and stamped by the board's clock.
 
-A frame arrives late by what the bus, the driver and the scheduler add, never early. So the host time of a sample is the
-board's time plus the smallest difference seen, which may creep up to follow clocks that drift apart:
+A frame arrives late by the delays of bus, driver and scheduler, never early. So the host time of a sample is the board's time
+plus the smallest difference seen. That difference may grow slowly, to follow clocks that drift apart:
 
     offset(k) = min(offset(k-1) + DRIFT x (t_k - t_(k-1)), reception(k) - t_k),    stamp(k) = t_k + offset(k) <= reception(k)
 
-When all samples of a window come later than that by more than STEP, one of the clocks was set, or stood: the offset follows at once.
+When all samples of a window are later than that by more than STEP, one of the clocks was set or stopped: the offset follows
+immediately.
 """
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import can
 
@@ -18,53 +19,52 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.bmi088 import accelerometer_scale, gyroscope_scale
 
 DRIFT = 2e-4
-"""Creep of the offset, s/s: more than two crystals differ (2 x 50 ppm), and 2 us a sample."""
+"""Growth of the offset, s/s: more than the difference of two crystals (2 x 50 ppm); 2 us per sample."""
 
 STEP, STEP_WINDOW = 0.02, 5
-"""s; samples."""
+"""Delay (s) of all samples in a window (number of samples) after which the offset follows."""
 
 STUCK_SAMPLES = 10
-"""As many equal or saturated samples in a row are not a measurement: the BMI088's noise is a count and more on six axes."""
+"""Equal or saturated samples in a row that are a fault: the BMI088's noise is at least a count on six axes."""
 
 IMU_FRAMES = (0x310, 0x311, 0x312, 0x313)
 _FULL_SCALE = 32767  # counts
 _WRAP = 1 << 32  # us
-_SET_BACK = 1.0  # s by which the host's clock was set back at least
-_RESTART = 1_000_000  # us: a board time that goes back by more, or ahead of the reception by more, is a restart
+_SET_BACK = 1.0  # s; stamps that go back by more mean that the host's clock was set back
+_RESTART = 1_000_000  # us; a board time that goes back by more, or ahead of the reception by more, means a restart of the board
 
 
 class ImuSample(NamedTuple):
-    """stamp, reception (s, host); board_time (us, wraps); specific_force (m/s^2) and angular_rate (rad/s) along the sensor's
-    axes; temperature (degC).
-    """
+    """One IMU sample, along the sensor's axes."""
 
-    stamp: float
-    reception: float
+    stamp: float  # s, host clock
+    reception: float  # s, host clock
     sequence: int
-    board_time: int
-    specific_force: tuple[float, float, float]
-    angular_rate: tuple[float, float, float]
-    temperature: float
+    board_time: int  # us, wraps
+    specific_force: tuple[float, float, float]  # m/s^2
+    angular_rate: tuple[float, float, float]  # rad/s
+    temperature: float  # degC
 
 
 @dataclasses.dataclass
 class ImuCounters:
-    """Since the stream began."""
+    """Counters since the stream began."""
 
     samples: int = 0
-    lost: int = 0  # by the gaps of the sequence
+    lost: int = 0  # from the gaps of the sequence
     repeated: int = 0  # same or older board time
     rejected: int = 0  # wrong length or check
     restarts: int = 0  # of the board
 
 
 class BoardClock:
-    """Maps the board's microseconds to the host's clock."""
+    """Maps the board's time (us) to the host's clock."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
+        """Forget the offset, as after a restart of the board."""
         self._offset = math.inf
         self._time: float | None = None  # s, unwrapped
         self._last_us = 0
@@ -72,13 +72,16 @@ class BoardClock:
         self._least_delay, self._window = math.inf, 0
 
     def advance(self, board_time: int) -> int:
-        """us since the last sample, by the shorter way around the wrap; negative when older. 0 for the first one."""
+        """Return the time since the last sample (us, modulo the wrap); negative for an older sample, 0 for the first one."""
         if self._time is None:
             return 0
         return (board_time - self._last_us + _WRAP // 2) % _WRAP - _WRAP // 2
 
     def stamp(self, board_time: int, reception: float) -> float:
-        """Host time (s) of a sample that was received at `reception`; strictly increasing unless the host's clock was set back."""
+        """Return the host time (s) of a sample that was received at `reception` (s).
+
+        It increases strictly unless the host's clock was set back.
+        """
         elapsed = 1e-6 * self.advance(board_time)
         self._time = 1e-6 * board_time if self._time is None else self._time + elapsed
         self._last_us = board_time
@@ -99,13 +102,16 @@ class BoardClock:
 
 
 class ImuStream:
-    """Takes the board's frames, gives samples. Attributes: counters, status (the last BoardStatus, or None), stuck, saturated."""
+    """Makes samples from the board's frames.
+
+    Attributes: counters, status (values of the last BoardStatus, or None), stuck, saturated.
+    """
 
     def __init__(self) -> None:
         self.counters = ImuCounters()
-        self.status = None
+        self.status: Any = None
         self.stuck = self.saturated = False
-        self._parts: dict[str, tuple] = {}
+        self._parts: dict[str, Any] = {}
         self._sequence: int | None = None
         self._clock = BoardClock()
         self._last_reception = -math.inf
@@ -114,13 +120,11 @@ class ImuStream:
 
     @property
     def fault(self) -> str | None:
-        """Why its samples should not be trusted, in one sentence; None when nothing is known against them."""
+        """Reason why the samples must not be used, in one sentence; None without a fault."""
         if self.status is None:
-            return "the board has not told its status yet"
+            return "the board has not sent its status yet"
         if self.status.protocol != codec.PROTOCOL:
-            return (
-                f"the board speaks version {self.status.protocol} of the frames; {codec.PROTOCOL} is needed: update its firmware"
-            )
+            return f"the board uses version {self.status.protocol} of the frames; {codec.PROTOCOL} is needed: update its firmware"
         if int(self.status.flags) & 1:
             return "the board's IMU does not answer"
         if self.stuck:
@@ -130,7 +134,7 @@ class ImuStream:
         return None
 
     def on_frame(self, message: can.Message, reception: float) -> ImuSample | None:
-        """Take a frame received at `reception` (s, host clock); the sample that it completes, or None."""
+        """Take a frame received at `reception` (s, host clock). Return the sample that it completes, or None."""
         if message.arbitration_id not in IMU_FRAMES:
             return None
         try:
@@ -150,8 +154,8 @@ class ImuStream:
             return None
         return self._sample(acceleration, rate, values, reception)
 
-    def _sample(self, acceleration: tuple, rate: tuple, time: tuple, reception: float) -> ImuSample | None:
-        if self.status is None:  # without its ranges the counts mean nothing
+    def _sample(self, acceleration: Any, rate: Any, time: Any, reception: float) -> ImuSample | None:
+        if self.status is None:  # without the ranges the counts cannot be converted
             return None
         advance = self._clock.advance(time.time)
         if abs(advance) > _RESTART + 1e6 * max(0.0, reception - self._last_reception) or advance < -_RESTART:

@@ -1,9 +1,10 @@
-"""A CAN bus that comes back: receives and sends without raising, counts what goes wrong, and reopens with back-off.
+"""A CAN bus that is reopened after errors: it receives and sends without raising, counts errors, and reopens with back-off.
 
-The adapter may vanish, the controller may go bus-off, the transmit queue may overflow. None of it ends the caller's
-loop: `receive` and `send` tell by their results, `status` says what is wrong in one sentence.
+The adapter may be unplugged, the controller may go bus-off, the transmit queue may overflow. None of these ends the caller's
+loop: `receive` and `send` report them by their results, and `status` says in one sentence what is wrong.
 """
 
+import contextlib
 import dataclasses
 import threading
 import time
@@ -18,35 +19,36 @@ _FIRST_WAIT, _LONGEST_WAIT = 0.1, 2.0  # s, between attempts to reopen
 _OVERLOAD_TIME = 0.5  # s of failing sends after which the bus is reopened
 _MOST_AT_ONCE = 1024  # frames: 0.3 s of full traffic
 _ERROR_BUS_OFF = 0x40  # socketcan error class
-_WALL_CLOCK = 60.0  # s by which a frame's stamp is old at most if it is wall time
+_WALL_CLOCK = 60.0  # s; an older stamp of a frame is not wall time
 
 
 @dataclasses.dataclass
 class LinkCounters:
-    """Since the link was made."""
+    """Counters since the link was made."""
 
     received: int = 0
     sent: int = 0
     send_errors: int = 0
     error_frames: int = 0
-    lost: int = 0  # times that an open bus was lost
+    lost: int = 0  # how often an open bus was lost
     opened: int = 0
 
 
 def lateness(frame: can.Message, wall: float) -> float:
-    """s from when the kernel took the frame until `wall` (s, time.time()): a thread that comes late does not make a frame late.
+    """Return the time (s) from when the kernel received the frame until `wall` (s, time.time()); 0 if its stamp is not wall time.
 
-    0 for drivers whose stamps are no wall time.
+    With it, a delayed thread can date a frame correctly.
     """
     late = wall - frame.timestamp
     return late if 0.0 <= late < _WALL_CLOCK else 0.0
 
 
 class CanLink:
-    """The bus `settings`, received with the filter `frame_ids`, reopened whenever it is lost.
+    """The bus `settings`, filtered for `frame_ids`; it is reopened when it is lost.
 
-    `opener` opens the bus and raises BusError (for tests). Not opened until the first `open`, `receive` or `send`.
-    One thread receives; any thread may send.
+    It is opened by the first `open`, `receive` or `send`. One thread receives; any thread may send.
+    `opener` opens the bus and raises BusError; `clock` returns s. Both can be replaced for tests.
+    Attributes: counters, status.
     """
 
     def __init__(
@@ -67,10 +69,11 @@ class CanLink:
 
     @property
     def is_open(self) -> bool:
+        """Whether the bus is open."""
         return self._bus is not None
 
     def open(self) -> None:
-        """Open now. Raises BusError."""
+        """Open the bus if it is not open. Raises BusError."""
         with self._lock:
             if self._bus is None:
                 self._bus = self._opener(self._settings, self._frame_ids)
@@ -78,9 +81,9 @@ class CanLink:
                 self.counters.opened += 1
 
     def receive(self, timeout: float) -> list[can.Message]:
-        """Every frame waiting, or the first to come within `timeout` (s); empty when there is none or no bus.
+        """Return all waiting frames, or wait for the first one up to `timeout` (s); empty when none comes or there is no bus.
 
-        While there is no bus the time-out is slept out, so that a loop around this keeps its pace.
+        Without a bus it sleeps for the time-out, so that the caller's loop keeps its pace.
         """
         deadline = self._clock() + timeout
         frames: list[can.Message] = []
@@ -102,12 +105,12 @@ class CanLink:
                         break
                     continue
                 frames.append(frame)
-        except Exception as error:  # drivers raise what they like when their adapter vanishes
+        except Exception as error:  # drivers raise different exceptions when their adapter is unplugged
             self._lose(str(error) or type(error).__name__)
         return frames
 
     def send(self, frames: Iterable[can.Message]) -> bool:
-        """Send in order; False when a frame was not taken (no bus, full queue, vanished adapter)."""
+        """Send the frames in order. Return False when one was not accepted (no bus, full queue, adapter unplugged)."""
         if not self._ensure_open():
             return False
         with self._lock:
@@ -129,6 +132,7 @@ class CanLink:
                 return False
 
     def close(self) -> None:
+        """Close the bus; it is not reopened by `receive` or `send`."""
         with self._lock:
             bus, self._bus = self._bus, None
             self._next_attempt = float("inf")
@@ -165,8 +169,6 @@ class CanLink:
 
 
 def _shut(bus: can.BusABC | None) -> None:
-    try:
-        if bus is not None:
+    if bus is not None:
+        with contextlib.suppress(Exception):  # a bus without its adapter cannot always be shut down
             bus.shutdown()
-    except Exception:  # a bus whose adapter is gone cannot always be shut down
-        pass

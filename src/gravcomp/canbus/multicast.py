@@ -1,9 +1,9 @@
-"""A CAN bus among the processes of one host: python-can's `udp_multicast` frames over the loopback interface alone.
+"""A CAN bus between the processes of one host: python-can's `udp_multicast` frames over the loopback interface.
 
-The datagrams are those of python-can's `udp_multicast` interface, so its tools (`python -m can.logger`) can listen.
-Its own bus class needs a route for multicast and sends on the default network interface; this one joins and sends on
-the loopback interface, so that it works without any network and no frame leaves the host. It does not hear its own
-frames, ignores what is not a frame (`undecodable` counts that), and hears only its own group and port.
+The datagrams are those of python-can's `udp_multicast` interface, so its tools (`python -m can.logger`) can receive them.
+python-can's own bus class needs a route for multicast and sends on the default network interface; this one uses the loopback
+interface, so that it works without a network and no frame leaves the host. It does not receive its own frames, receives only from
+its own group and port, and ignores datagrams that are not frames (counted in `undecodable`).
 """
 
 import select
@@ -22,8 +22,8 @@ _LOOPBACK = socket.inet_aton("127.0.0.1")
 _SO_TIMESTAMPNS = 35
 _TIMESPEC = struct.Struct("@ll")
 _SO_RCVBUFFORCE = 33
-_RECEIVE_BUFFER = 1 << 20  # bytes: some 2500 frames, 0.7 s of full traffic
-_TAKEN: list[socket.socket] = []  # the ports of private_channel
+_RECEIVE_BUFFER = 1 << 20  # bytes: about 2500 frames, 0.7 s of full traffic
+_TAKEN: list[socket.socket] = []  # keep the ports of private_channel
 
 
 class LoopbackMulticastBus(can.BusABC):
@@ -33,7 +33,7 @@ class LoopbackMulticastBus(can.BusABC):
     """
 
     def __init__(self, channel: str = DEFAULT_CHANNEL, can_filters: can.typechecking.CanFilters | None = None, **_: object):
-        self._is_shutdown = True  # until it is open
+        self._is_shutdown = True  # until the bus is open
         group, port = parse_channel(channel)
         self.undecodable = 0
         self.channel_info = f"udp_multicast {group}:{port} on loopback"
@@ -70,7 +70,7 @@ class LoopbackMulticastBus(can.BusABC):
                 raise can.CanOperationError(f"cannot receive from {self.channel_info}: {error}") from error
             if address != self._own_address:
                 message = self._decode(datagram, ancillary)
-                # Filtered here: BusABC.recv would take a frame that is not wanted for the end of what is waiting.
+                # Filtered here: BusABC.recv would take an unwanted frame as a sign that no more frames wait.
                 if message is not None and self._is_wanted(message):
                     return message, True
 
@@ -84,14 +84,15 @@ class LoopbackMulticastBus(can.BusABC):
             if len(message.data) > 8 or message.dlc > 8 or (not message.is_remote_frame and message.dlc != len(message.data)):
                 raise ValueError("not a classic CAN frame")
             return message
-        except Exception:  # whatever a stranger sends to the port must not end the receiver
+        except Exception:  # any datagram from another program must be ignored, not end the receiver
             self.undecodable += 1
             return None
 
     def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
-        exact = filters is not None and all(f["can_mask"] == 0x7FF and f.get("extended") is False for f in filters)
-        self._ids = frozenset(f["can_id"] for f in filters) if exact else None
-        attach(self._receiver, self._own_address[1], self._ids and sorted(self._ids))
+        self._ids: frozenset[int] | None = None  # the only ids received, when the filters are exact
+        if filters is not None and all(f["can_mask"] == 0x7FF and f.get("extended") is False for f in filters):
+            self._ids = frozenset(f["can_id"] for f in filters)
+        attach(self._receiver, self._own_address[1], sorted(self._ids) if self._ids else None)
 
     def _is_wanted(self, message: can.Message) -> bool:
         if self._ids is None:
@@ -99,22 +100,28 @@ class LoopbackMulticastBus(can.BusABC):
         return message.arbitration_id in self._ids and not message.is_extended_id
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Send a frame. Raises can.CanOperationError; `timeout` is not used."""
         try:
             self._sender.sendto(pack_message(msg), self._destination)
         except OSError as error:
             raise can.CanOperationError(f"cannot send to {self.channel_info}: {error}") from error
 
     def fileno(self) -> int:
+        """Return the file descriptor of the receiving socket."""
         return self._receiver.fileno()
 
     def shutdown(self) -> None:
+        """Close the bus."""
         super().shutdown()
         self._sender.close()
         self._receiver.close()
 
 
 def parse_channel(channel: str) -> tuple[str, int]:
-    """('239.74.163.2', 43113) of '239.74.163.2:43113'; raises can.CanInitializationError when it is not a multicast group."""
+    """Return group and port of a channel, ('239.74.163.2', 43113) of '239.74.163.2:43113'.
+
+    Raises can.CanInitializationError when the channel is not a multicast group.
+    """
     group, _, port = channel.partition(":")
     try:
         number = int(port or DEFAULT_CHANNEL.partition(":")[2])
@@ -128,7 +135,10 @@ def parse_channel(channel: str) -> tuple[str, int]:
 
 
 def enlarge_receive_buffer(receiver: socket.socket) -> None:
-    """A receiver that is held up shall lose no frame. Beyond net.core.rmem_max (512 frames by default) root alone may ask."""
+    """Enlarge the receive buffer, so that a delayed receiver loses no frame.
+
+    Without the rights of root the kernel limits it to net.core.rmem_max (512 frames by default).
+    """
     try:
         receiver.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BUFFER)
     except OSError:
@@ -136,9 +146,9 @@ def enlarge_receive_buffer(receiver: socket.socket) -> None:
 
 
 def private_channel() -> str:
-    """A channel that no other run on this host uses: a group of its own, and a port that is taken for as long as this process lives.
+    """Return a channel that no other run on this host uses: its own group, and a port reserved until this process ends.
 
-    The port is kept on 127.0.0.1, where no bus listens, so that the kernel gives it to nobody else.
+    The port is reserved by a socket on 127.0.0.1, where no bus listens, so that the kernel gives it to no other process.
     """
     probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     probe.bind(("127.0.0.1", 0))

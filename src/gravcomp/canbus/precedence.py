@@ -1,4 +1,4 @@
-"""Who serves the bus goes before other processes: hardware does not wait, and neither must the loop that drives it."""
+"""Scheduling priority for the processes that serve the bus: hardware does not wait for other processes."""
 
 import contextlib
 import os
@@ -8,10 +8,11 @@ _NICENESS = -5
 
 
 def take_precedence() -> None:
-    """Let the calling thread, and the threads that it will start, go before other processes'.
+    """Raise the priority of the calling thread and of the threads that it starts from now on.
 
-    Where the user may not ask for it (`ulimit -e` says how far), the thread takes its turn. Linux weighs sessions against each other
-    first and the niceness of threads only within one (its autogroups), and the launcher gives each node a session of its own.
+    Without the right to do so (`ulimit -e` shows the limit) the priority stays as it is. Linux first compares sessions
+    (autogroups), and the niceness of threads only within a session; the launcher starts each node in its own session. So both
+    are set.
     """
     with contextlib.suppress(OSError), open("/proc/self/autogroup", "w") as autogroup:
         autogroup.write(str(_NICENESS))

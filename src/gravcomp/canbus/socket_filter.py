@@ -1,12 +1,12 @@
-"""What a socket of the loopback bus need not even receive: its owner's own frames, and ids that nobody asked for.
+"""Kernel filter for the sockets of the loopback bus: drops the process's own frames, and ids that it does not use.
 
-A CAN driver filters ids in the kernel. Here a classic BPF program (linux/filter.h) does: without it each process of a robot would be
-woken for every frame of all others, and for its own, which multicast brings back. It looks at the UDP header (source port at 0) and at
-the id where python-can's packing has it,
+A CAN driver filters ids in the kernel. For the loopback bus a classic BPF program (linux/filter.h) does it. Without the filter
+each process of a robot would be woken for every frame of all others, and for its own frames, which multicast returns. The program
+reads the UDP header (source port at byte 0) and the id at the place where python-can packs it:
 
     8: map  "timestamp" float64  28: 0xae "arb...  "arbitration_id"  43: 0xcd  44: id, 16 bits
 
-and lets through whatever is packed in another way: the bus looks at every frame again.
+A datagram that is packed differently passes; the bus checks every frame again.
 """
 
 import ctypes
@@ -24,9 +24,9 @@ _UINT16 = 0xCD
 
 
 def attach(receiver: socket.socket, own_port: int, frame_ids: Sequence[int] | None) -> bool:
-    """Filter what `receiver` gets: nothing sent from `own_port`; of 16-bit ids only `frame_ids`, or all (None).
+    """Let `receiver` drop frames sent from `own_port`, and 16-bit ids other than `frame_ids` (None: keep all ids).
 
-    Returns whether the kernel took it; the socket works as before where it does not.
+    Return whether the kernel accepted the filter; if not, the socket works as before.
     """
     ids = None if frame_ids is None or len(frame_ids) > _MOST_IDS else frame_ids
     program = _program(own_port, ids)
@@ -43,7 +43,7 @@ def _program(own_port: int, ids: Sequence[int] | None) -> list[tuple[int, int, i
     if ids is None:
         return [(_LOAD_HALF, 0, 0, 0), (_JUMP_EQUAL, 0, 1, own_port), drop, accept]
     n = len(ids)
-    matches = [(_JUMP_EQUAL, n - i, 0, frame_id) for i, frame_id in enumerate(ids)]  # over the others and the drop
+    matches = [(_JUMP_EQUAL, n - i, 0, frame_id) for i, frame_id in enumerate(ids)]  # jump over the other ids and the drop
     return [
         (_LOAD_HALF, 0, 0, 0),
         (_JUMP_EQUAL, n + 7, 0, own_port),

@@ -173,7 +173,7 @@ class BridgeDriver:
     def _cycle(self) -> None:
         """Receive until the next control period or until frames come; then do what is due.
 
-        Frames that come near the end of a period end it: the currents use the newest feedback, and the thread wakes once for both.
+        Frames that come near the end of a period end it: the currents use the newest feedback, and the thread wakes only once.
         """
         period, state_period = 1.0 / self._options.rate, 1.0 / self._options.state_rate
         near = _NEAR * period
