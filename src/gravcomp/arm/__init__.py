@@ -1,1 +1,1 @@
-"""The arm that carries the robot: where its joints put the robot's base, and so gravity in it."""
+"""The arm that carries the robot: its kinematics, from joint positions to gravity in the robot's base, and its tour."""

@@ -1,7 +1,8 @@
 """Forward kinematics of a URDF from its root to the robot's base.
 
-The pose of a link is the product of the joints on the way to it, each  T = T_origin T_axis(q)  (http://wiki.ros.org/urdf/XML/joint), and
-gravity in it is  g = R^T (0, 0, -9.81)  with R the rotation of the link in the root, whose z points up.
+The pose of a link is the product of the joint transforms between root and link, each  T = T_origin T_axis(q)
+(http://wiki.ros.org/urdf/XML/joint). Gravity in the link is  g = R^T (0, 0, -9.81),  where R is the rotation of the link in the
+root, whose z axis points up.
 """
 
 import math
@@ -19,7 +20,7 @@ _MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the chain: origin (4, 4) in its parent, axis (3,) of unit length."""
+    """A joint of the chain: origin (4, 4) in its parent link, axis (3,) of unit length."""
 
     name: str
     kind: str
@@ -27,7 +28,7 @@ class Joint:
     axis: np.ndarray
 
     def transform(self, position: float) -> np.ndarray:
-        """(4, 4) at a position in rad or m."""
+        """Return the transform (4, 4) at a position (rad or m)."""
         result = self.origin.copy()
         if self.kind == "prismatic":
             result[:3, 3] += self.origin[:3, :3] @ (self.axis * position)
@@ -40,58 +41,59 @@ class Chain:
     """The joints from `root` to `tip`, in this order."""
 
     def __init__(self, urdf: str, tip: str, root: str | None = None, source: str = "robot_description"):
-        """`root`: the URDF's own when not given. Raises ConfigError naming what is missing."""
+        """Read the URDF; without `root`, its root link is used. Raises ConfigError when the URDF or a link is wrong."""
         try:
             document = xml.fromstring(urdf)
         except xml.ParseError as error:
             raise ConfigError(f"{source}: is not a URDF: {error}") from error
-        above = {joint.find("child").get("link"): joint for joint in document.iter("joint") if joint.find("child") is not None}
-        links = [link.get("name") for link in document.iter("link")]
+        joint_above = {
+            _link(joint, "child", source): joint for joint in document.iter("joint") if joint.find("child") is not None
+        }
+        links = [link.get("name", "") for link in document.iter("link")]
         for name in (tip, root):
             if name is not None and name not in links:
                 raise ConfigError(f"{source}: has no link '{name}'; it has: {', '.join(links) or 'none'}")
         self.joints: list[Joint] = []
         link = tip
-        while link != root and link in above:
-            self.joints.insert(0, _joint(above[link], source))
-            link = above[link].find("parent").get("link")
+        while link != root and link in joint_above:
+            self.joints.insert(0, _joint(joint_above[link], source))
+            link = _link(joint_above[link], "parent", source)
         if root is not None and link != root:
-            raise ConfigError(f"{source}: link '{tip}' does not hang on '{root}'; its root is '{link}'")
+            raise ConfigError(f"{source}: link '{tip}' is not below '{root}' in the tree; its root is '{link}'")
         self.root, self.tip = link, tip
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """Names of the joints whose positions are needed."""
+        """Names of the moving joints, whose positions are needed."""
         return tuple(joint.name for joint in self.joints if joint.kind in _MOVING)
 
     def pose(self, positions: Mapping[str, float]) -> np.ndarray:
-        """The tip in the root, (4, 4). Raises KeyError for a joint without position."""
+        """Return the pose (4, 4) of the tip in the root. Raises KeyError for a moving joint without a position."""
         result = np.eye(4)
         for joint in self.joints:
             result = result @ joint.transform(positions[joint.name] if joint.kind in _MOVING else 0.0)
         return result
 
     def gravity(self, positions: Mapping[str, float]) -> np.ndarray:
-        """(3,) m/s^2 in the tip."""
+        """Return gravity (3,) in the tip (m/s^2). Raises KeyError for a moving joint without a position."""
         return gravity_in(self.pose(positions)[:3, :3])
 
 
 def gravity_in(rotation: np.ndarray) -> np.ndarray:
-    """(3,) m/s^2 in a frame whose rotation (3, 3) in a frame with z up is given."""
+    """Return gravity (3,) in a frame (m/s^2), from its rotation (3, 3) in a frame whose z axis points up."""
     return -STANDARD_GRAVITY * rotation[2]
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> float:
-    """rad between two vectors (3,)."""
+    """Return the angle (rad) between two vectors (3,)."""
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
 
 
 def _joint(element: xml.Element, source: str) -> Joint:
-    name, kind = element.get("name"), element.get("type")
+    name, kind = element.get("name", ""), element.get("type", "")
     if kind not in (*_MOVING, "fixed"):
-        raise ConfigError(
-            f"{source}: joint '{name}' is of type '{kind}'; allowed on the way to the robot: {', '.join((*_MOVING, 'fixed'))}"
-        )
+        allowed = ", ".join((*_MOVING, "fixed"))
+        raise ConfigError(f"{source}: joint '{name}' is of type '{kind}'; allowed between the root and the robot: {allowed}")
     origin = np.eye(4)
     given = element.find("origin")
     if given is not None:
@@ -104,12 +106,21 @@ def _joint(element: xml.Element, source: str) -> Joint:
     return Joint(name, kind, origin, direction / np.linalg.norm(direction))
 
 
+def _link(joint: xml.Element, end: str, source: str) -> str:
+    """Return the link at one end, `parent` or `child`, of a joint."""
+    element = joint.find(end)
+    name = None if element is None else element.get("link")
+    if name is None:
+        raise ConfigError(f"{source}: joint '{joint.get('name')}' has no {end} link")
+    return name
+
+
 def _numbers(text: str) -> list[float]:
     return [float(word) for word in text.split()]
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rodrigues' formula."""
+    """Return the rotation (3, 3) about a unit axis by an angle (rad), by Rodrigues' formula."""
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * k @ k

@@ -1,4 +1,4 @@
-"""URDF from the xacro files that the packages install."""
+"""URDF from the xacro files that the ROS packages install."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from gravcomp.config import ConfigError
 
 
 def shipped_xacro(name: str) -> Path:
-    """`share/gravcomp_fem/urdf/NAME` of the first prefix that has it. Raises ConfigError."""
+    """Return `share/gravcomp_fem/urdf/NAME` in the first prefix of AMENT_PREFIX_PATH that has it. Raises ConfigError."""
     for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(":"):
         path = Path(prefix) / "share" / "gravcomp_fem" / "urdf" / name
         if prefix and path.exists():
@@ -16,10 +16,10 @@ def shipped_xacro(name: str) -> Path:
 
 
 def expanded(path: Path, **arguments: str) -> str:
-    """The URDF that a xacro file makes of its arguments. Raises ConfigError."""
+    """Return the URDF from a xacro file and its arguments. Raises ConfigError when xacro fails."""
     import xacro
 
     try:
         return xacro.process_file(str(path), mappings=arguments).toprettyxml(indent="  ")
-    except Exception as error:  # xacro raises what its expressions raise
+    except Exception as error:  # xacro raises whatever its expressions raise
         raise ConfigError(f"{path}: {error}") from error

@@ -1,13 +1,12 @@
-"""A tour of an arm through poses: joint positions over time, and what is measured at each pose.
+"""Tour of an arm through poses: joint positions over time.
 
-Between two poses every joint follows the minimum-jerk polynomial  s(x) = 10 x^3 - 15 x^4 + 6 x^5  over the same time.
+Between two poses all joints follow the minimum-jerk polynomial  s(x) = 10 x^3 - 15 x^4 + 6 x^5  over the same time.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-# The article's five directions of the robot, degrees above the horizontal, and joints of the seven-axis arm that give them.
 FIVE_POSES = {
     135.0: (0.0, -0.6, 0.0, -0.9, 0.0, 0.7145, 0.0),
     90.0: (0.0, 0.3, 0.0, -0.9, 0.0, 0.6, 0.0),
@@ -15,11 +14,12 @@ FIVE_POSES = {
     0.0: (0.3, 0.5, 0.0, 0.8, 0.0, 0.2708, 0.0),
     -45.0: (0.0, 0.6, 0.0, 1.0, 0.0, 0.7562, 0.0),
 }
+"""The article's five directions of the robot (degrees above the horizontal) -> joint positions (rad) of the seven-axis arm."""
 
 
 @dataclass(frozen=True)
 class Tour:
-    """Poses (p, j) in rad, visited in order; each `hold` s after a way of `travel` s."""
+    """Poses (p, j) in rad, visited in order: `travel` s to each pose, then `hold` s at rest."""
 
     poses: np.ndarray
     travel: float
@@ -27,11 +27,11 @@ class Tour:
 
     @property
     def duration(self) -> float:
-        """s of one pass."""
+        """Duration of one pass (s)."""
         return len(self.poses) * (self.travel + self.hold)
 
     def positions(self, time: float) -> np.ndarray:
-        """(j,) rad at `time` s; it starts from the last pose, so that passes join, and goes on for ever."""
+        """Return the joint positions (j,) in rad at `time` s. The tour starts from the last pose and repeats without a jump."""
         leg, into = divmod(time, self.travel + self.hold)
         index = int(leg) % len(self.poses)
         x = min(1.0, into / self.travel)
@@ -40,6 +40,6 @@ class Tour:
         return before + s * (self.poses[index] - before)
 
     def at_rest(self, time: float, settled: float) -> int | None:
-        """The pose that has been held for `settled` s at `time`, else None."""
+        """Return the index of the pose that has been held for at least `settled` s at `time`, or None."""
         leg, into = divmod(time, self.travel + self.hold)
         return int(leg) % len(self.poses) if into >= self.travel + settled else None

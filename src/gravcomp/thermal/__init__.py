@@ -1,4 +1,4 @@
-"""Temperature of the IMU: the control that keeps it still, and the plant it is tested against."""
+"""Temperature of the IMU: the control of its heater, and the thermal plant that the virtual robot uses."""
 
 from gravcomp.thermal.heater import HeaterControl, HeaterFault, HeaterOptions, HeaterState
 from gravcomp.thermal.plant import ThermalPlant, ThermalPlantOptions

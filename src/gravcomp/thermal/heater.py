@@ -1,9 +1,10 @@
-"""Keeping the IMU at a temperature: target, PID at the rhythm of the chip's readings, ready flag, and faults that switch the heater off.
+"""Temperature control of the IMU: target, PID once per reading of the chip, ready flag, and faults that switch the heater off.
 
-The reading is renewed every 1.28 s only: the loop runs once a renewal, never on the repetitions between them. The target is fixed, or lies
-`rise` above the ambient, which is what the cold chip read first. It is learned once, and never above `warmest_ambient`: after a new start the
-chip is still warm, and the target would climb each time. A dead heater and over-temperature stay until `reset`; a dead
-sensor and a bad reading end with the next good reading.
+The chip renews its reading only every 1.28 s. The loop runs once per renewal, not on the repetitions in between. The target is
+fixed, or `rise` above the ambient temperature, which is the first reading of the cold chip. The ambient is learned once and
+limited to `warmest_ambient`: after a restart the chip is still warm, and without the limit the target would rise with each
+restart. The faults "dead heater" and "over temperature" stay until `reset`; "dead sensor" and "bad reading" end with the next
+valid reading.
 """
 
 import math
@@ -17,58 +18,73 @@ from gravcomp.thermal.plant import READING_PERIOD, READING_STEP
 
 @dataclass(frozen=True)
 class HeaterOptions:
-    """Target, safety and readiness."""
+    """Options of the temperature control."""
 
-    enabled: bool = parameter(True, description="heat at all")
+    enabled: bool = parameter(True, description="use the heater")
     rise: float = parameter(
-        15.0, unit="degC", minimum=0, maximum=60, description="target above the ambient, used where no target is given"
+        15.0, unit="degC", minimum=0, maximum=60, description="target above the ambient, when no target is given"
     )
-    target: float | None = parameter(None, unit="degC", minimum=0, maximum=65, description="fixed target; none: ambient + rise")
+    target: float | None = parameter(
+        None, unit="degC", minimum=0, maximum=65, description="fixed target; none: ambient plus rise"
+    )
     ambient: float | None = parameter(None, unit="degC", minimum=-40, maximum=60, description="ambient; none: the first reading")
     warmest_ambient: float = parameter(
         30.0,
         unit="degC",
         minimum=0,
         maximum=60,
-        description="a first reading above it is of a chip that is still warm, and counts as this",
+        description="largest ambient that is learned; a first reading above it comes from a chip that is still warm",
     )
-    highest_target: float = parameter(60.0, unit="degC", minimum=0, maximum=65, description="a target above it is cut to it")
-    over_temperature: float = parameter(70.0, unit="degC", minimum=20, maximum=105, description="heater off for good from here")
+    highest_target: float = parameter(60.0, unit="degC", minimum=0, maximum=65, description="a higher target is limited to this")
+    over_temperature: float = parameter(
+        70.0, unit="degC", minimum=20, maximum=105, description="at this temperature the heater is switched off until reset"
+    )
     largest_excess: float = parameter(
-        15.0, unit="degC", minimum=3, maximum=60, description="heater off for good so far above the target"
+        15.0, unit="degC", minimum=3, maximum=60, description="this far above the target the heater is switched off until reset"
     )
-    margin: float = parameter(0.5, unit="degC", minimum=0.1, maximum=10, description="ready within so much of the target")
-    ready_time: float = parameter(5.0, unit="s", minimum=0, maximum=600, description="ready after so long within the margin")
+    margin: float = parameter(
+        0.5, unit="degC", minimum=0.1, maximum=10, description="largest deviation from the target when ready"
+    )
+    ready_time: float = parameter(5.0, unit="s", minimum=0, maximum=600, description="ready after this time within the margin")
     sensor_timeout: float = parameter(
-        5.0, unit="s", minimum=1.5, maximum=60, description="no reading for so long: the sensor is dead"
+        5.0, unit="s", minimum=1.5, maximum=60, description="fault after this time without a reading: the sensor is dead"
     )
     dead_time: float = parameter(
-        30.0, unit="s", minimum=5, maximum=600, description="heating so long without warming: the heater is dead"
+        30.0,
+        unit="s",
+        minimum=5,
+        maximum=600,
+        description="fault after this time at nearly full duty without warming: the heater is dead",
     )
-    dead_rise: float = parameter(1.0, unit="degC", minimum=0.125, maximum=20, description="what it must have warmed in that time")
+    dead_rise: float = parameter(
+        1.0, unit="degC", minimum=0.125, maximum=20, description="temperature rise that is required in this time"
+    )
     pid: PidOptions = field(default_factory=PidOptions)
 
 
 class HeaterFault(Enum):
-    """Why the heater is off; the value is said to people."""
+    """Fault that switches the heater off; the value is shown to the user."""
 
     NONE = ""
-    OVER_TEMPERATURE = "over temperature: the chip is far too warm"
-    DEAD_HEATER = "the heater is fully on and the reading does not rise: it is dead or too weak, or the reading is stuck"
+    OVER_TEMPERATURE = "over temperature: the chip is much too warm"
+    DEAD_HEATER = "the heater is fully on and the reading does not rise: the heater is dead or too weak, or the reading is stuck"
     DEAD_SENSOR = "no temperature reading arrives"
     BAD_READING = "the temperature reading is not finite or out of range"
 
 
 PASSING = frozenset({HeaterFault.DEAD_SENSOR, HeaterFault.BAD_READING})
+"""Faults that end with the next valid reading."""
 
+PLAUSIBLE = (-45.0, 130.0)
+"""degC; range of the BMI088's readings."""
 
-PLAUSIBLE = (-45.0, 130.0)  # degC: what a BMI088 can say and survive
-NEARLY_FULL = 0.9  # of the largest duty: at less, not warming may be the balance with the ambient
+NEARLY_FULL = 0.9
+"""Share of the largest duty above which the chip must warm; at a smaller duty it may be in balance with the ambient."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeaterState:
-    """What the control does after a reading or a check."""
+    """State of the control after a reading or a check."""
 
     duty: float  # 0..1
     target: float  # degC, NaN before the first reading
@@ -78,10 +94,13 @@ class HeaterState:
 
 
 class HeaterControl:
-    """Takes temperature readings by stamp, gives the duty; `check` tells when none comes any more."""
+    """Computes the duty from stamped temperature readings; `check` detects that no more readings come.
+
+    Attribute `ambient` (degC): the learned one, None before the first reading. The argument is one that an earlier control of
+    the same chip has learned.
+    """
 
     def __init__(self, options: HeaterOptions | None = None, ambient: float | None = None):
-        """`ambient` (degC): learned by an earlier control of the same chip. Attribute `ambient`: the learned one, None before."""
         self.options = options or HeaterOptions()
         self.ambient = ambient
         self._pid = Pid(self.options.pid)
@@ -103,10 +122,11 @@ class HeaterControl:
 
     @property
     def state(self) -> HeaterState:
+        """Present state of the control."""
         return HeaterState(self._duty, self._target, self._temperature, self._ready, self._fault)
 
     def update(self, stamp_ns: int, temperature: float) -> HeaterState:
-        """Take a reading, degC, with its stamp; repetitions between renewals are allowed."""
+        """Take a reading (degC) with its stamp, and return the new state. Repetitions between renewals are allowed."""
         if not math.isfinite(temperature) or not PLAUSIBLE[0] <= temperature <= PLAUSIBLE[1]:
             return self._fail(HeaterFault.BAD_READING)
         if self._last_ns is not None and stamp_ns <= self._last_ns:
@@ -125,7 +145,7 @@ class HeaterControl:
             return self.state
 
         since = READING_PERIOD if self._controlled_ns is None else (stamp_ns - self._controlled_ns) * 1e-9
-        # A reading that stays the same is taken as renewed when its time has come.
+        # A reading that does not change counts as renewed after the period of the chip.
         if renewed or since >= READING_PERIOD:
             self._controlled_ns = stamp_ns
             self._duty = self._pid.update(min(since, 2.0 * READING_PERIOD), self._target, temperature)
@@ -134,7 +154,7 @@ class HeaterControl:
         return self.state
 
     def check(self, stamp_ns: int) -> HeaterState:
-        """Tell the control what time it is, so that it misses readings that do not come."""
+        """Check at time `stamp_ns` whether readings still come, and return the new state."""
         if self._last_ns is None:
             self._last_ns = stamp_ns
         elif (stamp_ns - self._last_ns) * 1e-9 > self.options.sensor_timeout and self._fault is HeaterFault.NONE:
