@@ -1,4 +1,4 @@
-"""Which Python, and which ROS."""
+"""Choose the Python interpreter, and the ROS, of the environment."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ print(json.dumps(dict(
 
 @dataclass(frozen=True)
 class Interpreter:
-    """A Python that can carry the environment. `ros`: the prefix of a sourced ROS 2 Jazzy, or '' for the wheels."""
+    """A Python that the environment can be built on. `ros`: prefix of a sourced ROS 2 Jazzy, or '' for the wheels."""
 
     path: str
     version: tuple
@@ -32,10 +32,10 @@ class Interpreter:
 
 
 def choose_interpreter() -> Interpreter:
-    """The sourced ROS's Python where there is one, else the first supported Python. Raises SetupError."""
+    """Return the sourced ROS's Python, or without a ROS the first supported Python. Raises SetupError."""
     if os.environ.get("ROS_DISTRO"):
         return _of_sourced_ros()
-    # Not the environment's own Python where it is active: it may be about to be made anew.
+    # Not the environment's own Python when it is active: that environment may be about to be replaced.
     own = sys.executable if sys.prefix == sys.base_prefix else getattr(sys, "_base_executable", "")
     candidates = [own] + [shutil.which(f"python{a}.{b}") for a, b in reversed(SUPPORTED)]
     tried = []
@@ -63,10 +63,10 @@ def _of_sourced_ros() -> Interpreter:
         raise SetupError(f"the sourced ROS is '{distro}'; 'jazzy' is needed, or none (then the wheels from PyPI are used)")
     prefix = os.environ.get("AMENT_PREFIX_PATH", "").split(":")[-1]
     path = shutil.which("python3")
-    found = path and _probe(path)
-    if not found or not found["rclpy"]:
+    found = _probe(path) if path else None
+    if not path or not found or not found["rclpy"]:
         raise SetupError(
-            "ROS_DISTRO is 'jazzy' but python3 finds no rclpy: source /opt/ros/jazzy/setup.bash anew, or unset ROS_DISTRO"
+            "ROS_DISTRO is 'jazzy' but python3 finds no rclpy: source /opt/ros/jazzy/setup.bash again, or unset ROS_DISTRO"
         )
     return Interpreter(path, tuple(found["version"]), found["ensurepip"], found["headers"], prefix)
 

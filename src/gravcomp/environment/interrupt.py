@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command with its own code, at whatever moment it comes."""
+"""End a command by Ctrl-C or SIGTERM with a defined exit code, at any moment."""
 
 import os
 import signal
@@ -7,22 +7,22 @@ from collections.abc import Callable
 
 
 def run_interruptible(work: Callable[[], int]) -> None:
-    """End the process with the code that `work` returns, with 130 where Ctrl-C or SIGTERM ended it.
+    """End the process with the code that `work` returns, or with 130 when Ctrl-C or SIGTERM ended it.
 
-    A KeyboardInterrupt may strike inside an import. There it can become another error, and where it passes through text that is being
-    compiled, as that of data classes is, CPython ends by the signal although it was caught.
+    A KeyboardInterrupt may be raised inside an import. There it can turn into another error. When it passes through code that is
+    being compiled (that of data classes is), CPython ends by the signal although the exception was caught.
     """
-    interrupted = []
+    interrupted: list[bool] = []
 
-    def interrupt(*_):
+    def interrupt(*_: object) -> None:
         interrupted.append(True)
         raise KeyboardInterrupt
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started this wants it ignored
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # otherwise the caller wants it ignored
         signal.signal(signal.SIGINT, interrupt)
     signal.signal(signal.SIGTERM, interrupt)
     try:
-        # Blocked by the interpreter that started this one, until here.
+        # The interpreter that started this one blocked it.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         code = work()
     except Exception:

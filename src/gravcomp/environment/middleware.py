@@ -7,9 +7,10 @@ _HERE = Path(__file__).parent
 
 
 def middleware(given: "Mapping[str, str]") -> "dict[str, str]":
-    """What to add to the environment `given`: this host alone, unless ROS_AUTOMATIC_DISCOVERY_RANGE or ROS_STATIC_PEERS ask for more.
+    """Return variables to add to the environment `given`.
 
-    Never shared memory, unless FASTDDS_BUILTIN_TRANSPORTS or FASTRTPS_DEFAULT_PROFILES_FILE of the user's say so.
+    Messages stay on this host unless ROS_AUTOMATIC_DISCOVERY_RANGE or ROS_STATIC_PEERS ask for more. Shared memory is not used
+    unless the user's FASTDDS_BUILTIN_TRANSPORTS or FASTRTPS_DEFAULT_PROFILES_FILE ask for it.
     """
     reach = {"ROS_AUTOMATIC_DISCOVERY_RANGE": given.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")}
     fast_dds = given.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp").startswith("rmw_fastrtps")

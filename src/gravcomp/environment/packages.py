@@ -1,38 +1,98 @@
-"""The Python packages: a virtual environment filled from the lock file, and the ROS wheels' CMake paths mended."""
+"""The Python packages: a virtual environment filled from lock files.
 
+`.venv` holds what runs the product (requirements.lock, or requirements-installed-ros.lock for a sourced ROS).
+`.workspace/tools` holds what builds the workspace. Further locks (`EXTRAS`) are added to `.venv` by the first command that needs
+them.
+"""
+
+import fcntl
+import hashlib
+import importlib
+import importlib.util
 import os
 import re
 import shutil
 import subprocess
-from collections import deque
+import sys
 from pathlib import Path
 
 from gravcomp.environment.errors import SetupError
+from gravcomp.environment.installer import install
 from gravcomp.environment.interpreter import Interpreter
-from gravcomp.environment.progress import Progress
+
+BUILD_LOCK = "requirements-build.lock"
+EXTRAS = {
+    "browser": ("requirements-browser.lock", "Packages for pictures of the page"),
+    "development": ("requirements-development.lock", "Packages for tests and checks"),
+    "reports": ("requirements-reports.lock", "Packages for figures"),
+}
+"""Locks that are installed on demand: file and title."""
+
+_SUFFICES = {"browser": "playwright", "reports": "matplotlib"}
+"""Modules whose presence makes an extra superfluous."""
+
+
+_SMALLEST_LINKED = 50_000  # bytes
 
 
 def lock_file(root: Path, python: Interpreter) -> Path:
-    """The lock of this kind of environment."""
+    """Path of the product's lock for this kind of environment."""
     return root / ("requirements-installed-ros.lock" if python.ros else "requirements.lock")
 
 
 def build(root: Path, python: Interpreter) -> Path:
-    """Make or complete `.venv`; returns its Python. Raises SetupError."""
+    """Make or complete `.venv`, and the build tools where no ROS is sourced; return the Python of `.venv`. Raises SetupError."""
     venv = root / ".venv"
     inner = venv / "bin" / "python"
     if not _usable(inner, python):
         shutil.rmtree(venv, ignore_errors=True)
         options = ["--system-site-packages"] if python.ros else []
         _run([python.path, "-m", "venv", *options, str(venv)], "the virtual environment could not be made")
-    _install(inner, lock_file(root, python))
+    install(root, inner, lock_file(root, python), "Python packages")
     if not python.ros:
-        _mend_cmake_paths(venv, inner)
+        install(root, inner, root / BUILD_LOCK, "Build tools", target=tools_folder(root))
+        _repair_cmake_paths(venv, inner)
+        _link_equal_files(venv)
     return inner
 
 
+def tools_folder(root: Path) -> Path:
+    """Folder of the packages that build the workspace."""
+    return root / ".workspace" / "tools"
+
+
+def provide_extra(name: str, root: "Path | None" = None) -> None:
+    """Install the packages of the extra `name` (a key of EXTRAS) into the running environment unless they are there.
+
+    root: the repository, by default that of the running command. A program that uses gravcomp as a library has neither; then
+    nothing is installed. Raises SetupError.
+    """
+    given = root or os.environ.get("GRAVCOMP_ROOT")
+    if not given:
+        return
+    root = Path(given)
+    if name in _SUFFICES and importlib.util.find_spec(_SUFFICES[name]):
+        return
+    lock, title = EXTRAS[name]
+    stamp = Path(sys.prefix) / f"{name}.key"
+    key = hashlib.sha256((root / lock).read_bytes()).hexdigest()
+    if _read(stamp) == key:
+        return
+    with open(Path(sys.prefix) / "lock", "w") as alone:
+        fcntl.flock(alone, fcntl.LOCK_EX)
+        if _read(stamp) == key:  # installed by another process meanwhile
+            return
+        install(root, Path(sys.executable), root / lock, title)
+        importlib.invalidate_caches()
+        stamp.write_text(key)
+
+
+def _read(path: Path) -> str:
+    return path.read_text() if path.exists() else ""
+
+
 def _usable(inner: Path, python: Interpreter) -> bool:
-    """An interrupted or moved environment, or one of another Python, is made anew."""
+    """Whether `.venv` is complete, in its place and of this Python; otherwise it is made again."""
     if not inner.exists():
         return False
     probe = "import sys, pip; print(sys.version_info[:2] == {!r}, sys.prefix)".format(python.version)
@@ -43,27 +103,8 @@ def _usable(inner: Path, python: Interpreter) -> bool:
     return whole and shares == bool(python.ros)
 
 
-def _install(inner: Path, lock: Path) -> None:
-    count = sum(1 for line in lock.read_text().splitlines() if re.match(r"^[A-Za-z0-9]", line))
-    command = [str(inner), "-m", "pip", "install", "--require-hashes", "--no-deps", "--no-input", "--progress-bar", "off",
-               "--disable-pip-version-check", "-r", str(lock)]  # fmt: skip
-    last = deque(maxlen=15)
-    with Progress("Python packages", total=count + count // 4) as progress:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        for line in process.stdout:
-            last.append(line)
-            words = line.split()
-            if line.startswith(("Collecting ", "Requirement already")):
-                progress.advance(words[1] if words[0] == "Collecting" else words[3])
-            elif line.startswith("Installing collected"):
-                progress.advance("unpacking")
-        if process.wait() != 0:
-            raise SetupError("pip could not install the locked packages:\n" + "".join(last).strip())
-        progress.advance("", progress.total)
-
-
-def _mend_cmake_paths(venv: Path, inner: Path) -> None:
-    """The ROS wheels' exported CMake files name the builder's Python; put this environment's in its place."""
+def _repair_cmake_paths(venv: Path, inner: Path) -> None:
+    """Replace the paths of the wheel builder's Python in the ROS wheels' exported CMake files by those of this environment."""
     probe = "import numpy, sysconfig; print(sysconfig.get_paths()['include']); print(numpy.get_include())"
     python_include, numpy_include = _run([str(inner), "-c", probe], "NumPy cannot be imported").splitlines()
     for path in (venv / "share").rglob("*.cmake"):
@@ -72,10 +113,27 @@ def _mend_cmake_paths(venv: Path, inner: Path) -> None:
             continue
         text = re.sub(r"/opt/python/[^/;\"]+/lib/python[0-9.]+/site-packages/numpy/_core/include", numpy_include, text)
         text = re.sub(r"/opt/python/[^/;\"]+/include/python[0-9.]+", python_include, text)
-        # A file of its own in place of the wheel's: pip may have linked that one from elsewhere.
-        replacement = path.with_suffix(".mended")
+        # A new file: the installer may have linked the old one from its cache.
+        replacement = path.with_suffix(".repaired")
         replacement.write_text(text, errors="surrogateescape")
         os.replace(replacement, path)
+
+
+def _link_equal_files(venv: Path) -> None:
+    """Store libraries that several wheels contain, or one wheel under several names, once: wheels cannot hold links."""
+    of_size: "dict[int, list[Path]]" = {}
+    for path in (venv / "lib").rglob("*.so*"):
+        if not path.is_symlink() and path.stat().st_size >= _SMALLEST_LINKED:
+            of_size.setdefault(path.stat().st_size, []).append(path)
+    for paths in of_size.values():
+        first: "dict[bytes, Path]" = {}
+        for path in paths if len(paths) > 1 else ():
+            digest = hashlib.sha256(path.read_bytes()).digest()
+            same = first.setdefault(digest, path)
+            if not same.samefile(path):
+                link = path.with_name(path.name + ".link")
+                os.link(same, link)
+                os.replace(link, path)
 
 
 def _run(command: list, failure: str) -> str:

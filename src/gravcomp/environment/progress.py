@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar on a terminal, a line now and then elsewhere."""
+"""Progress on stderr: a bar on a terminal, otherwise a line for each tenth."""
 
 import sys
 import time
@@ -16,20 +16,27 @@ class Progress:
         self._started = time.monotonic()
         self._printed_tenth = -1
         self._tty = sys.stderr.isatty()
+        self._notes: "list[str]" = []
 
     def __enter__(self) -> "Progress":
         self._show("")
         return self
 
-    def __exit__(self, kind, *_) -> None:
+    def __exit__(self, kind: "type | None", *_: object) -> None:
         seconds = time.monotonic() - self._started
         end = "done" if kind is None else "not finished"
-        print(f"{chr(13) if self._tty else ''}{self.title}: {end} after {seconds:.0f} s".ljust(79), file=sys.stderr, flush=True)
+        notes = "".join(f" ({note})" for note in self._notes)
+        line = f"{self.title}: {end} after {seconds:.0f} s{notes}"
+        print(f"{chr(13) if self._tty else ''}{line}".ljust(79), file=sys.stderr, flush=True)
 
     def advance(self, what: str, steps: int = 1) -> None:
-        """Count steps that were done; `what` names the latest."""
+        """Count completed steps; `what` names the latest."""
         self.done = min(self.done + steps, self.total)
         self._show(what)
+
+    def note(self, text: str) -> None:
+        """Add a remark to the line that is printed at the end."""
+        self._notes.append(text)
 
     def _show(self, what: str) -> None:
         share = self.done / self.total

@@ -9,6 +9,7 @@ import pwd
 import signal
 import sys
 from pathlib import Path
+from typing import Iterator
 
 from gravcomp.environment import packages, system_packages, workspace
 from gravcomp.environment.errors import SetupError
@@ -19,7 +20,7 @@ SEARCH_PATHS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PATH")
 
 
 def enter(root: Path, arguments: "list[str]") -> int:
-    """Run the command in the environment, which replaces this process; returns only where the environment cannot be made (3, 130)."""
+    """Replace this process by the command in its environment; return 3 or 130 when the environment cannot be made."""
     # A bare environment has neither; ROS logs below HOME, and the build looks its tools up in PATH.
     os.environ.setdefault("PATH", "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin")
     os.environ.setdefault("HOME", pwd.getpwuid(os.geteuid()).pw_dir)
@@ -71,10 +72,12 @@ def _make(root: Path) -> dict:
         system_packages.provide(system_packages.missing_packages(python))
         inner = root / ".venv" / "bin" / "python"
         stamp = root / ".venv" / "packages.key"
-        packages_key = hashlib.sha256(
-            packages.lock_file(root, python).read_bytes() + str((root, python.version, python.ros)).encode()
-        ).hexdigest()
-        if not (stamp.exists() and stamp.read_text() == packages_key):
+        digest = hashlib.sha256(str((root, python.version, python.ros)).encode())
+        for lock in (packages.lock_file(root, python), root / packages.BUILD_LOCK):
+            digest.update(lock.read_bytes())
+        packages_key = digest.hexdigest()
+        tools = python.ros or packages.tools_folder(root).is_dir()
+        if not (tools and stamp.exists() and stamp.read_text() == packages_key):
             inner = packages.build(root, python)
             stamp.write_text(packages_key)
         paths = workspace.build(root, python, inner)
@@ -92,7 +95,8 @@ def _key(root: Path, ros: str) -> str:
     """
     sourced = os.environ.get("AMENT_PREFIX_PATH", "").split(":")[-1] if os.environ.get("ROS_DISTRO") else ""
     digest = hashlib.sha256(f"{root}|{ros}|{sourced}".encode())
-    files = [*root.glob("*.lock"), root / "colcon.meta"]
+    product = "requirements-installed-ros.lock" if ros else "requirements.lock"
+    files = [root / product, root / packages.BUILD_LOCK, root / "colcon.meta"]
     files += [root / "src" / name for name in ("package.xml", "setup.py", "setup.cfg")]
     for package in workspace.PACKAGES[1:]:
         files += [p for p in (root / package).rglob("*") if p.is_file() and _is_built(p)]
@@ -110,7 +114,7 @@ def _is_built(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _alone(root: Path):
+def _alone(root: Path) -> "Iterator[None]":
     (root / ".workspace").mkdir(exist_ok=True)
     with open(root / ".workspace" / "lock", "w") as lock:
         try:

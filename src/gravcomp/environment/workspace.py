@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import Interpreter
+from gravcomp.environment.packages import tools_folder
 from gravcomp.environment.progress import Progress
 
 PACKAGES = ("src", "gravcomp_msgs", "gravcomp_node", "gravcomp_hw", "gravcomp_estimation", "gravcomp_fem")
@@ -21,15 +22,16 @@ def build(root: Path, python: Interpreter, inner: Path) -> "dict[str, str]":
         environment["PYTHONPATH"] = ":".join(filter(None, [str(_site_packages(inner)), os.environ.get("PYTHONPATH")]))
         colcon = ["colcon"]
     else:
-        prefix = str(root / ".venv")
+        prefix, tools = str(root / ".venv"), tools_folder(root)
         environment.update(
-            PATH=f"{prefix}/bin:{environment['PATH']}",
+            PATH=f"{prefix}/bin:{tools}/bin:{environment['PATH']}",
+            PYTHONPATH=str(tools),
             AMENT_PREFIX_PATH=prefix,
             CMAKE_PREFIX_PATH=prefix,
             CMAKE_GENERATOR="Ninja",
         )
-        environment.pop("PYTHONPATH", None)
-        colcon = [str(inner.parent / "colcon")]
+        # By the Python of `.venv`, which colcon writes into the nodes' scripts.
+        colcon = [str(inner), str(tools / "bin" / "colcon")]
     base = root / ".workspace"
     _forget_other_maker(base, f"{root} {python.version} {python.ros}")
     command = [
@@ -37,12 +39,12 @@ def build(root: Path, python: Interpreter, inner: Path) -> "dict[str, str]":
         "--build-base", str(base / "build"), "--install-base", str(base / "install"), "--symlink-install", "--merge-install",
         "--event-handlers", "console_direct-", "console_start_end+",
     ]  # fmt: skip
-    last = deque(maxlen=40)
+    last: "deque[str]" = deque(maxlen=40)
     with Progress("Workspace", total=2 * len(PACKAGES)) as progress:
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=root, env=environment
         )
-        for line in process.stdout:
+        for line in process.stdout or ():
             last.append(line)
             if line.startswith(("Starting >>>", "Finished <<<")):
                 progress.advance(line.split()[2])

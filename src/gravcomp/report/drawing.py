@@ -51,6 +51,9 @@ class Drawing:
         self.svg = ""
 
     def __enter__(self) -> "Drawing":
+        from gravcomp.environment.packages import provide_extra
+
+        provide_extra("reports")
         import matplotlib
 
         self._context = matplotlib.rc_context({**_STYLE, "axes.prop_cycle": matplotlib.cycler(color=CYCLE)})

@@ -32,6 +32,9 @@ class Browser:
     """
 
     def __init__(self, width: int = 1600, height: int = 900, patience: float = 120.0):
+        from gravcomp.environment.packages import provide_extra
+
+        provide_extra("browser")
         from playwright.sync_api import Error, sync_playwright
 
         executable = find_chromium()
