@@ -1,10 +1,10 @@
 """Keep a robot straight while gravity turns: the loop of model and inverse problem, without ROS and without a clock.
 
-Each step linearises the model at its present shape,
+Each step linearises the model at its current shape,
 
     effector = W_ea lambda + effector_free,    displacement = W_aa lambda + displacement_free,
 
-and finds the tensions whose effector is nearest to the target (gravcomp.inverse.programme).
+and finds the tensions whose effector is nearest to the target (see gravcomp.inverse.programme).
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ target = straight_target(robot.length, tip_direction_weight=1e-3)  # m^2: 0.1 ra
 
 
 def gravity_at(time: float) -> np.ndarray:
-    """Horizontal for half a second, then turning about y at 30 deg/s."""
+    """Return gravity (3,) in m/s^2 in soft_base: horizontal robot for half a second, then a rotation about y at 30 deg/s."""
     angle = np.radians(30.0) * max(0.0, time - 0.5)
     return 9.81 * np.array([-np.cos(angle), 0.0, np.sin(angle)])
 
@@ -43,4 +43,4 @@ for step in range(150):
 
 print(f"\nat the end, {shape.model} model:")
 for name, u, tension in zip(robot.cable_names, command.displacement, shape.cable_tension):
-    print(f"  {name}: winch {1e3 * u:+6.3f} mm, {tension:.3f} N")
+    print(f"  {name}: displacement {1e3 * u:+6.3f} mm, tension {tension:.3f} N")

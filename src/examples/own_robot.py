@@ -1,4 +1,4 @@
-"""An own robot: read from a YAML, varied in Python, and asked what it weighs, how it sags and which forces it needs."""
+"""Read your own robot from its file, vary it in Python, and compute its mass, its sag and the tensions that compensate it."""
 
 import dataclasses
 from pathlib import Path
@@ -13,7 +13,7 @@ HORIZONTAL = np.array([-9.81, 0.0, 0.0])  # m/s^2 in soft_base
 
 
 def compensated(simulator: Simulator):
-    """The shape once the loop of model and inverse problem has settled."""
+    """Return the shape after the loop of model and inverse problem has settled."""
     robot, shape = simulator.robot, simulator.solve(HORIZONTAL)
     controller, target = InverseController(robot), straight_target(robot.length)
     for _ in range(80):
