@@ -22,7 +22,7 @@ START = 300.0  # s; a machine that has never run the graph compiles first
 # What every node has: rclpy's own topics, those of the parameters and of the lifecycle.
 COMMON_TOPICS = {"/rosout", "/parameter_events", "/clock"}
 COMMON_SERVICES = ("rcl_interfaces/", "lifecycle_msgs/", "type_description_interfaces/")
-RATED = {port.name: port.type for entry in NODES for port in entry.gives if port.rate is not None}
+RATED = {port.name: port.type for entry in NODES for port in entry.publishes if port.rate is not None}
 
 
 @pytest.fixture(scope="module")
@@ -141,8 +141,8 @@ def test_every_node_takes_gives_and_serves_what_the_table_says(robot, observer, 
         def fits() -> bool:
             takes, gives, services = interface(observer, executable)
             return (
-                agrees(takes, entry.takes, executable)
-                and agrees(gives, entry.gives, executable)
+                agrees(takes, entry.subscribes, executable)
+                and agrees(gives, entry.publishes, executable)
                 and agrees(services, entry.services, executable)
             )
 

@@ -108,7 +108,7 @@ def check_ros2(words: list[str]) -> None:
                     assert (ROOT / word).exists(), f"{word} does not exist"
         case ["run", package, executable, *rest]:
             assert EXECUTABLES.get(executable) == package
-            names = {port.name for kind in ("takes", "gives") for port in getattr(node(executable), kind)} | {"__ns", "__node"}
+            names = {port.name for kind in ("subscribes", "publishes") for port in getattr(node(executable), kind)} | {"__ns", "__node"}
             for option, word in zip(rest, rest[1:]):
                 key = word.partition(":=")[0]
                 if option == "-p":
@@ -120,7 +120,7 @@ def check_ros2(words: list[str]) -> None:
             assert (f"~/{service}", kind) in [(port.name, port.type) for port in node(executable).services]
         case ["topic", "pub", *rest]:
             name, kind, *content = [word for word in rest if not word.startswith("-")]
-            assert ports("takes").get(name.lstrip("/")) == kind
+            assert ports("subscribes").get(name.lstrip("/")) == kind
             if content and kind.startswith("gravcomp_msgs/"):
                 fields = re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
                 assert set(re.findall(r"(\w+):", content[0])) <= set(fields)
@@ -137,9 +137,9 @@ def check_ros2(words: list[str]) -> None:
                 "shutdown",
             )
         case ["topic", "hz", name]:
-            assert name.lstrip("/") in ports("gives")
+            assert name.lstrip("/") in ports("publishes")
         case ["topic", "echo", name, "--field", field]:
-            kind = ports("gives")[name.lstrip("/")]
+            kind = ports("publishes")[name.lstrip("/")]
             assert field in re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
         case _:
             raise AssertionError(f"no check is known for {' '.join(words)}")
@@ -154,7 +154,7 @@ def test_ros2_lines_fit_the_graph(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_topics_and_services_exist(name):
-    topics = set(ports("gives", "takes")) | FOREIGN_TOPICS
+    topics = set(ports("publishes", "subscribes")) | FOREIGN_TOPICS
     services = set(ports("services"))
     for word in inline_of((ROOT / name).read_text()):
         if re.fullmatch(r"(imu|cable|robot|controller|target|truth|virtual|measured)/[a-z_]+", word):
@@ -235,7 +235,7 @@ def test_a_name_of_the_glossary_exists(name):
         pass  # test_parameters_and_keys_exist
     else:
         keys = {key for path in shipped_robots().values() for key in keys_of(load_yaml(path))} | DEFAULT_KEYS
-        topics = {topic.lstrip("/") for topic in ports("gives", "takes", "services")}
+        topics = {topic.lstrip("/") for topic in ports("publishes", "subscribes", "services")}
         assert name in keys | topics | NODE_PARAMETERS | set(EXECUTABLES) | OTHER_NAMES
 
 

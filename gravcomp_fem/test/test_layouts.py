@@ -13,7 +13,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.graph.nodes import NODES
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
-TOPICS = {port.name: port.type for entry in NODES for port in (*entry.takes, *entry.gives)}
+TOPICS = {port.name: port.type for entry in NODES for port in (*entry.subscribes, *entry.publishes)}
 SERVICES = {port.name.replace("~", f"/{entry.executable}"): port.type for entry in NODES for port in entry.services}
 SHOWN_AS = {
     "rviz_default_plugins/MarkerArray": "visualization_msgs/msg/MarkerArray",

@@ -11,7 +11,8 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.time import Time
 
 from gravcomp.doctor.finding import Finding
-from gravcomp.graph.nodes import NODES, Port
+from gravcomp.graph.interface import Port
+from gravcomp.graph.nodes import NODES
 from gravcomp_node import SENSOR
 
 _DISCOVERY, _LISTEN = 2.0, 4.0  # s
@@ -24,7 +25,7 @@ class GraphProbe:
     def __init__(self) -> None:
         self._node = rclpy.create_node("graph_probe")
         self._ages: dict[str, list[float]] = {}
-        self._ports = {port.name: port for entry in NODES for port in entry.gives if port.rate is not None}
+        self._ports = {port.name: port for entry in NODES for port in entry.publishes if port.rate is not None}
 
     def examine(self) -> list[Finding]:
         """One finding a topic, one for the QoS of all."""

@@ -25,7 +25,8 @@ from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.realtime import RealtimeRobot
-from gravcomp.virtual.robot import Truth, VirtualRobot
+from gravcomp.virtual.robot import VirtualRobot
+from gravcomp.virtual.truth import Truth
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 # Faults come one after the other and each counts.

@@ -13,7 +13,7 @@ def examine(robot: str) -> list[Finding]:
     try:
         check_robot_file(robot)
         file = load_robot_file(robot)
-        known = {entry.executable for entry in NODES if entry.parameters}
+        known = {entry.executable for entry in NODES}
         for name in file.section("nodes"):
             if name not in known:
                 raise ConfigError(f"{file.source}: unknown key 'nodes.{name}'; allowed: {', '.join(sorted(known))}")

@@ -1,1 +1,1 @@
-"""The graph as data: its nodes and their parameters, without ROS."""
+"""The graph as data, without ROS: its nodes with parameters, topics and services."""

@@ -1,6 +1,6 @@
-"""The tables of nodes, topics and parameters in the packages' READMEs, made from the code.
+"""Generate the tables of nodes, topics and parameters in the READMEs from the code.
 
-    python -m gravcomp.graph.documentation REPOSITORY      # renews the tables between their marks
+    python -m gravcomp.graph.documentation REPOSITORY      # updates the tables between their marks
 
 A table stands between `<!-- node NAME -->` (or `<!-- topics -->`) and `<!-- end -->`.
 """
@@ -9,7 +9,8 @@ import re
 import sys
 from pathlib import Path
 
-from gravcomp.graph.nodes import NODES, Node, Port, node
+from gravcomp.graph.interface import Node, Port
+from gravcomp.graph.nodes import NODES, node
 
 _BLOCK = re.compile(r"(<!-- (node (\w+)|topics) -->\n).*?(<!-- end -->)", re.DOTALL)
 DOCUMENTS = ("README.md", "gravcomp_hw/README.md", "gravcomp_estimation/README.md", "gravcomp_fem/README.md")
@@ -18,36 +19,37 @@ DOCUMENTS = ("README.md", "gravcomp_hw/README.md", "gravcomp_estimation/README.m
 def node_tables(entry: Node) -> str:
     """Topics, services and parameters of a node as Markdown."""
     parts = []
-    ports = [("takes", p) for p in entry.takes] + [("gives", p) for p in entry.gives] + [("serves", p) for p in entry.services]
+    ways = (("subscribes", entry.subscribes), ("publishes", entry.publishes), ("serves", entry.services))
+    ports = [(way, port) for way, of_way in ways for port in of_way]
     parts.append("| | name | type | |\n|---|---|---|---|")
     parts += [f"| {way} | `{p.name}` | {_short(p.type)} | {p.meaning} |" for way, p in ports]
     leaves = entry.declared_parameters()
     if leaves:
         parts.append("\n| parameter | default | allowed | |\n|---|---|---|---|")
     for leaf in leaves:
-        fixed = " (fixed at the start)" if leaf.parameter.read_only else ""
+        fixed = " (read-only)" if leaf.parameter.read_only else ""
         default = "" if leaf.default is None else f"`{leaf.default}`"
         parts.append(f"| `{leaf.key}` | {default} | {leaf.parameter.allowed()} | {leaf.parameter.description}{fixed} |")
     return "\n".join(parts) + "\n"
 
 
 def topic_table() -> str:
-    """Every topic with who gives and who takes it, tools left out, as Markdown."""
+    """Every topic with its publishers and subscribers as Markdown, without the tools."""
     topics: dict[str, tuple[Port, list, list]] = {}
     for entry in (entry for entry in NODES if not entry.tool):
-        for port in entry.gives:
+        for port in entry.publishes:
             topics.setdefault(port.name, (port, [], []))[1].append(entry.executable)
-        for port in entry.takes:
+        for port in entry.subscribes:
             topics.setdefault(port.name, (port, [], []))[2].append(entry.executable)
-    rows = ["| topic | type | carries | from | to |", "|---|---|---|---|---|"]
-    for name, (port, givers, takers) in topics.items():
-        givers = ["all"] if name == "/diagnostics" else givers
-        rows.append(f"| `{name}` | {_short(port.type)} | {port.meaning} | {', '.join(givers)} | {', '.join(takers)} |")
+    rows = ["| topic | type | content | from | to |", "|---|---|---|---|---|"]
+    for name, (port, publishers, subscribers) in topics.items():
+        publishers = ["all"] if name == "/diagnostics" else publishers
+        rows.append(f"| `{name}` | {_short(port.type)} | {port.meaning} | {', '.join(publishers)} | {', '.join(subscribers)} |")
     return "\n".join(rows) + "\n"
 
 
 def renewed(text: str) -> str:
-    """The document with its tables as the code has them now."""
+    """Return the document with its tables generated again."""
     return _BLOCK.sub(
         lambda m: m.group(1) + (topic_table() if m.group(2) == "topics" else node_tables(node(m.group(3)))) + m.group(4), text
     )
@@ -58,6 +60,7 @@ def _short(kind: str) -> str:
 
 
 def main(root: Path) -> None:
+    """Update the tables of all DOCUMENTS below `root`."""
     for name in DOCUMENTS:
         path = root / name
         path.write_text(renewed(path.read_text()))

@@ -1,222 +1,181 @@
-"""What each node takes and gives: the graph's interface in one table, from which the documentation and the doctor read.
+"""The nodes of the graph with their parameters, topics and services.
 
-Topic and service names are relative to the robot's namespace; those with ~ to the node; those with / to none.
+The tables in the documents, the doctor and the tests of the running graph read this one table.
 """
 
-import importlib
-from dataclasses import dataclass
-
-from gravcomp.config import DeclaredParameter, declared_parameters
-from gravcomp.graph.parameters.shared import SharedParameters
-
-
-@dataclass(frozen=True)
-class Port:
-    """A topic or service: its name, its type, what it carries with its unit; `rate` in Hz where the graph keeps one."""
-
-    name: str
-    type: str
-    meaning: str
-    rate: float | None = None
-    optional: bool = False  # not there in every configuration
-
-
-@dataclass(frozen=True)
-class Node:
-    """A node: where it is found, what it is for, and its ports.
-
-    parameters: module and data class, none for a program that only looks; tool: watches or works a graph from outside, which does not
-    depend on it.
-    """
-
-    package: str
-    executable: str
-    summary: str
-    parameters: str = ""
-    takes: tuple[Port, ...] = ()
-    gives: tuple[Port, ...] = ()
-    services: tuple[Port, ...] = ()
-    tool: bool = False
-
-    def declared_parameters(self) -> list[DeclaredParameter]:
-        """The node's parameters, those that every node has first."""
-        if not self.parameters:
-            return []
-        module, name = self.parameters.split(":")
-        return declared_parameters(SharedParameters) + declared_parameters(getattr(importlib.import_module(module), name))
-
+from gravcomp.graph.interface import Node, Port
 
 _PARAMETERS = "gravcomp.graph.parameters"
 _DIAGNOSTICS = Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "state of the node, 1 Hz")
 
 NODES = (
     Node(
-        "gravcomp_hw", "can_bridge", "drives the cables over CAN; publishes the IMU and what the cables do",
+        "gravcomp_hw", "can_bridge", "drives the cables over CAN; publishes the IMU samples and the state of the cables",
         f"{_PARAMETERS}.can_bridge:CanBridgeParameters",
-        takes=(
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "displacements in m, pulled in is positive"),
-            Port("imu/heater", "std_msgs/msg/Float32", "duty of the IMU's heater, 0..1"),
+        subscribes=(
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m, positive: pulled in"),
+            Port("imu/heater", "std_msgs/msg/Float32", "duty of the IMU's heater, 0 to 1"),
         ),
-        gives=(
-            Port("imu/data_raw", "sensor_msgs/msg/Imu", "m/s^2 and rad/s in imu_link, no orientation", 100.0),
-            Port("imu/temperature", "sensor_msgs/msg/Temperature", "degC"),
-            Port("cable/state", "gravcomp_msgs/msg/CableState", "state of the bridge, measured displacements in m"),
-            Port("joint_states", "sensor_msgs/msg/JointState", "the cables as joints: m, m/s, N"),
+        publishes=(
+            Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link", 100.0),
+            Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "bridge state, measured displacements (m) and tensions (N)"),
+            Port("joint_states", "sensor_msgs/msg/JointState", "the cables as prismatic joints: m, m/s, N"),
             _DIAGNOSTICS,
         ),
         services=(
-            Port("~/home", "std_srvs/srv/Trigger", "tighten each cable, set its zero"),
-            Port("~/stop", "std_srvs/srv/Trigger", "zero current at once"),
-            Port("~/release", "std_srvs/srv/Trigger", "zero current, the cables may run out"),
-            Port("~/resume", "std_srvs/srv/Trigger", "go on after a stop or a fault"),
+            Port("~/home", "std_srvs/srv/Trigger", "tighten each cable and set its zero position"),
+            Port("~/stop", "std_srvs/srv/Trigger", "set all currents to zero immediately"),
+            Port("~/release", "std_srvs/srv/Trigger", "pay the cables out, then set all currents to zero"),
+            Port("~/resume", "std_srvs/srv/Trigger", "continue after a stop or a fault"),
         ),
     ),
     Node(
-        "gravcomp_estimation", "imu_estimator", "where gravity points, and the temperature control of the IMU",
+        "gravcomp_estimation", "imu_estimator", "estimates orientation and gravity, and controls the IMU's temperature",
         f"{_PARAMETERS}.imu_estimator:ImuEstimatorParameters",
-        takes=(
-            Port("imu/data_raw", "sensor_msgs/msg/Imu", "m/s^2 and rad/s in imu_link"),
-            Port("imu/temperature", "sensor_msgs/msg/Temperature", "degC"),
+        subscribes=(
+            Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link"),
+            Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC"),
         ),
-        gives=(
-            Port("imu/data", "sensor_msgs/msg/Imu", "with orientation and covariances, bias taken off (REP-145)", 100.0),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "m/s^2 in soft_base", 100.0),
-            Port("imu/bias", "geometry_msgs/msg/Vector3Stamped", "of the gyroscope, rad/s"),
-            Port("imu/status", "gravcomp_msgs/msg/ImuStatus", "what is thought of the IMU"),
-            Port("imu/heater", "std_msgs/msg/Float32", "duty of the heater, 0..1"),
+        publishes=(
+            Port("imu/data", "sensor_msgs/msg/Imu", "with orientation and covariances, bias removed (REP-145)", 100.0),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2, in soft_base", 100.0),
+            Port("imu/bias", "geometry_msgs/msg/Vector3Stamped", "gyroscope bias in rad/s"),
+            Port("imu/status", "gravcomp_msgs/msg/ImuStatus", "IMU health, bias and temperature state"),
+            Port("imu/heater", "std_msgs/msg/Float32", "duty of the IMU's heater, 0 to 1"),
             _DIAGNOSTICS,
         ),
         services=(
-            Port("~/reset", "std_srvs/srv/Trigger", "begin anew"),
-            Port("~/reset_bias", "std_srvs/srv/Trigger", "forget the bias"),
+            Port("~/reset", "std_srvs/srv/Trigger", "restart orientation, bias and heater control"),
+            Port("~/reset_bias", "std_srvs/srv/Trigger", "restart the bias estimate"),
         ),
     ),
     Node(
-        "gravcomp_fem", "fem_simulator", "the robot's shape under the virtual gravity, and how it answers to the cables",
+        "gravcomp_fem", "fem_simulator", "computes the robot's shape under the virtual gravity, and its compliance to the cables",
         f"{_PARAMETERS}.fem_simulator:FemSimulatorParameters",
-        takes=(
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "m/s^2 in soft_base"),
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "what drives the model's cables (cables_from: command)"),
-            Port("cable/state", "gravcomp_msgs/msg/CableState", "or this (cables_from: state)", optional=True),
+        subscribes=(
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2, in soft_base"),
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
         ),
-        gives=(
-            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape, cables, and the linear answer to the cables", 100.0),
-            Port("robot/tip", "geometry_msgs/msg/PoseStamped", "m, in soft_base", 100.0),
-            Port("robot/markers", "visualization_msgs/msg/MarkerArray", "for RViz, up to 10 Hz"),
-            Port("/tf", "tf2_msgs/msg/TFMessage", "soft_tip and backbone frames, where tf2_msgs is installed", optional=True),
+        publishes=(
+            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape, cables and compliance", 100.0),
+            Port("robot/tip", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m", 100.0),
+            Port("robot/markers", "visualization_msgs/msg/MarkerArray", "markers for RViz, up to 10 Hz"),
+            Port("/tf", "tf2_msgs/msg/TFMessage", "frames of tip and backbone, where tf2_msgs is installed", optional=True),
             _DIAGNOSTICS,
         ),
     ),
     Node(
-        "gravcomp_fem", "inverse_controller", "the cable displacements that bring the modelled robot to its target",
+        "gravcomp_fem", "inverse_controller", "computes the cable displacements that bring the model to its target",
         f"{_PARAMETERS}.inverse_controller:InverseControllerParameters",
-        takes=(
-            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape and linear answer"),
-            Port("target", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m; its z axis is the direction"),
-            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "tip, direction, backbone points or a bend, with weights"),
+        subscribes=(
+            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape and compliance"),
+            Port("target", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m; its z axis is the tip direction"),
+            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "target tip, direction, backbone points or bend, with weights"),
         ),
-        gives=(
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "displacements in m, pulled in is positive", 100.0),
-            Port("controller/status", "gravcomp_msgs/msg/ControllerStatus", "how well the target is kept"),
+        publishes=(
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m, positive: pulled in", 100.0),
+            Port("controller/status", "gravcomp_msgs/msg/ControllerStatus", "tracking error and state of the controller"),
             _DIAGNOSTICS,
         ),
         services=(
-            Port("~/enable", "std_srvs/srv/SetBool", "compensate, or send nothing"),
+            Port("~/enable", "std_srvs/srv/SetBool", "start or stop sending commands"),
             Port("~/relax", "std_srvs/srv/Trigger", "pay the cables out until ~/enable is called"),
         ),
     ),
     Node(
-        "gravcomp_hw", "virtual_robot", "the robot that is not there: rod, cables, motors and IMU board behind CAN frames",
+        "gravcomp_hw", "virtual_robot", "simulates the hardware: rod, cables, motors and IMU board behind CAN frames",
         f"{_PARAMETERS}.virtual_robot:VirtualRobotNodeParameters",
-        takes=(
-            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "world from soft_base (motion: topic, or steerable)"),
-            Port("virtual/fault", "std_msgs/msg/String", "a fault as YAML, e.g. {kind: stall, cable: s1c2, duration: 1.0}; or 'clear'"),
+        subscribes=(
+            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "rotation from soft_base to world"),
+            Port("virtual/fault", "std_msgs/msg/String", "fault as YAML, {kind: stall, cable: s1c2, duration: 1.0}, or 'clear'"),
         ),
-        gives=(
-            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "m, in soft_base; for judging alone"),
-            Port("truth/backbone", "geometry_msgs/msg/PoseArray", "m, in soft_base; for judging alone"),
-            Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "m/s^2, in soft_base; for judging alone"),
+        publishes=(
+            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; only for evaluation"),
+            Port("truth/backbone", "geometry_msgs/msg/PoseArray", "backbone in soft_base, m; only for evaluation"),
+            Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in soft_base, m/s^2; only for evaluation"),
             _DIAGNOSTICS,
         ),
     ),
     Node(
-        "gravcomp_hw", "judge", "plays sag and compensation on a running graph and judges it by the virtual robot's truth",
+        "gravcomp_hw", "judge", "runs release and compensation, and evaluates them with the virtual robot's ground truth",
         f"{_PARAMETERS}.judge:JudgeParameters",
-        takes=(
-            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "m"),
-            Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "m/s^2"),
-            Port("robot/tip", "geometry_msgs/msg/PoseStamped", "m"),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "m/s^2"),
-            Port("imu/data_raw", "sensor_msgs/msg/Imu", "its rate"),
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its rate"),
+        subscribes=(
+            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "ground truth of the tip, m"),
+            Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "ground truth of gravity, m/s^2"),
+            Port("robot/tip", "geometry_msgs/msg/PoseStamped", "the model's tip, m"),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "estimated gravity, m/s^2"),
+            Port("imu/data_raw", "sensor_msgs/msg/Imu", "its rate is measured"),
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its rate is measured"),
         ),
-        gives=(_DIAGNOSTICS,),
+        publishes=(_DIAGNOSTICS,),
         tool=True,
     ),
     Node(
-        "gravcomp_estimation", "imu_replay", "the IMU stream of a bag at its own times",
+        "gravcomp_estimation", "imu_replay", "plays the IMU samples of a recording at their own times",
         f"{_PARAMETERS}.imu_replay:ImuReplayParameters",
-        gives=(
-            Port("imu/data_raw", "sensor_msgs/msg/Imu", "m/s^2 and rad/s in imu_link"),
-            Port("imu/temperature", "sensor_msgs/msg/Temperature", "degC"),
-            Port("/clock", "rosgraph_msgs/msg/Clock", "the bag's time"),
+        publishes=(
+            Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link"),
+            Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC"),
+            Port("/clock", "rosgraph_msgs/msg/Clock", "time of the recording"),
             _DIAGNOSTICS,
         ),
     ),
     Node(
-        "gravcomp_estimation", "arm_gravity", "gravity from the arm that carries the robot: in place of the IMU, or as a check of it",
+        "gravcomp_estimation", "arm_gravity", "computes gravity from the pose of the arm, in place of the IMU or to check it",
         f"{_PARAMETERS}.arm_gravity:ArmGravityParameters",
-        takes=(
-            Port("joint_states", "sensor_msgs/msg/JointState", "of the arm (source: joint_states)"),
+        subscribes=(
+            Port("joint_states", "sensor_msgs/msg/JointState", "positions of the arm's joints (source: joint_states)"),
             Port("robot_description", "std_msgs/msg/String", "URDF of arm and robot", optional=True),
-            Port("/tf", "tf2_msgs/msg/TFMessage", "the arm's frames, in place of both (source: tf)", optional=True),
-            Port("/tf_static", "tf2_msgs/msg/TFMessage", "the arm's fixed frames (source: tf)", optional=True),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "the IMU's, to be checked (use: check)", optional=True),
+            Port("/tf", "tf2_msgs/msg/TFMessage", "frames of the arm (source: tf)", optional=True),
+            Port("/tf_static", "tf2_msgs/msg/TFMessage", "fixed frames of the arm (source: tf)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the IMU (use: check)", optional=True),
         ),
-        gives=(
-            Port("gravity/arm", "geometry_msgs/msg/Vector3Stamped", "m/s^2 in soft_base, from the arm (use: check)", optional=True),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "the same in place of imu_estimator (use: publish)", optional=True),
+        publishes=(
+            Port("gravity/arm", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: check)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: publish)", optional=True),
             _DIAGNOSTICS,
         ),
     ),
     Node(
-        "gravcomp_fem", "viewer", "a live 3D page of what is published, with controls",
+        "gravcomp_fem", "viewer", "serves a live 3D page of the graph, with controls",
         f"{_PARAMETERS}.viewer:ViewerParameters",
-        takes=(
-            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "body, cables and gravity"),
-            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its delay"),
-            Port("cable/state", "gravcomp_msgs/msg/CableState", "tensions by the motors, and the bridge's state"),
-            Port("controller/status", "gravcomp_msgs/msg/ControllerStatus", "what the controller says"),
-            Port("target", "geometry_msgs/msg/PoseStamped", "the target, whoever sets it"),
-            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "likewise"),
-            Port("truth/backbone", "geometry_msgs/msg/PoseArray", "the virtual robot's shape, where there is one"),
+        subscribes=(
+            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape, cables and gravity"),
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "delay of the command"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "measured tensions and the bridge's state"),
+            Port("controller/status", "gravcomp_msgs/msg/ControllerStatus", "state of the controller"),
+            Port("target", "geometry_msgs/msg/PoseStamped", "current target"),
+            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "current target"),
+            Port("truth/backbone", "geometry_msgs/msg/PoseArray", "shape of the virtual robot, where there is one"),
         ),
-        gives=(
-            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "what is picked on the page"),
-            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "how the base is tilted on the page"),
-            Port("virtual/fault", "std_msgs/msg/String", "what is broken on the page"),
+        publishes=(
+            Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "target set on the page"),
+            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "tilt of the base set on the page"),
+            Port("virtual/fault", "std_msgs/msg/String", "fault set on the page"),
             _DIAGNOSTICS,
         ),
     ),
     Node(
-        "gravcomp_fem", "recorder", "the graph's topics into a bag, as they come",
+        "gravcomp_fem", "recorder", "writes the graph's topics into a bag",
         f"{_PARAMETERS}.recorder:RecorderParameters",
-        takes=(Port("*", "any", "every topic of the namespace and the global ones, or those of `topics`"),),
-        gives=(_DIAGNOSTICS,),
+        subscribes=(Port("*", "any", "every topic of the namespace and every global topic, or those in `topics`"),),
+        publishes=(_DIAGNOSTICS,),
         tool=True,
     ),
     Node(
-        "gravcomp_fem", "arm_player", "an arm that is not there: carries the virtual robot through poses and judges it",
+        "gravcomp_fem", "arm_player", "simulates an arm that carries the virtual robot through poses, and measures the tip error",
         f"{_PARAMETERS}.arm_player:ArmPlayerParameters",
-        takes=(
-            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "m, in soft_base; for judging alone"),
-            Port("cable/state", "gravcomp_msgs/msg/CableState", "whether the bridge follows"),
-            Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "by how much arm_gravity says that arm and IMU disagree"),
+        subscribes=(
+            Port("truth/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; only for evaluation"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "state of the bridge"),
+            Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "difference of arm and IMU, from arm_gravity"),
         ),
-        gives=(
-            Port("joint_states", "sensor_msgs/msg/JointState", "the arm's joints in rad"),
+        publishes=(
+            Port("joint_states", "sensor_msgs/msg/JointState", "positions of the arm's joints in rad"),
             Port("robot_description", "std_msgs/msg/String", "URDF of arm and robot"),
-            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "world from soft_base, as the arm holds it"),
+            Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "rotation from soft_base to world"),
             _DIAGNOSTICS,
         ),
     ),
@@ -224,5 +183,5 @@ NODES = (
 
 
 def node(executable: str) -> Node:
-    """The node of that name."""
+    """The node with this executable. Raises StopIteration when there is none."""
     return next(entry for entry in NODES if entry.executable == executable)

@@ -7,28 +7,34 @@ from gravcomp.config import parameter
 
 @dataclasses.dataclass(frozen=True)
 class ArmGravityParameters:
-    """Where the arm's pose comes from, and what is done with gravity from it."""
+    """Source of the arm's pose, and use of the gravity computed from it."""
 
     use: str = parameter(
         "check",
         choices=("check", "publish"),
         read_only=True,
-        description="compare with the IMU's gravity, or publish gravity itself, in place of imu_estimator",
+        description="check: compare with the IMU's gravity; publish: publish gravity in place of imu_estimator",
     )
     source: str = parameter(
         "joint_states",
         choices=("joint_states", "tf"),
         read_only=True,
-        description="the joints' positions and the URDF, or TF (needs tf2_msgs, that is a ROS installation)",
+        description="joint_states: joint positions and URDF; tf: TF (needs tf2_msgs, that is a ROS installation)",
     )
     urdf: str = parameter(
-        "", unit="path", read_only=True, description="URDF with arm and robot; empty: the topic robot_description"
+        "", unit="path", read_only=True, description="URDF with arm and robot; empty: from the topic robot_description"
     )
     world_frame: str = parameter(
-        "world", read_only=True, description="frame whose z points up; the link or TF frame that carries the arm"
+        "world", read_only=True, description="link or TF frame that carries the arm; its z axis points up"
     )
-    base_frame: str = parameter("soft_base", read_only=True, description="the robot's base in the URDF or in TF")
+    base_frame: str = parameter("soft_base", read_only=True, description="link or TF frame of the robot's base")
     tolerance: float = parameter(
-        3.0, edge="deg", minimum=0.05, maximum=90.0, description="between both directions of gravity, beyond that they disagree"
+        3.0,
+        edge="deg",
+        minimum=0.05,
+        maximum=90.0,
+        description="largest angle between the gravity of arm and IMU at which they agree",
     )
-    patience: float = parameter(0.5, unit="s", minimum=0.0, maximum=60.0, description="how long they may, before it is reported")
+    patience: float = parameter(
+        0.5, unit="s", minimum=0.0, maximum=60.0, description="a disagreement that lasts longer is reported"
+    )

@@ -1,4 +1,4 @@
-"""Parameters of the node fault_probe."""
+"""Parameters of gravcomp_hw.fault_probe."""
 
 import dataclasses
 
@@ -7,6 +7,6 @@ from gravcomp.config import parameter
 
 @dataclasses.dataclass(frozen=True)
 class FaultProbeParameters:
-    """What can be set on the node."""
+    """Parameters of the module."""
 
-    seed: int = parameter(1, minimum=0, maximum=2**31 - 1, read_only=True, description="of the hostile messages")
+    seed: int = parameter(1, minimum=0, maximum=2**31 - 1, read_only=True, description="seed of the hostile messages")

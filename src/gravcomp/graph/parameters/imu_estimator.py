@@ -14,7 +14,7 @@ RELIABILITIES = ("auto", "best_effort", "reliable")
 
 @dataclass(frozen=True)
 class ImuEstimatorParameters:
-    """What can be set on the node; where the IMU sits is in the robot's file under robot.imu_mount."""
+    """Parameters of the node; the pose of the IMU is in the robot file under robot.imu_mount."""
 
     imu_frame: str = parameter("imu_link", description="frame of imu/data", read_only=True)
     base_frame: str = parameter("soft_base", description="frame of gravity", read_only=True)
@@ -22,11 +22,13 @@ class ImuEstimatorParameters:
         "auto",
         choices=RELIABILITIES,
         read_only=True,
-        description="how imu/data_raw is taken; auto: as reliably as it is offered, so a replayed bag loses nothing",
+        description="reliability of the subscription to imu/data_raw; auto: as offered, so that no sample of a replay is lost",
     )
-    stale_time: float = parameter(0.5, unit="s", minimum=0.05, maximum=10, description="no sample for so long: NO_DATA")
+    stale_time: float = parameter(
+        0.5, unit="s", minimum=0.05, maximum=10, description="without a sample for this time the status is NO_DATA"
+    )
     bias_model_file: str = parameter(
-        "", read_only=True, description="where the bias over temperature is kept; empty: neither used nor learned", unit="path"
+        "", read_only=True, description="file of the bias over temperature; empty: neither used nor learned", unit="path"
     )
     filter: FilterOptions = field(default_factory=FilterOptions)
     calibration: ImuCalibration = field(default_factory=ImuCalibration)
@@ -35,5 +37,5 @@ class ImuEstimatorParameters:
 
     @property
     def estimator(self) -> EstimatorOptions:
-        """What the orientation depends on."""
+        """Options of the orientation estimate."""
         return EstimatorOptions(self.filter, self.calibration, self.prediction)

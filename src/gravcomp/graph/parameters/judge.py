@@ -7,13 +7,23 @@ from gravcomp.config import parameter
 
 @dataclasses.dataclass(frozen=True)
 class JudgeParameters:
-    """What can be set on the node."""
+    """Parameters of the node."""
 
     duration: float = parameter(
-        30.0, unit="s", minimum=5.0, maximum=86400.0, read_only=True, description="of the run, from the first truth on"
+        30.0,
+        unit="s",
+        minimum=5.0,
+        maximum=86400.0,
+        read_only=True,
+        description="duration of the run, from the first ground truth on",
     )
     relax_time: float = parameter(
-        8.0, unit="s", minimum=0.0, maximum=3600.0, read_only=True, description="with released cables, before compensation begins"
+        8.0,
+        unit="s",
+        minimum=0.0,
+        maximum=3600.0,
+        read_only=True,
+        description="time with released cables before compensation begins",
     )
     settle_time: float = parameter(
         4.0,
@@ -21,19 +31,19 @@ class JudgeParameters:
         minimum=0.0,
         maximum=600.0,
         read_only=True,
-        description="after compensation began, not counted in the residual",
+        description="time after the start of compensation that is not counted in the residual",
     )
     start_timeout: float = parameter(
-        60.0, unit="s", minimum=1.0, maximum=600.0, read_only=True, description="for the first truth to come"
+        60.0, unit="s", minimum=1.0, maximum=600.0, read_only=True, description="longest wait for the first ground truth"
     )
     result_file: str = parameter(
-        "", read_only=True, description="JSON file with the state of the run, renewed while it goes; empty: none"
+        "", read_only=True, description="JSON file with the current state and figures, rewritten during the run; empty: none"
     )
     nodes: tuple[str, ...] = parameter((), read_only=True, description="nodes whose lifecycle states are reported")
     measure_delay: bool = parameter(
-        True, read_only=True, description="listen to the CAN bus for the delay from IMU to motor current"
+        True, read_only=True, description="measure the delay from IMU sample to motor current on the CAN bus"
     )
     interface: str = parameter(
-        "", read_only=True, description="python-can interface; empty: hardware.can.interface of the robot's file"
+        "", read_only=True, description="python-can interface; empty: hardware.can.interface of the robot file"
     )
-    channel: str = parameter("", read_only=True, description="its channel; empty: hardware.can.channel of the robot's file")
+    channel: str = parameter("", read_only=True, description="CAN channel; empty: hardware.can.channel of the robot file")

@@ -7,9 +7,7 @@ from gravcomp.config import parameter
 
 @dataclass(frozen=True)
 class SharedParameters:
-    """Which robot, and whether the node goes active by itself."""
+    """Parameters of every node."""
 
-    robot: str = parameter("article", read_only=True, description="a shipped robot's name or the path of a robot's YAML")
-    autostart: bool = parameter(
-        True, read_only=True, description="configure and activate at the start, without a lifecycle manager"
-    )
+    robot: str = parameter("article", read_only=True, description="name of a shipped robot or path of a robot file")
+    autostart: bool = parameter(True, read_only=True, description="configure and activate at start, without a lifecycle manager")

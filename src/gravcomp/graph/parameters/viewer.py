@@ -8,7 +8,7 @@ from gravcomp.view.options import PageOptions
 
 @dataclasses.dataclass(frozen=True)
 class ViewerParameters(PageOptions):
-    """What can be set on the node: the page's options, and what it does with what people ask for."""
+    """Parameters of the node: the page's options, and those of its targets and bags."""
 
     frame: str = parameter("soft_base", read_only=True, description="frame of the targets that the page sets")
     tip_direction_weight: float = parameter(
@@ -16,8 +16,8 @@ class ViewerParameters(PageOptions):
         unit="m^2",
         minimum=0.0,
         maximum=10.0,
-        description="of the targets that the page sets, beside a weight of 1 of the tip's position",
+        description="weight of the tip direction in the targets that the page sets; the tip position has weight 1",
     )
     bag_folder: str = parameter(
-        "", unit="path", read_only=True, description="where bags are recorded; empty: the folder it was started in"
+        "", unit="path", read_only=True, description="folder of the recorded bags; empty: the current folder"
     )
