@@ -1,4 +1,4 @@
-"""The shell that all nodes share: declared parameters, lifecycle, status, diagnostics and a clean end.
+"""Base of all nodes: declared parameters, lifecycle, diagnostics and a clean shutdown.
 
 class Sensor(ManagedNode):
     name = "sensor"

@@ -1,13 +1,13 @@
-"""An executor for nodes that follow streams of messages: little work between a message and its callback.
+"""An executor for nodes that process streams of messages, with little overhead between a message and its callback.
 
-rclpy's own gathers all entities of a node anew for every message, makes a task with three coroutines of it, and lets the middleware
-wait for a dozen services each time; at a hundred messages a second that costs several times what our callbacks do. Here
+For every message, rclpy's executor collects all entities of the node again, creates a task with three coroutines, and lets the
+middleware wait for about a dozen services. At 100 messages per second this costs several times as much as the callbacks. Here
 
-    main thread    waits for subscriptions and timers alone, with lists made anew only when the node's entities change
-    second thread  rclpy's executor for everything else: asleep until a service or client has something; it looks at the events
-                   of the middleware once a second, since whoever waits for those of a subscription is woken by its messages, too
+    main thread    waits for subscriptions and timers only; its lists are rebuilt only when the node's entities change
+    second thread  runs rclpy's executor for everything else. It sleeps until a service or client is ready. It checks the events
+                   of the middleware only once per second, because a wait for the events of a subscription also ends for messages
 
-Callbacks of both are run one at a time, as by a single thread: whoever calls one holds the same lock. No callback may be a coroutine.
+Both threads hold the same lock while they call a callback, so callbacks run one at a time. A callback must not be a coroutine.
 """
 
 import contextlib
@@ -23,11 +23,11 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-_EVENT_PERIOD = 1.0  # s between two looks at events of the middleware, such as a quality of service that does not fit
+_EVENT_PERIOD = 1.0  # s between two checks for events of the middleware, such as incompatible quality of service
 
 
 class StreamExecutor:
-    """Spins one node. `spin_once` is called from one thread only; an exception of any callback is raised there."""
+    """Executes the callbacks of one node. Call `spin_once` from one thread only; it raises the exceptions of all callbacks."""
 
     def __init__(self, node: Node):
         self._node, self._context = node, node.context
@@ -35,8 +35,8 @@ class StreamExecutor:
         self._guard = GuardCondition(callback=None, callback_group=None, context=node.context)
         self._rare = _RareExecutor(self)
         self._changed = True
-        self._held = contextlib.ExitStack()  # the handles of the lists, so that none is destroyed while it is waited for
-        self._subscriptions: dict[int, Subscription] = {}  # by the pointers that a wait answers with
+        self._held = contextlib.ExitStack()  # keeps the handles of the lists alive while the wait set uses them
+        self._subscriptions: dict[int, Subscription] = {}  # key: the pointer that the wait set returns
         self._timers: dict[int, Timer] = {}
         self._wait_set: Any = None
         self._error: BaseException | None = None
@@ -46,7 +46,7 @@ class StreamExecutor:
         self._thread.start()
 
     def spin_once(self, timeout: float) -> None:
-        """Wait up to `timeout` (s) for messages and timers, and call what is due."""
+        """Wait up to `timeout` (s) for messages and timers, and call their callbacks."""
         if self._error is not None:
             raise self._error
         with self._serial:
@@ -66,7 +66,7 @@ class StreamExecutor:
             self._call_subscription(self._subscriptions[pointer])
 
     def shutdown(self) -> None:
-        """End the second thread and let go of the node."""
+        """Stop the second thread and release the node."""
         self._ending = True
         self._rare.wake()
         self._thread.join(5.0)
@@ -75,12 +75,12 @@ class StreamExecutor:
         self._guard.destroy()
 
     def entities_changed(self) -> None:
-        """The node has got or lost an entity; from any thread."""
+        """Rebuild the lists before the next wait, because the node's entities have changed. Callable from any thread."""
         self._changed = True
         self._trigger()
 
     def _gather(self) -> None:
-        """The lists anew. Entities whose group executes nothing (gravcomp_node.polled) are not waited for."""
+        """Rebuild the lists, without the entities whose callback group executes nothing (gravcomp_node.polled)."""
         self._changed = False
         self._held.close()
         self._subscriptions = self._hold(self._node.subscriptions)
@@ -101,7 +101,7 @@ class StreamExecutor:
     def _call_timer(self, timer: Timer) -> None:
         with self._serial, contextlib.suppress(InvalidHandle):
             with timer.handle:
-                if not timer.handle.is_timer_ready():  # cancelled, or served meanwhile
+                if not timer.handle.is_timer_ready():  # cancelled, or called in the meantime
                     return
                 timer.handle.call_timer()
             timer.callback()
@@ -109,7 +109,7 @@ class StreamExecutor:
     def _call_subscription(self, subscription: Subscription) -> None:
         with self._serial:
             if self._changed and subscription not in list(self._node.subscriptions):
-                return  # destroyed by a callback of this round
+                return  # destroyed by a callback that ran before it
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             if taken is None:
                 return
@@ -119,7 +119,7 @@ class StreamExecutor:
                 subscription.callback(*taken)
 
     def _serve(self) -> None:
-        """The second thread."""
+        """Body of the second thread."""
         try:
             while not self._ending:
                 self._rare.takes_events = False
@@ -128,12 +128,12 @@ class StreamExecutor:
                 self._serve_what_comes(0.0)
         except (ShutdownException, ExternalShutdownException):
             return
-        except BaseException as error:  # raised where somebody sees it
+        except BaseException as error:  # spin_once raises it in the main thread
             self._error = error
             self._trigger()
 
     def _serve_what_comes(self, timeout: float) -> None:
-        """One after the other, until nothing has come for `timeout` (s)."""
+        """Call callbacks one after the other until none is ready within `timeout` (s)."""
         while not self._ending:
             try:
                 handler, _, _ = self._rare.wait_for_ready_callbacks(timeout)
@@ -150,7 +150,7 @@ class StreamExecutor:
 
 
 class _RareExecutor(SingleThreadedExecutor):
-    """rclpy's executor of what comes rarely; the one that the node knows, so it hears of every new entity."""
+    """rclpy's executor for services and events. The node is registered with it, so it is notified of every new entity."""
 
     def __init__(self, owner: StreamExecutor):
         super().__init__(context=owner._context)

@@ -1,4 +1,4 @@
-"""A lifecycle node whose parameters are one frozen data class, and which starts by itself unless told otherwise."""
+"""A lifecycle node with one frozen data class of parameters, which by default configures and activates itself."""
 
 import gc
 from typing import Any
@@ -18,7 +18,7 @@ OK, WARN, ERROR = (bytes([level]) for level in (0, 1, 2))
 class ManagedNode(LifecycleNode):
     """Base of all nodes. A subclass sets `name` and `parameters_class` and overrides the hooks it needs.
 
-    `parameters`: the current values (frozen data class); `robot_file`: the robot's YAML; `finished`: set it to end the process.
+    `parameters`: the current values (frozen data class); `robot_file`: the robot file; `finished`: set it to True to end the process.
     """
 
     name: str
@@ -47,31 +47,31 @@ class ManagedNode(LifecycleNode):
     # Hooks.
 
     def configure(self) -> None:
-        """Make what the node needs, publishers included. Raise ConfigError to refuse."""
+        """Create the node's resources, publishers included. Raise ConfigError to refuse the transition."""
 
     def activate(self) -> None:
-        """Begin: subscriptions and timers."""
+        """Create subscriptions and timers. Raise ConfigError to refuse the transition."""
 
     def deactivate(self) -> None:
-        """Cease; leave everything safe."""
+        """Destroy what `activate` created, and leave the hardware in a safe state."""
 
     def cleanup(self) -> None:
-        """Give back what `configure` made."""
+        """Release what `configure` created."""
 
     def check_parameters(self, new: Any) -> None:
-        """Refuse a change with ConfigError beyond what the ranges say."""
+        """Check a change beyond the declared ranges; raise ConfigError to refuse it."""
 
     def parameters_changed(self, old: Any, new: Any) -> None:
-        """React to a change; `self.parameters` is the new value already."""
+        """Apply a change; `self.parameters` already holds the new values."""
 
-    # What subclasses call.
+    # Called by subclasses and by `run`.
 
     def report(self, level: bytes, sentence: str, **values: Any) -> None:
-        """What /diagnostics says of this node from now on."""
+        """Set the level, message and values that /diagnostics publishes from now on."""
         self._level, self._sentence, self._values = level, sentence, values
 
     def start(self) -> None:
-        """Go active when autostart says so. Raises ConfigError when the node refuses."""
+        """Configure and activate if `autostart` is set. Raises ConfigError when the node refuses a transition."""
         if not self.autostart:
             return
         for transition in (self.trigger_configure, self.trigger_activate):
@@ -79,26 +79,28 @@ class ManagedNode(LifecycleNode):
                 raise ConfigError(self.failure or "could not be started")
 
     def shut_down(self) -> None:
-        """Leave the active state whatever state it is in; nothing raised."""
+        """Deactivate and clean up from any state. Logs exceptions instead of raising them."""
         for needed, step in ((self.is_active, self.deactivate), (self._is_configured, self.cleanup)):
             if needed:
                 try:
                     step()
-                except Exception as error:  # an end must go through to the last step
-                    self.get_logger().error(f"at the end: {error!r}")
+                except Exception as error:  # the remaining steps must still run
+                    self.get_logger().error(f"error during shutdown: {error!r}")
         self.is_active = self._is_configured = False
 
     # Lifecycle.
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Run `configure` and freeze the memory it allocated."""
         result = self._attempt(self.configure)
         self._is_configured = result == TransitionCallbackReturn.SUCCESS
         if self._is_configured:
             self.report(WARN, "configured, not active")
-            _set_memory_aside()
+            _freeze_memory()
         return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Run `activate`."""
         super().on_activate(state)
         self.report(OK, "active")
         result = self._attempt(self.activate)
@@ -106,6 +108,7 @@ class ManagedNode(LifecycleNode):
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Run `deactivate`."""
         self.is_active = False
         result = self._attempt(self.deactivate)
         super().on_deactivate(state)
@@ -114,6 +117,7 @@ class ManagedNode(LifecycleNode):
         return result
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Run `cleanup`."""
         self._is_configured = False
         result = self._attempt(self.cleanup)
         if result == TransitionCallbackReturn.SUCCESS:
@@ -121,8 +125,9 @@ class ManagedNode(LifecycleNode):
         return result
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Run `shut_down`; succeeds from any state."""
         self.shut_down()
-        self.report(WARN, "shut down: end the process and start it again to use it")
+        self.report(WARN, "shut down: restart the process to use the node again")
         return TransitionCallbackReturn.SUCCESS
 
     def _attempt(self, step: Any) -> TransitionCallbackReturn:
@@ -168,9 +173,10 @@ class ManagedNode(LifecycleNode):
         self._diagnostics.publish(message)
 
 
-def _set_memory_aside() -> None:
-    """Spare what stays (modules, compiled code, models) the collector's rounds: the first full one, a few seconds into the work, would
-    hold the node up for 0.1 to 0.4 s.
+def _freeze_memory() -> None:
+    """Exclude existing objects (modules, compiled code, models) from garbage collection.
+
+    The first full collection, a few seconds after the start, would block the node for 0.1 to 0.4 s.
     """
     gc.unfreeze()
     gc.collect()

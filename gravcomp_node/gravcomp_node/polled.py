@@ -1,8 +1,9 @@
-"""Subscriptions that are asked instead of calling: what has come when somebody wants it, at no cost until then.
+"""Subscriptions that are read when needed, without a callback and at no cost between two reads.
 
-A usual subscription wakes the process for each message, which costs an executor ten times more than taking it. A page of 20 Hz needs
-one in five messages of a stream of 100 Hz, and whoever keeps a record needs them in time to be kept, not at once. This one leaves them to the
-middleware, which keeps as many as the depth of its quality of service says and drops the older ones.
+A usual subscription wakes the process for each message, which costs the executor ten times as much as taking the message. A page
+with 20 updates per second needs only one in five messages of a 100 Hz stream, and a recorder can read messages in batches. A
+polled subscription leaves the messages in the middleware, which keeps as many as the depth of the quality of service and drops
+older ones.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from rclpy.qos import QoSProfile
 
 @dataclass(frozen=True)
 class Received:
-    """A message and when it was sent, ns of the system's clock; `number`: its place in its publisher's stream."""
+    """A message with the time at which it was sent (ns, system clock) and its sequence number at its publisher."""
 
     message: Any
     sent: int
@@ -23,7 +24,7 @@ class Received:
 
 
 class Polled:
-    """A topic that is asked for."""
+    """A polled subscription of `node` to a topic."""
 
     def __init__(self, node: LifecycleNode, kind: type, topic: str, qos: QoSProfile):
         self._node = node
@@ -32,12 +33,12 @@ class Polled:
         self.last: Received | None = None
 
     def take(self) -> Received | None:
-        """The newest of what has come since the last call; None when nothing has. `last` keeps it."""
+        """Return the newest message since the last call, or None. `last` keeps it."""
         fresh = self.take_all()
         return fresh[-1] if fresh else None
 
     def take_all(self) -> list[Received]:
-        """All that has come since the last call and was kept, oldest first."""
+        """Return all messages kept since the last call, oldest first."""
         fresh = []
         with self._subscription.handle:
             while (taken := self._subscription.handle.take_message(self._kind, False)) is not None:
@@ -47,11 +48,12 @@ class Polled:
         return fresh
 
     def destroy(self) -> None:
+        """Destroy the subscription."""
         self._node.destroy_subscription(self._subscription)
 
 
 class _NeverExecuted(CallbackGroup):
-    """An executor does not even wait for what may not be executed."""
+    """A group whose entities are never executed, so that an executor does not wait for them."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
@@ -64,4 +66,4 @@ class _NeverExecuted(CallbackGroup):
 
 
 def _never_called(_: Any) -> None:
-    raise AssertionError("asked for, never called")
+    raise AssertionError("a polled subscription has no callback")

@@ -1,4 +1,4 @@
-"""A declared data class as ROS parameters: descriptors, defaults from the robot's YAML, overrides, and back."""
+"""Conversion between declared data classes and ROS parameters: descriptors, defaults from the robot file, overrides."""
 
 import typing
 from typing import Any
@@ -11,10 +11,10 @@ from gravcomp.config import ConfigError, DeclaredParameter, convert, declared_pa
 
 
 def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
-    """Declare every leaf of `cls` on the node and return the data class with the overrides taken in.
+    """Declare every leaf of `cls` on the node and return the data class with the overrides applied.
 
-    `defaults`: nested mapping of edge keys from the robot's YAML; `source`: where it stands, for errors.
-    Raises ConfigError for a value of the wrong type or out of range, wherever it was given.
+    `defaults`: nested mapping of edge keys from the robot file; `source`: its origin, for error messages.
+    Raises ConfigError when a default or an override has the wrong type or is out of range.
     """
     check_defaults(cls, defaults, source)
     given = _flatten(defaults)
@@ -22,7 +22,7 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
         override = node._parameter_overrides.get(leaf.key)
         value = given.get(leaf.key, leaf.default)
         if override is not None:
-            # Checked here and not by rclpy, so that the error says what is allowed, and '1' is as good as '1.0'.
+            # Checked here instead of in rclpy, so that the error states what is allowed, and '1' is accepted for '1.0'.
             value = None if _is_unset(override.value, leaf) else override.value
             convert(value, leaf.type, leaf.parameter, source=f"parameter of {node.get_name()}", key=leaf.key)
         value = _ros_value(value, leaf.type)
@@ -31,7 +31,7 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
 
 
 def refuse_unknown_overrides(node: Node) -> None:
-    """A mistyped parameter is refused; ROS itself would ignore it."""
+    """Raise ConfigError for an override of an unknown parameter, which ROS would ignore."""
     for name in node._parameter_overrides:
         known = node.has_parameter(name) or name.startswith(("qos_overrides.", "start_type_description_service"))
         if not known:
@@ -40,7 +40,10 @@ def refuse_unknown_overrides(node: Node) -> None:
 
 
 def read(node: Node, cls: type, changes: list[Parameter] = ()) -> Any:
-    """The data class from the node's parameters, with `changes` (not yet set) taken in. Raises ConfigError."""
+    """Return the data class with the node's parameters and the `changes`, which are not set yet.
+
+    Raises ConfigError when a value is not allowed.
+    """
     changed = {p.name: p.value for p in changes}
     mapping: dict = {}
     for leaf in declared_parameters(cls):
@@ -59,7 +62,7 @@ def read(node: Node, cls: type, changes: list[Parameter] = ()) -> Any:
 
 
 def check_defaults(cls: type, defaults: dict, source: str) -> None:
-    """Check what the YAML gives: unknown keys and bad values; a key that only ROS will give may be missing."""
+    """Raise ConfigError for unknown keys and values that are not allowed; keys may be missing."""
     leaves = {leaf.key: leaf for leaf in declared_parameters(cls)}
     for key, value in _flatten(defaults).items():
         if key not in leaves:
@@ -68,7 +71,7 @@ def check_defaults(cls: type, defaults: dict, source: str) -> None:
 
 
 def _is_unset(value: Any, leaf: DeclaredParameter) -> bool:
-    """Whether a parameter that may be unset is: `ros2 param dump` writes null, which comes back from a file and from `ros2 param load` as a word."""
+    """Return whether an optional parameter is unset: null, which `ros2 param dump` writes, may return as text."""
     return _may_be_unset(leaf) and value in (None, "null", "None")
 
 
@@ -97,7 +100,7 @@ def _scalar_type(kind: Any) -> Any:
 
 
 def _ros_value(value: Any, kind: Any) -> Any:
-    """ROS knows no tuples and tells 1 from 1.0."""
+    """Convert to the types of ROS, which has no tuples and distinguishes 1 from 1.0."""
     scalar = _scalar_type(kind)
     if isinstance(value, (list, tuple)) or hasattr(value, "typecode"):
         return [scalar(v) for v in value]
@@ -113,7 +116,7 @@ def _descriptor(leaf: DeclaredParameter, value: Any) -> ParameterDescriptor:
         description=f"{declared.description}{unit}",
         additional_constraints=f"allowed: {declared.allowed()}",
         read_only=declared.read_only,
-        # An unset or empty value tells ROS no type, so it may change; `read` checks it all the same.
+        # The type of an unset or empty value is unknown to ROS, so it may change; `read` checks it.
         dynamic_typing=_may_be_unset(leaf) or value == [],
     )
     if leaf.type is float and (declared.minimum is not None or declared.maximum is not None):

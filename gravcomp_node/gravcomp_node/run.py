@@ -1,4 +1,4 @@
-"""A node's process: from the command line to a clean end under SIGINT and SIGTERM."""
+"""Process of a node: from the command line to a clean shutdown on SIGINT or SIGTERM."""
 
 import gc
 import signal
@@ -20,12 +20,15 @@ parameters (name, default, allowed, meaning):
 
 
 def run(node_class: type[ManagedNode], argv: list[str] | None = None) -> int:
-    """Run the node until a signal or until it has finished. Returns the exit code: 0, or 2 with a sentence on stderr."""
+    """Run the node until a signal arrives or the node has finished.
+
+    Return the exit code: 0, or 2 after an error, with one sentence on stderr.
+    """
     argv = sys.argv if argv is None else argv
     if {"-h", "--help"} & set(argv[1:]):
         print(_help(node_class))
         return 0
-    # Own handlers that only set a flag: rclpy's tear the context down under a running callback.
+    # These handlers only set a flag; rclpy's handlers would shut the context down during a callback.
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(True))
@@ -47,7 +50,7 @@ def run(node_class: type[ManagedNode], argv: list[str] | None = None) -> int:
             node.shut_down()
             node.destroy_node()
         rclpy.try_shutdown()
-        gc.unfreeze()  # what was set aside when the node was configured ends with it
+        gc.unfreeze()  # the objects frozen by ManagedNode end with the node
     return 0
 
 
