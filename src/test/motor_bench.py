@@ -1,4 +1,4 @@
-"""Six geared motors on springs behind CAN frames, and a bridge on top: a bench for the tests of gravcomp.motors."""
+"""Test bench for gravcomp.motors: a bridge and six geared motors on springs, connected by CAN frames."""
 
 import math
 import random
@@ -12,7 +12,7 @@ STEP = 5e-4  # s
 
 
 class SpringMotor:
-    """A motor with friction that winds a cable onto a spring which becomes taut at `taut` (m) from the start."""
+    """A motor with friction that pulls a spring by a cable, which is taut from the displacement `taut` (m) on."""
 
     def __init__(self, motor: Motor, drive: Drive, *, friction: float = 0.1, taut: float = 0.002, stiffness: float = 2000.0):
         self.motor, self.drive, self.friction, self.taut, self.stiffness = motor, drive, friction, taut, stiffness
@@ -55,7 +55,7 @@ class Bench:
         self.motors = [SpringMotor(m, hardware.drive, **(motors or {})) for m in hardware.motors]
         self.bridge = Bridge(hardware, **bridge)
         self.imu = True
-        self.largest_current = 0.0  # A, of all frames so far
+        self.largest_current = 0.0  # A, in all frames so far
         self.states = []
 
     def start(self) -> "Bench":
@@ -65,7 +65,7 @@ class Bench:
         return self
 
     def run(self, duration: float, command=None) -> None:
-        """`command(time since the call)` -> displacements, or None for no commands."""
+        """Run for `duration` (s). `command(time since the call)` returns displacements; None: no commands."""
         begin = self.now
         for _ in range(round(duration / STEP)):
             self._step += 1
@@ -94,5 +94,5 @@ class Bench:
                         motor.current = current
 
     def since(self, begin: float, state) -> float:
-        """s from `begin` until the state was first seen."""
+        """Return the time (s) from `begin` until the bridge was first in this state."""
         return next(t for t, s in self.states if t >= begin and s is state) - begin

@@ -1,4 +1,4 @@
-"""The bridge's states: every cause leads where the table in gravcomp_hw/README.md says, in time, and back without a restart."""
+"""States of the bridge: every cause leads in time to the state in the table of gravcomp_hw/README.md; recovery needs no restart."""
 
 import math
 import random
@@ -49,7 +49,7 @@ def test_the_first_commands_after_activation_do_not_jump():
     assert all(abs(motor.displacement) < 0.001 for motor in bench.motors)
 
 
-# Each: what happens, the state it leads to, within what time (s), what the message says.
+# Each: the cause, the state it leads to, the time limit (s), words of the message.
 CAUSES = {
     "stale command": (lambda b: b.run(0.3), State.HOLDING, 0.25, "no command from an IMU sample of the last 200 ms"),
     "stale imu": (lambda b: (setattr(b, "imu", False), b.run(0.3, lambda t: GOAL)), State.HOLDING, 0.25, "no good IMU samples"),
@@ -94,8 +94,8 @@ def test_every_cause_leads_to_its_safe_state_in_time(cause):
     assert (bench.bridge.state in DRIVING) or all(motor.current == 0.0 for motor in bench.motors)
 
 
-def test_commands_that_come_late_out_of_a_queue_do_not_keep_the_bridge_going():
-    """The estimator died, and what was under way goes on arriving: 200 ms count from its last IMU sample."""
+def test_old_commands_from_a_queue_do_not_keep_the_bridge_active():
+    """The estimator has died and its last commands still arrive: the 200 ms count from the last IMU sample."""
     bench = following()
     begin = bench.now
     for k in range(1, 8):
@@ -108,7 +108,7 @@ def test_commands_that_come_late_out_of_a_queue_do_not_keep_the_bridge_going():
 @pytest.mark.parametrize(
     "cause", ["stale command", "nan", "infinite", "too few", "outside", "jump", "old", "from the future", "bus lost"]
 )
-def test_after_what_passes_good_commands_suffice(cause):
+def test_good_commands_recover_from_temporary_causes(cause):
     bench = following()
     CAUSES[cause][0](bench)
     bench.run(0.6, lambda t: GOAL)
@@ -116,7 +116,7 @@ def test_after_what_passes_good_commands_suffice(cause):
 
 
 @pytest.mark.parametrize("cause", ["stop", "stall"])
-def test_after_what_was_asked_for_or_broke_resume_is_needed(cause):
+def test_after_a_stop_or_a_motor_fault_resume_is_needed(cause):
     bench = following()
     CAUSES[cause][0](bench)
     bench.run(0.5, lambda t: GOAL)
@@ -139,7 +139,7 @@ def test_zero_is_kept_over_a_short_loss_of_feedback():
 
 
 def test_after_a_long_loss_the_zero_is_where_the_cables_are():
-    """Nobody knows how far they ran meanwhile; `zero` says so for this bench."""
+    """It is unknown how far the cables moved; with `zero` = start the present position is used."""
     bench = following()
     for motor in bench.motors:
         motor.silent = True
@@ -151,8 +151,8 @@ def test_after_a_long_loss_the_zero_is_where_the_cables_are():
     assert bench.bridge.snapshot().displacement == pytest.approx([0.0] * 6, abs=2e-5)
 
 
-def test_turns_that_could_not_be_counted_wait_for_somebody_to_decide():
-    """A motor turned by hand while its feedback was away: its zero may be off by whole turns, silently."""
+def test_turns_that_could_not_be_counted_wait_for_the_user_to_decide():
+    """A motor was turned by hand while its feedback was missing: its zero may be off by whole turns."""
     bench = following()
     bench.motors[1].silent = True
     bench.run(0.3)
@@ -167,7 +167,7 @@ def test_turns_that_could_not_be_counted_wait_for_somebody_to_decide():
     assert bench.motors[1].displacement == pytest.approx(GOAL[1], abs=2e-5)
 
 
-def test_turns_that_could_not_be_counted_are_uncertain_again_when_homing_was_broken_off():
+def test_turns_that_could_not_be_counted_are_uncertain_again_after_homing_was_stopped():
     bench = following()
     bench.motors[1].silent = True
     bench.run(0.3)
@@ -182,8 +182,8 @@ def test_turns_that_could_not_be_counted_are_uncertain_again_when_homing_was_bro
     assert bench.bridge.state is State.FAULT and "could not be counted" in bench.bridge.message
 
 
-def test_frames_that_come_late_and_all_at_once_cost_neither_the_zero_nor_the_state():
-    """A receiver held up for 40 ms at full speed. While a count may have a turn too many, nothing is driven by it."""
+def test_frames_that_come_late_and_all_at_once_change_neither_zero_nor_state():
+    """A receiver is delayed by 40 ms at full speed. While the turns are in doubt the motors get no current."""
     bench, goal = Bench().start(), [0.01] * 6
     bench.run(0.2, lambda t: goal)
     late = []
@@ -206,8 +206,8 @@ def test_frames_that_come_late_and_all_at_once_cost_neither_the_zero_nor_the_sta
     assert [motor.displacement for motor in bench.motors] == pytest.approx(goal, abs=2e-5)
 
 
-def test_a_bridge_that_was_held_up_looks_before_it_drives():
-    """The guard zeroed the currents meanwhile and the cables may have run out; no current goes out by what was true before."""
+def test_a_delayed_bridge_waits_for_new_feedback_before_it_drives():
+    """The guard has zeroed the currents and the cables may have moved; no current is computed from old feedback."""
     bench = following()
     bench.now += 0.5
     for motor in bench.motors:
@@ -219,7 +219,7 @@ def test_a_bridge_that_was_held_up_looks_before_it_drives():
     assert bench.bridge.state is State.ACTIVE
 
 
-def test_a_bridge_that_is_homing_keeps_the_zeros_from_before_for_a_later_one():
+def test_during_homing_the_record_has_the_zeros_from_before():
     bench = following()
     before = bench.bridge.zero_record()
     bench.bridge.home(bench.now)
@@ -228,8 +228,8 @@ def test_a_bridge_that_is_homing_keeps_the_zeros_from_before_for_a_later_one():
     assert {i: rotor.zero for i, rotor in bench.bridge.zero_record().items()} == {i: rotor.zero for i, rotor in before.items()}
 
 
-def test_zeros_that_a_guard_kept_do_not_hold_for_motors_that_answer_much_later():
-    """They were without supply; nobody knows where the cables are."""
+def test_restored_zeros_are_lost_when_the_motors_answer_much_later():
+    """The motors had no supply; the positions of the cables are unknown."""
     bench = following()
     record = bench.bridge.zero_record()
     bench.bridge = later = Bench(zero="home").bridge
@@ -245,7 +245,7 @@ def test_zeros_that_a_guard_kept_do_not_hold_for_motors_that_answer_much_later()
     assert later.state is State.STOPPED and "not homed" in later.message
 
 
-def test_unknown_zero_waits_for_homing_when_it_is_asked_so():
+def test_with_zero_home_an_unknown_zero_waits_for_homing():
     bench = Bench(zero="home").start()
     assert bench.bridge.state is State.STOPPED and "not homed" in bench.bridge.message
     assert bench.largest_current == 0.0
@@ -260,7 +260,7 @@ def test_an_encoder_that_jumps_is_a_fault():
 
 
 def test_a_motor_wired_the_wrong_way_round_is_stopped():
-    """The feedback tells the opposite sense of the currents, so the loop pushes away from its setpoint."""
+    """The feedback has the opposite sign of the currents, so the loop drives away from its setpoint."""
     bench = Bench()
     bench.motors[0].feedback = lambda: mirrored(bench.motors[0])
     bench.start()
@@ -274,7 +274,7 @@ def mirrored(motor):
     return codec.encode(f"MotorFeedback{motor.sent_id}", angle=8191 - values.angle, speed=-values.speed, current=values.current)
 
 
-def test_a_bridge_that_is_activated_again_knows_its_zeros_though_the_cables_were_moved_meanwhile():
+def test_a_bridge_that_is_activated_again_has_its_zeros_although_the_cables_were_moved():
     bench = following()
     bench.bridge.deactivate()
     bench.deliver(bench.bridge.zero_frames())
@@ -314,7 +314,7 @@ def test_release_pays_out_and_leaves_no_current():
     assert all(motor.displacement == pytest.approx(-0.03, abs=2e-3) for motor in bench.motors)
 
 
-def test_a_later_run_goes_on_with_the_zeros_of_an_earlier_one():
+def test_a_later_run_continues_with_the_zeros_of_an_earlier_one():
     bench = following()
     record = bench.bridge.zero_record()
     later = Bench().bridge
@@ -324,7 +324,7 @@ def test_a_later_run_goes_on_with_the_zeros_of_an_earlier_one():
     assert later.snapshot().displacement == pytest.approx([m.displacement for m in bench.motors], abs=1e-6)
 
 
-def test_the_kept_zeros_hold_though_motors_answered_before_they_came():
+def test_restored_zeros_are_used_although_motors_answered_before():
     bench = following()
     record = bench.bridge.zero_record()
     bench.bridge = later = Bench().bridge

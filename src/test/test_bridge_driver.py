@@ -1,4 +1,4 @@
-"""The bridge's thread on a real bus between processes' worth of links: pace, immediate answers, ends."""
+"""The thread of the bridge on a loopback bus: control rate, immediate answers, ends."""
 
 import time
 
@@ -13,11 +13,19 @@ from gravcomp.description.hardware import CanInterface, Hardware
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.state import CableSnapshot, State
 
-STATUS = dict(protocol=1, firmware_major=1, firmware_minor=0, accelerometer_range=1, gyroscope_range=0, heater_duty=0, flags=0)
+STATUS = {
+    "protocol": 1,
+    "firmware_major": 1,
+    "firmware_minor": 0,
+    "accelerometer_range": 1,
+    "gyroscope_range": 0,
+    "heater_duty": 0,
+    "flags": 0,
+}
 
 
 class Board:
-    """Answers for six motors that stand still, and for the IMU."""
+    """Sends the feedback of six motors at rest, and the frames of the IMU board."""
 
     def __init__(self, can: CanInterface):
         self.link = CanLink(can, [0x200, 0x1FF, 0x320, 0x321])
@@ -107,7 +115,7 @@ def test_the_heater_is_off_without_fresh_commands(pair):
     assert 0.5 in duties and duties[-1] == 0.0
 
 
-def test_a_reader_that_hangs_costs_old_entries_only(pair):
+def test_a_reader_that_hangs_loses_only_old_entries(pair):
     driver, board = pair
     driver.activate()
     board.run(2.5)
@@ -117,7 +125,7 @@ def test_a_reader_that_hangs_costs_old_entries_only(pair):
 
 
 @pytest.mark.parametrize("pair", [DriverOptions(guard=False, state_rate=1.0)], indirect=True)
-def test_a_change_of_the_state_is_told_at_once_however_rare_the_snapshots(pair):
+def test_a_change_of_the_state_is_reported_immediately_at_any_snapshot_rate(pair):
     driver, board = pair
     driver.activate()
     board.run(1.0)
@@ -125,11 +133,11 @@ def test_a_change_of_the_state_is_told_at_once_however_rare_the_snapshots(pair):
         driver.queue.get()
     driver.request(lambda bridge, now: bridge.stop())
     time.sleep(0.1)
-    told = [driver.queue.get() for _ in range(driver.queue.qsize())]
-    assert State.STOPPED in [entry.state for entry in told if isinstance(entry, CableSnapshot)]
+    reported = [driver.queue.get() for _ in range(driver.queue.qsize())]
+    assert State.STOPPED in [entry.state for entry in reported if isinstance(entry, CableSnapshot)]
 
 
-def test_an_error_in_the_bridge_stops_the_motors_and_leaves_a_way_back(pair, monkeypatch):
+def test_an_error_in_the_bridge_stops_the_motors_and_resume_recovers(pair, monkeypatch):
     driver, board = pair
     driver.activate()
     board.run(1.0, each=lambda: follow(driver))

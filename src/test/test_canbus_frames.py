@@ -1,4 +1,4 @@
-"""The codec agrees with the DBC, refuses what cannot be, and the frames are those of the manuals."""
+"""The codec agrees with the DBC and refuses invalid frames; the frames are those of the manuals."""
 
 import random
 import re
@@ -45,7 +45,7 @@ def test_check_byte_is_crc8_sae_j1850():
     assert codec.check_byte(ord("1"), b"23456789") == 0x4B
 
 
-def test_a_single_flipped_bit_in_a_board_frame_is_noticed():
+def test_a_single_flipped_bit_in_a_board_frame_is_detected():
     frame = codec.encode("ImuGyroscope", x=100, y=-200, z=300, sequence=17)
     for bit in range(64):
         data = bytearray(frame.data)
@@ -63,14 +63,14 @@ def test_a_single_flipped_bit_in_a_board_frame_is_noticed():
         (can.Message(arbitration_id=0x201, is_extended_id=False, is_remote_frame=True, dlc=8), "not a standard data frame"),
     ],
 )
-def test_frames_that_cannot_be_are_refused(frame, complaint):
+def test_invalid_frames_are_refused(frame, complaint):
     with pytest.raises(codec.FrameError, match=re.escape(complaint)):
         codec.decode(frame)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 33.0, -33.0])
 def test_values_that_do_not_fit_are_refused(value):
-    with pytest.raises(codec.FrameError, match="MotorCommand5to8.current_5"):
+    with pytest.raises(codec.FrameError, match=r"MotorCommand5to8\.current_5"):
         codec.encode("MotorCommand5to8", current_5=value, current_6=0, current_7=0, current_8=0)
 
 
@@ -78,5 +78,5 @@ def test_every_frame_of_the_dbc_is_documented():
     page = resources.files("gravcomp.canbus").joinpath("FRAMES.md").read_text()
     for message in DATABASE.messages:
         if message.name.startswith("Motor"):
-            continue  # the C610's own frames stand there as ranges of ids
+            continue  # the page lists the C610's frames as ranges of ids
         assert f"0x{message.frame_id:X}" in page and f"`{message.name}`" in page

@@ -1,4 +1,4 @@
-"""Buses that open, isolate runs from one another, and come back after errors."""
+"""Buses open, isolate runs from one another, and are reopened after errors."""
 
 import select
 import socket
@@ -35,11 +35,11 @@ class FlakyBus:
 
     def shutdown(self):
         self.shut = True
-        raise OSError("no such device")  # as an adapter that is gone
+        raise OSError("no such device")  # like an adapter that was unplugged
 
 
 class Workshop:
-    """Opens FlakyBuses, unless told that there is none."""
+    """Opens FlakyBuses while `available`."""
 
     def __init__(self):
         self.buses, self.available, self.attempts, self.now = [], True, 0, 0.0
@@ -53,7 +53,7 @@ class Workshop:
         return self.buses[-1]
 
 
-def test_two_processes_worth_of_links_hear_each_other_but_not_themselves():
+def test_two_links_receive_each_others_frames_but_not_their_own():
     settings = CanInterface(channel=private_channel())
     a, b = CanLink(settings), CanLink(settings, [0x201])
     a.open(), b.open()
@@ -64,7 +64,7 @@ def test_two_processes_worth_of_links_hear_each_other_but_not_themselves():
     a.close(), b.close()
 
 
-def test_frames_that_are_not_wanted_do_not_hide_those_behind_them():
+def test_filtered_frames_do_not_hide_later_ones():
     settings = CanInterface(channel=private_channel())
     a, b = CanLink(settings), CanLink(settings, [0x201])
     a.open(), b.open()
@@ -74,7 +74,7 @@ def test_frames_that_are_not_wanted_do_not_hide_those_behind_them():
 
 
 def waiting(bus):
-    """How many datagrams lie in the bus's socket; they are gone afterwards."""
+    """Read the datagrams that wait in the bus's socket, and return their number."""
     time.sleep(0.05)
     count = 0
     while select.select([bus.fileno()], [], [], 0.0)[0]:
@@ -84,8 +84,8 @@ def waiting(bus):
 
 
 @pytest.mark.parametrize(("frame_ids", "kept"), [([0x200, 0x311], 4), ([0x10, 0x200], 3), (None, 5)])
-def test_frames_that_nobody_asked_for_do_not_wake_the_process(frame_ids, kept):
-    """Ids below 256 are packed in another way and are left to the second look."""
+def test_filtered_frames_do_not_wake_the_process(frame_ids, kept):
+    """Ids below 256 are packed differently; the kernel filter lets them pass, and the bus filters them."""
     settings = CanInterface(channel=private_channel())
     with open_bus(settings, frame_ids) as listener, open_bus(settings) as sender:
         for i in (0x10, 0x11, 0x200, 0x201, 0x311):
@@ -95,7 +95,7 @@ def test_frames_that_nobody_asked_for_do_not_wake_the_process(frame_ids, kept):
         assert waiting(sender) == 5
 
 
-def test_a_receiver_that_is_held_up_for_0_1_s_loses_no_frame_and_knows_when_each_came():
+def test_a_receiver_delayed_by_0_1_s_loses_no_frame_and_has_the_right_stamps():
     """350 frames are 0.1 s of six motors at 500 Hz and the board."""
     settings = CanInterface(channel=private_channel())
     a, b = CanLink(settings), CanLink(settings)
@@ -112,8 +112,8 @@ def test_a_receiver_that_is_held_up_for_0_1_s_loses_no_frame_and_knows_when_each
     a.close(), b.close()
 
 
-def test_a_private_channel_is_given_once():
-    """The kernel gives free ports at random: of 400, three would be found twice if none were taken."""
+def test_private_channels_are_different():
+    """The kernel gives free ports at random: of 400, three would be given twice if they were not reserved."""
     assert len({private_channel() for _ in range(400)}) == 400
 
 
@@ -125,7 +125,7 @@ def test_runs_on_private_channels_do_not_hear_each_other():
     a.close(), b.close()
 
 
-def test_what_is_no_frame_does_not_reach_the_caller_and_frames_go_on():
+def test_datagrams_that_are_no_frames_are_ignored():
     channel = private_channel()
     link, friend = CanLink(CanInterface(channel=channel)), CanLink(CanInterface(channel=channel))
     link.open(), friend.open()
@@ -139,7 +139,7 @@ def test_what_is_no_frame_does_not_reach_the_caller_and_frames_go_on():
 
 
 def test_python_can_itself_understands_the_datagrams():
-    """So that its logger and viewer can be used beside a running robot."""
+    """So its logger and viewer can be used with a running robot."""
     channel = private_channel()
     group, port = parse_channel(channel)
     try:
@@ -168,7 +168,7 @@ def test_a_bus_that_cannot_be_opened_says_what_to_do(settings, complaint):
         open_bus(settings)
 
 
-def test_a_vanished_adapter_is_reopened_with_growing_pauses():
+def test_an_unplugged_adapter_is_reopened_with_growing_pauses():
     shop = Workshop()
     shop.link.open()
     shop.available, shop.buses[0].failure = False, OSError("device not configured")
@@ -191,7 +191,7 @@ def test_bus_off_and_error_frames_are_not_data():
     assert shop.link.receive(0.0) == [] and not shop.link.is_open and "bus-off" in shop.link.status
 
 
-def test_a_full_transmit_queue_is_waited_out_before_the_bus_is_reopened():
+def test_the_bus_is_reopened_when_the_transmit_queue_stays_full():
     shop = Workshop()
     shop.link.open()
     shop.buses[0].failure = can.CanOperationError("No buffer space available")

@@ -1,4 +1,4 @@
-"""Who serves the bus goes before other sessions, where the user may ask for it, and goes on where not."""
+"""Processes that serve the bus raise their priority if the user has the right to; otherwise they run as usual."""
 
 import os
 import subprocess
@@ -20,24 +20,24 @@ print(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()), inherited[0], 
 
 
 def niceness(before: str = "") -> list[int]:
-    """Of the thread that asked, of one that it starts, and of the session."""
+    """Return the niceness of the calling thread, of one that it starts, and of the session."""
     child = [sys.executable, "-c", CHILD.format(before=before)]
     done = subprocess.run(child, capture_output=True, text=True, check=True, start_new_session=True)
     return [int(number) for number in done.stdout.split()]
 
 
 @pytest.fixture(autouse=True)
-def sessions_are_weighed():
+def sessions_have_priorities():
     if not Path("/proc/self/autogroup").exists():
-        pytest.skip("this kernel does not weigh sessions against each other")
+        pytest.skip("this kernel has no priorities of sessions (autogroups)")
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root may ask for precedence")
-def test_thread_and_session_go_before_others():
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root has the right to raise the priority")
+def test_thread_and_session_get_a_higher_priority():
     thread, inherited, session = niceness()
     assert thread == inherited == session < 0
 
 
-def test_who_may_not_ask_takes_its_turn():
-    own = os.getpriority(os.PRIO_PROCESS, 0)  # the child's from its start; other tests may have changed it
+def test_without_the_right_the_priority_stays():
+    own = os.getpriority(os.PRIO_PROCESS, 0)  # the child starts with it; other tests may have changed it
     assert niceness("if os.geteuid() == 0: os.setuid(65534)") == [own, own, 0]

@@ -68,3 +68,13 @@ def test_broken_yaml_names_the_line(tmp_path, text, words):
         load_yaml(path)
     for word in [str(path), *words]:
         assert word in str(error.value)
+
+
+@dataclass(frozen=True)
+class Drive:
+    travel: float = parameter(3.0, edge="mm", description="travel", renamed_from="stroke_mm")
+
+
+def test_a_renamed_key_is_refused_and_the_error_names_the_new_key():
+    with pytest.raises(ConfigError, match=r"f.yaml: key 'drive\.stroke_mm' has been renamed; write 'travel_mm' instead"):
+        from_mapping(Drive, {"stroke_mm": 4.0}, source="f.yaml", key="drive")

@@ -1,4 +1,4 @@
-"""The guard: zeros when the bridge dies or hangs, one bridge a bus, turns kept for the next one. With real processes."""
+"""The guard: zeros when the bridge dies or hangs, one bridge per bus, turns kept for the next bridge. With real processes."""
 
 import dataclasses
 import os
@@ -19,7 +19,7 @@ from gravcomp.description.hardware import CanInterface, Hardware, Motor
 from gravcomp.motors.guard_client import GuardClient, GuardError
 from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT, GuardSettings
 
-# A stand-in for the bridge: beats until it is ended.
+# A process in place of the bridge: sends heartbeats until it is ended.
 BRIDGE = """
 import sys, time
 from gravcomp.description.hardware import CanInterface, Hardware, Motor
@@ -61,7 +61,7 @@ def bridge(hardware, bus):
 
 
 def start_bridge(hardware, rpm=0, **options):
-    """With motor 1 turning at `rpm`."""
+    """Start it with motor 1 turning at `rpm`."""
     command = [sys.executable, "-c", BRIDGE, hardware.can.channel, str(rpm)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
     assert process.stdout.readline() == "ready\n"
@@ -74,7 +74,7 @@ def drain(bus):
 
 
 def zeros(bus, duration):
-    """The ids of the frames that come within the time; all must be without current."""
+    """Return the ids of the frames that come within the time; all must have zero current."""
     frames, deadline = [], time.monotonic() + duration
     while time.monotonic() < deadline:
         frames += bus.receive(0.02)
@@ -91,7 +91,7 @@ def test_a_killed_bridge_leaves_no_current(bridge, bus):
     assert zeros(bus, 1.0) == {0x200, 0x1FF}
 
 
-def test_a_bridge_that_hangs_leaves_no_current_and_may_go_on(bridge, bus):
+def test_a_bridge_that_hangs_leaves_no_current_and_may_continue(bridge, bus):
     bridge.send_signal(signal.SIGSTOP)
     assert zeros(bus, 1.0) == {0x200, 0x1FF}
     bridge.send_signal(signal.SIGCONT)
@@ -106,7 +106,7 @@ def test_a_second_bridge_on_the_bus_is_refused(bridge, hardware):
 
 
 def turn_on(hardware, rpm):
-    """Motor 1 goes on from the count 10,000 at `rpm` for 0.5 s; its last count."""
+    """Turn motor 1 from the count 10,000 at `rpm` for 0.5 s; return its last count."""
     motors, begin = CanLink(hardware.can), time.monotonic()
     while (elapsed := time.monotonic() - begin) < 0.5:
         count = 10_000 + round(rpm * 8192 / 60 * elapsed)
@@ -121,7 +121,7 @@ def turn_on(hardware, rpm):
     return count
 
 
-def test_the_next_bridge_gets_the_turns_counted_meanwhile(bridge, hardware):
+def test_the_next_bridge_gets_the_turns_that_the_guard_counted(bridge, hardware):
     bridge.kill()
     bridge.wait()
     count = turn_on(hardware, 70)
@@ -132,8 +132,8 @@ def test_the_next_bridge_gets_the_turns_counted_meanwhile(bridge, hardware):
     client.close()
 
 
-def test_turns_that_nobody_counted_are_told_to_the_next_bridge(hardware, bus):
-    """A rotor that turned at full speed when the bridge died, and was heard of again 0.1 s later."""
+def test_turns_that_could_not_be_counted_are_uncertain_for_the_next_bridge(hardware, bus):
+    """A rotor turns at full speed when the bridge dies, and its feedback is missing for 0.1 s."""
     process = start_bridge(hardware, rpm=2750)
     process.kill()
     process.wait()
@@ -144,7 +144,7 @@ def test_turns_that_nobody_counted_are_told_to_the_next_bridge(hardware, bus):
     client.close()
 
 
-def test_a_guard_that_hangs_is_ended_so_that_a_new_one_can_be_started(hardware, bus):
+def test_a_guard_that_hangs_is_killed_so_that_a_new_one_can_start(hardware, bus):
     client = GuardClient.connect(hardware)
     (guard,) = guards(hardware)
     guard.suspend()
@@ -156,7 +156,7 @@ def test_a_guard_that_hangs_is_ended_so_that_a_new_one_can_be_started(hardware, 
     GuardClient.connect(hardware).close()
 
 
-def test_a_bridge_that_hung_itself_does_not_blame_the_guard(hardware, bus):
+def test_a_bridge_that_hung_does_not_take_the_guard_as_hanging(hardware, bus):
     client = GuardClient.connect(hardware)
     assert client.beat(None)
     time.sleep(ANSWER_TIMEOUT + 0.2)
@@ -165,7 +165,7 @@ def test_a_bridge_that_hung_itself_does_not_blame_the_guard(hardware, bus):
 
 
 def guards(hardware):
-    """Its processes; a dead one has no command line any more."""
+    """Return the guard processes of this bus; a dead one has no command line."""
     lines = {process: " ".join(process.info["cmdline"] or []) for process in psutil.process_iter(["cmdline"])}
     return [process for process, line in lines.items() if "gravcomp.motors.guard" in line and hardware.can.channel in line]
 
@@ -197,7 +197,7 @@ def test_the_guard_outlives_the_bridges_process_group(hardware, bus):
     GuardClient.connect(hardware).close()
 
 
-# The bridge itself, with two motors that hold a tension: commands as from a controller.
+# The bridge itself, with two motors that hold a tension, and commands as from a controller.
 DRIVER = """
 import sys, time
 from gravcomp.description.hardware import CanInterface, Hardware, Motor
@@ -212,8 +212,8 @@ while True:
 """
 
 
-class StandingMotors:
-    """Both motors answer at 250 Hz from a thread and never move."""
+class MotorsAtRest:
+    """Sends the feedback of both motors, at rest, at 250 Hz from a thread."""
 
     def __init__(self, hardware):
         self._link, self._ending = CanLink(hardware.can), threading.Event()
@@ -232,8 +232,8 @@ class StandingMotors:
 
 @pytest.fixture
 def driven(hardware, bus):
-    """The process of a bridge that drives."""
-    motors = StandingMotors(hardware)
+    """Process of a bridge that drives its motors."""
+    motors = MotorsAtRest(hardware)
     process = subprocess.Popen([sys.executable, "-c", DRIVER, hardware.can.channel])
     wait_for_current(bus)
     yield process
@@ -250,7 +250,7 @@ def wait_for_current(bus):
         assert time.monotonic() < deadline
 
 
-def test_a_bridge_that_goes_on_after_a_hang_sends_no_stale_currents_and_drives_again(driven, bus):
+def test_a_bridge_that_continues_after_a_hang_sends_no_stale_currents_and_drives_again(driven, bus):
     driven.send_signal(signal.SIGSTOP)
     time.sleep(0.2)
     drain_now(bus)
@@ -259,11 +259,11 @@ def test_a_bridge_that_goes_on_after_a_hang_sends_no_stale_currents_and_drives_a
     frames, deadline = [], time.monotonic() + 0.15
     while time.monotonic() < deadline:
         frames += bus.receive(0.02)
-    assert len(frames) > 20 and not any(any(frame.data) for frame in frames[2:])  # the first two were on their way already
+    assert len(frames) > 20 and not any(any(frame.data) for frame in frames[2:])  # the first two were already being sent
     wait_for_current(bus)
 
 
-def test_a_guard_that_was_killed_or_hung_is_replaced_and_the_new_one_does_the_same(driven, hardware, bus):
+def test_a_guard_that_was_killed_or_hangs_is_replaced(driven, hardware, bus):
     for end in (psutil.Process.kill, psutil.Process.suspend):
         (guard,) = guards(hardware)
         assert is_connected(hardware)
@@ -272,7 +272,7 @@ def test_a_guard_that_was_killed_or_hung_is_replaced_and_the_new_one_does_the_sa
         while guards(hardware) in ([], [guard]) or not is_connected(hardware):
             assert time.monotonic() < deadline
             time.sleep(0.2)
-    time.sleep(0.2)  # what is seen first may be what is left of the old one
+    time.sleep(0.2)  # the first socket found may be the old guard's
     driven.kill()
     driven.wait()
     time.sleep(0.05)
@@ -287,12 +287,12 @@ def test_a_guard_that_was_killed_or_hung_is_replaced_and_the_new_one_does_the_sa
 
 
 def is_connected(hardware):
-    """The guard listens, and a bridge has been admitted: two sockets of this name."""
+    """Return whether the guard listens and a bridge is admitted: two sockets have this name."""
     address = GuardSettings(dataclasses.asdict(hardware.can), [], 1.0).address.replace("\0", "@")
     return Path("/proc/net/unix").read_text().count(address) == 2
 
 
 def drain_now(bus):
-    """The frames that wait, not those to come."""
+    """Read the frames that wait, not those to come."""
     while len(bus.receive(0.0)) > 20:
         pass

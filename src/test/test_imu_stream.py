@@ -1,4 +1,4 @@
-"""Samples from frames: nothing invented, nothing twice, stamped without jitter."""
+"""Samples from frames: complete, each one once, stamped without jitter."""
 
 import math
 import random
@@ -44,7 +44,7 @@ def test_counts_become_si_by_the_boards_ranges(stream):
     assert s.temperature == 40.125 and s.board_time == 50_000
 
 
-def test_nothing_is_published_before_the_ranges_are_known():
+def test_there_are_no_samples_before_the_ranges_are_known():
     assert feed(ImuStream(), sample(0) + sample(1), 1.0) == []
 
 
@@ -86,7 +86,7 @@ def test_the_boards_clock_may_wrap(stream):
     assert [b - a for a, b in zip(stamps, stamps[1:])] == pytest.approx([0.01] * 5, abs=1e-5)
 
 
-def test_a_restarted_board_is_recognised_and_goes_on(stream):
+def test_a_restarted_board_is_recognised_and_samples_continue(stream):
     for k in range(1000):
         feed(stream, sample(k), 1.0 + 0.01 * k)
     (s,) = feed(stream, sample(0), 15.0)
@@ -95,7 +95,7 @@ def test_a_restarted_board_is_recognised_and_goes_on(stream):
 
 @pytest.mark.parametrize("step", [30.0, 0.1, -0.1, -3600.0])
 def test_a_clock_that_is_set_is_followed(stream, step):
-    """The host's by a time server, or the board's that stood."""
+    """The host's clock set by a time server, or the board's clock after it stopped."""
     for k in range(300):
         feed(stream, sample(k), 5000.0 + 0.01 * k)
     late = [
@@ -104,7 +104,7 @@ def test_a_clock_that_is_set_is_followed(stream, step):
     assert late[-1] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_a_stuck_sensor_is_told(stream):
+def test_a_stuck_sensor_is_reported(stream):
     for k in range(STUCK_SAMPLES + 2):
         feed(stream, sample(k, noise=3), 1.0 + 0.01 * k)
     assert "repeats" in stream.fault
@@ -112,7 +112,7 @@ def test_a_stuck_sensor_is_told(stream):
     assert stream.fault is None
 
 
-def test_a_saturated_sensor_is_told_and_a_knock_is_not(stream):
+def test_a_saturated_sensor_is_reported_and_a_knock_is_not(stream):
     for k in range(STUCK_SAMPLES + 2):
         feed(stream, sample(k, noise=32767 - k % 2), 1.0 + 0.01 * k)
     assert stream.fault is None
@@ -123,7 +123,7 @@ def test_a_saturated_sensor_is_told_and_a_knock_is_not(stream):
     assert "saturated" in stream.fault
 
 
-def test_board_faults_are_told_in_words(stream):
+def test_board_faults_are_reported_in_words(stream):
     stream.on_frame(status(flags=1), 0.0)
     assert "does not answer" in stream.fault
     stream.on_frame(status(protocol=9), 0.0)

@@ -1,4 +1,4 @@
-"""Counting turns, the position loop, the last clamp, the knee of homing."""
+"""Counting of turns, motor faults, the last clamp, the position loop, and the knee of homing."""
 
 import dataclasses
 import math
@@ -16,11 +16,11 @@ from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.output import CurrentOutput
 
-RPM = 60.0 / COUNTS_PER_TURN  # a count a second
+RPM = 60.0 / COUNTS_PER_TURN  # rpm of one count per second
 
 
 def spin(encoder, rpm, duration, rate, start=0.0, loss=0.0):
-    """Feed a steady rotation; returns the true count at the end."""
+    """Feed a steady rotation; return the true count at the end."""
     true, now = start, 100.0
     for k in range(int(duration * rate)):
         now, true = 100.0 + k / rate, start + rpm / RPM * k / rate
@@ -45,15 +45,15 @@ def test_turns_survive_a_third_of_the_frames_being_lost():
 
 
 def test_the_wrap_is_at_8192():
-    """Drivers that wrap at 8191 lose a count a turn: 36,000 turns would lose 4.4 turns."""
+    """Drivers that wrap at 8191 lose one count per turn: 36,000 turns would lose 4.4 turns."""
     encoder = Encoder()
     for k in range(40_000):
         encoder.update(k * 2000 % COUNTS_PER_TURN, 2000 * 500 * RPM, 0.0, k / 500)
     assert encoder.count == 39_999 * 2000
 
 
-def starved(rpm, pause):
-    """An encoder whose sender is starved at times: nothing for `pause` (s), then all frames at once. With the true count."""
+def delayed(rpm, pause):
+    """Return an encoder whose frames repeatedly come `pause` (s) late and all at once, and the true count."""
     encoder, late = Encoder(), round(pause / 0.002)
     for k in range(2000):
         count = rpm / RPM * 0.002 * k
@@ -65,8 +65,8 @@ def starved(rpm, pause):
 
 @pytest.mark.parametrize("rpm", [0, 100, -300, 1500, -2750, 5000])
 @pytest.mark.parametrize("pause", [0.01, 0.03, 0.06, 0.1, 0.15])
-def test_late_frames_are_no_jumps_and_cost_no_turn_silently(rpm, pause):
-    encoder, count = starved(rpm, pause)
+def test_late_frames_are_no_jumps_and_lose_no_turn_silently(rpm, pause):
+    encoder, count = delayed(rpm, pause)
     if encoder.certain:
         assert encoder.count == pytest.approx(count, abs=1 + abs(rpm) / RPM * 0.002 * JUMPS)
 
@@ -76,12 +76,12 @@ def test_late_frames_are_no_jumps_and_cost_no_turn_silently(rpm, pause):
 )
 def test_turns_of_frames_that_come_late_and_all_at_once_are_counted(rpm, pause):
     """700 rpm are 10 mm/s of cable, 1720 are 25 mm/s."""
-    encoder, count = starved(rpm, pause)
+    encoder, count = delayed(rpm, pause)
     assert encoder.certain and encoder.count == pytest.approx(count, abs=1)
 
 
-def test_turns_in_doubt_are_told_within_0_2_s_or_not_at_all():
-    """Frames that were lost leave two counts for the same angle: neither is refuted by what comes afterwards."""
+def test_turns_in_doubt_are_decided_within_0_2_s_or_not_at_all():
+    """Lost frames leave two counts for the same angle, and later feedback excludes neither."""
     encoder, begin = Encoder(), 0.5
     settling = []
     for k in range(500):
@@ -96,8 +96,8 @@ def test_turns_in_doubt_are_told_within_0_2_s_or_not_at_all():
 @pytest.mark.parametrize("stalls", [[(0.02, 0.06)], [(0.03, 0.09)], [(0.02, 0.05), (0.054, 0.09)], [(0.06, 0.11), (0.112, 0.15)]])
 @pytest.mark.parametrize("start", [0, 2000, 5000])
 @pytest.mark.parametrize("sense", [1, -1])
-def test_turns_are_counted_when_frames_held_up_tell_of_speeding_up_and_slowing_down(stalls, start, sense):
-    """125 feedbacks a second; from rest to 1900 rpm in 0.08 s, and back to rest."""
+def test_turns_are_counted_when_delayed_frames_contain_acceleration_and_deceleration(stalls, start, sense):
+    """125 feedbacks per second; from rest to 1900 rpm in 0.08 s, and back to rest."""
     encoder, waiting = Encoder(), []
     for k in range(60):
         now = 0.008 * k
@@ -116,8 +116,8 @@ def test_turns_are_counted_when_frames_held_up_tell_of_speeding_up_and_slowing_d
 @pytest.mark.parametrize("rpm", [100, -700, 1500, 2750])
 @pytest.mark.parametrize("gap", [0.004, 0.02, 0.05, 0.08, 0.2, 0.9])
 @pytest.mark.parametrize("start", [0, 3000, 6000])
-def test_lost_frames_cost_no_turn_silently(rpm, gap, start):
-    """Beside late frames, of which the encoder cannot tell them, they need another count for the same angle."""
+def test_lost_frames_lose_no_turn_silently(rpm, gap, start):
+    """The encoder cannot distinguish lost frames from late ones, which need another count for the same angle."""
     encoder = Encoder()
     for k in range(1000):
         count = start + rpm / RPM * 0.002 * k
@@ -126,7 +126,7 @@ def test_lost_frames_cost_no_turn_silently(rpm, gap, start):
     assert not encoder.certain or encoder.count == int(count)
 
 
-def test_a_rotor_that_was_turned_by_hand_while_nobody_listened_has_uncertain_turns():
+def test_a_rotor_that_was_turned_by_hand_without_feedback_has_uncertain_turns():
     encoder = Encoder()
     encoder.update(1000, 0, 0.0, 0.0)
     assert encoder.update(4000, 0, 0.0, 0.3) and not encoder.certain
@@ -134,13 +134,13 @@ def test_a_rotor_that_was_turned_by_hand_while_nobody_listened_has_uncertain_tur
     assert encoder.update(4001, 0, 0.0, 0.302) and encoder.certain
 
 
-def test_a_rotor_that_stands_where_it_stood_has_not_moved():
+def test_a_rotor_at_rest_at_the_same_angle_has_not_moved():
     encoder = Encoder()
     encoder.update(8190, 0, 0.0, 0.0)
     assert encoder.update(3, 0, 0.0, 0.9) and encoder.certain and encoder.count == 8195
 
 
-def test_single_jumps_are_passed_over_and_repeated_ones_told():
+def test_single_jumps_are_ignored_and_repeated_ones_detected():
     encoder = Encoder()
     for k in range(10):
         assert encoder.update(4000, 0, 0.0, k * 0.002)
@@ -153,7 +153,7 @@ def test_single_jumps_are_passed_over_and_repeated_ones_told():
     assert encoder.jumps == JUMPS and encoder.count == 4001
 
 
-def test_two_controllers_with_one_id_are_told_though_every_other_feedback_is_right():
+def test_two_controllers_with_one_id_are_detected():
     encoder = Encoder()
     for k in range(20):
         encoder.update(4000 if k % 2 else 1200, 0, 0.0, k * 0.001)
@@ -174,21 +174,21 @@ def test_impossible_feedback_is_rejected(angle, speed):
 @pytest.mark.parametrize(
     ("current", "velocity", "complaint"), [(1.0, 0.0, "stalled"), (-1.0, 0.03, "against"), (0.1, 0.1, "runs away")]
 )
-def test_a_fault_of_a_motor_must_last_in_what_was_seen_of_it(current, velocity, complaint):
-    """A control that is held up sees two feedbacks half a second apart; that is no half second of the fault."""
+def test_a_motor_fault_must_last_in_the_observed_time(current, velocity, complaint):
+    """A delayed control sees two feedbacks half a second apart; that does not count as half a second of the fault."""
     monitor = MotorMonitor(Drive(), Watchdog())
     assert not any(monitor.update(0.5 * k, current, velocity, 0.0) for k in range(3))
-    assert not any(monitor.update(1.0, current, velocity, 0.0) for _ in range(1000))  # nothing new was seen
+    assert not any(monitor.update(1.0, current, velocity, 0.0) for _ in range(1000))  # no new feedback
     assert complaint in next(filter(None, (monitor.update(1.0 + 0.002 * k, current, velocity, 0.0) for k in range(100))))
 
 
 @pytest.mark.parametrize("limit", [0.05, 1.0, 2.3456, 10.0])
-def test_no_frame_exceeds_the_limit_whatever_is_asked(limit):
+def test_no_frame_exceeds_the_limit_for_any_input(limit):
     random.seed(5)
     output = CurrentOutput([1, 2, 5], limit)
     wild = [math.nan, math.inf, -math.inf, 1e300, -1e300, 32.767, -32.768, limit, -limit, 0.0]
     for _ in range(3000):
-        asked = [random.choice(wild + [random.gauss(0, 10)]) for _ in range(3)]
+        asked = [random.choice([*wild, random.gauss(0, 10)]) for _ in range(3)]
         for frame in output.frames(asked, enabled=True):
             for current in codec.decode(frame).values:
                 assert abs(current) <= limit

@@ -1,4 +1,4 @@
-"""Temperature control: settles without overshoot on any likely board, and switches the heater off whenever something is wrong."""
+"""Temperature control: it settles without overshoot on all likely boards, and switches the heater off at every fault."""
 
 import math
 
@@ -11,7 +11,7 @@ SECOND = 1_000_000_000
 
 
 def heated(plant, control, duration, *, period=0.1, begin=0.0, reading=None):
-    """Run the loop; returns true temperatures and states. `reading(t, plant)` replaces the chip's own."""
+    """Run the loop; return true temperatures and states. `reading(t, plant)` replaces the chip's reading."""
     temperatures, states = [], []
     duty = control.state.duty
     for k in range(round(duration / period)):
@@ -28,7 +28,7 @@ def heated(plant, control, duration, *, period=0.1, begin=0.0, reading=None):
     "board",
     [{}, {"ambient": -5.0}, {"rise": 30.0}, {"rise": 80.0}, {"time_constant": 30.0}, {"time_constant": 120.0}],
 )
-def test_settles_within_two_minutes_with_hardly_any_overshoot(board):
+def test_settles_within_two_minutes_with_little_overshoot(board):
     control = HeaterControl()
     temperatures, states = heated(ThermalPlant(ThermalPlantOptions(**board)), control, 300.0)
     target = board.get("ambient", 20.0) + 15.0
@@ -38,13 +38,13 @@ def test_settles_within_two_minutes_with_hardly_any_overshoot(board):
     assert states[-1].ready and not states[100].ready
 
 
-def test_a_fixed_target_is_kept_and_cut_to_what_is_allowed():
+def test_the_target_is_fixed_or_limited():
     assert HeaterControl(HeaterOptions(target=45.0)).update(0, 20.0).target == 45.0
     assert HeaterControl(HeaterOptions(rise=60.0)).update(0, 20.0).target == 60.0
 
 
 def test_a_chip_that_is_still_warm_does_not_raise_the_target():
-    """Neither after a reset, nor in a new control of the same process, nor after a new start, however often."""
+    """Neither after a reset, nor in a new control of the same process, nor after repeated restarts."""
     control = HeaterControl()
     assert control.update(0, 20.0).target == 35.0
     control.reset()
@@ -67,7 +67,7 @@ def test_the_integral_does_not_wind_up_at_the_limit():
     pid = Pid(PidOptions(gain=0.1, integral_time=10.0))
     for _ in range(1000):
         assert pid.update(1.0, 100.0, 20.0) == 1.0
-    # Below its limit again at once when the error turns.
+    # Below the limit immediately when the sign of the error changes.
     assert pid.update(1.0, 100.0, 101.0) == 0.0
 
 
@@ -88,7 +88,7 @@ def test_over_temperature_switches_off_until_reset():
     assert control.update(6 * SECOND, 25.0).fault is HeaterFault.NONE
 
 
-def test_a_heater_that_stays_on_is_found_far_above_the_target():
+def test_a_heater_that_stays_on_is_detected_far_above_the_target():
     plant, control = ThermalPlant(ThermalPlantOptions(rise=60.0)), HeaterControl()
     for k in range(3000):
         plant.step(0.1, 1.0)
@@ -106,7 +106,7 @@ def test_a_chip_that_does_not_warm_switches_the_heater_off(cause):
     assert state.fault is HeaterFault.DEAD_HEATER and state.duty == 0.0 and not state.ready
 
 
-def test_a_dead_sensor_switches_off_and_heating_goes_on_when_it_speaks_again():
+def test_a_dead_sensor_switches_the_heater_off_until_it_answers_again():
     control = HeaterControl()
     assert control.update(0, 20.0).duty > 0.0
     assert control.check(4 * SECOND).fault is HeaterFault.NONE
@@ -117,7 +117,7 @@ def test_a_dead_sensor_switches_off_and_heating_goes_on_when_it_speaks_again():
 
 
 @pytest.mark.parametrize("reading", [math.nan, math.inf, -100.0, 500.0])
-def test_a_senseless_reading_switches_off_while_it_lasts(reading):
+def test_an_invalid_reading_switches_the_heater_off_while_it_lasts(reading):
     control = HeaterControl()
     control.update(0, 20.0)
     state = control.update(2 * SECOND, reading)
@@ -129,5 +129,5 @@ def test_repeated_readings_do_not_drive_the_loop_faster():
     slow, fast = HeaterControl(), HeaterControl()
     slow_temperatures, _ = heated(ThermalPlant(), slow, 40.0, period=0.64)
     fast_temperatures, _ = heated(ThermalPlant(), fast, 40.0, period=0.01)
-    # Two counts of the chip: the loops see renewals up to half a second apart.
+    # Tolerance of two counts of the chip: the two loops see a renewal up to half a second apart.
     assert slow_temperatures[-1] == pytest.approx(fast_temperatures[-1], abs=0.25)
