@@ -11,9 +11,15 @@ from gravcomp.canbus.imu_stream import STUCK_SAMPLES, ImuStream
 
 
 def status(**changes):
-    values = dict(
-        protocol=1, firmware_major=1, firmware_minor=0, accelerometer_range=1, gyroscope_range=0, heater_duty=0, flags=0
-    )
+    values = {
+        "protocol": 1,
+        "firmware_major": 1,
+        "firmware_minor": 0,
+        "accelerometer_range": 1,
+        "gyroscope_range": 0,
+        "heater_duty": 0,
+        "flags": 0,
+    }
     return codec.encode("BoardStatus", **(values | changes))
 
 
@@ -139,5 +145,5 @@ def test_random_bytes_under_the_boards_ids_do_no_harm(stream):
             data=random.randbytes(random.randint(0, 8)),
         )
         stream.on_frame(frame, 1.0)
-    got = feed(stream, [status()] + sample(0, start_us=1 << 31) + sample(1, start_us=1 << 31), 2.0)
+    got = feed(stream, [status(), *sample(0, start_us=1 << 31), *sample(1, start_us=1 << 31)], 2.0)
     assert got and got[-1].sequence == 1
