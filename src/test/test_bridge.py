@@ -1,4 +1,4 @@
-"""States of the bridge: every cause leads in time to the state in the table of gravcomp_hw/README.md; recovery without restart."""
+"""States of the bridge: every cause leads in time to the state in the table of gravcomp_hw/README.md, without a restart."""
 
 import math
 import random
