@@ -28,7 +28,7 @@ def test_all_well(situation):
 
 
 @pytest.mark.parametrize(
-    "change, code, words",
+    ("change", "code", "words"),
     [
         ({"sample_age": None}, ImuStatus.NO_DATA, "yet"),
         ({"sample_age": 2.0}, ImuStatus.NO_DATA, "for 2.0 s"),

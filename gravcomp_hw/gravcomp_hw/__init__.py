@@ -1,1 +1,1 @@
-"""The hardware side of gravcomp: nodes can_bridge and virtual_robot."""
+"""Hardware side of gravcomp: the nodes can_bridge, virtual_robot and judge."""

@@ -1,7 +1,7 @@
 """The node can_bridge: topics and services around gravcomp.motors.driver.BridgeDriver.
 
-A thread of its own takes samples and states from the driver's queue to the topics, so that a slow middleware delays
-neither the control (a thread of the driver) nor the commands (the executor).
+A separate thread publishes the samples and states from the driver's queue, so that a slow middleware delays neither the control
+(a thread of the driver) nor the commands (the executor).
 """
 
 import array
@@ -10,6 +10,7 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
 from gravcomp_node.managed_node import ERROR, OK, WARN
@@ -23,24 +24,26 @@ from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
+from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
 from gravcomp.motors.state import CableSnapshot, State
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
-_TEMPERATURE_EVERY = 10  # samples; the chip renews it every 1.28 s
+_TEMPERATURE_EVERY = 10  # samples; the chip updates its temperature every 1.28 s
 _LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}
-_LOG_PERIOD = 1.0  # s, between two equal complaints in the log
+_LOG_PERIOD = 1.0  # s, between two log messages about refused commands
 
 
 class CanBridge(ManagedNode):
-    """Drives the cables over CAN, and publishes the IMU and what the cables do."""
+    """Drives the cables over CAN; publishes the IMU samples and the state of the cables."""
 
     name = "can_bridge"
     parameters_class = CanBridgeParameters
 
     def configure(self) -> None:
+        """Open the bus and create the publishers. Raises ConfigError when the hardware section or the bus is not usable."""
         p = self.parameters
         self._hardware = self._read_hardware()
         self._driver = BridgeDriver(
@@ -54,12 +57,13 @@ class CanBridge(ManagedNode):
         self._temperature = self.create_publisher(Temperature, "imu/temperature", SENSOR)
         self._state = self.create_publisher(CableState, "cable/state", COMMAND)
         self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
-        self._told, self._refusal_told = "", -math.inf
+        self._logged, self._refusal_logged = "", -math.inf
         self._publishing = False
         self._publisher = threading.Thread(target=self._publish, name="publisher", daemon=True)
         self._publisher.start()
 
     def activate(self) -> None:
+        """Start driving. Raises ConfigError when the guard process cannot be started."""
         try:
             self._driver.activate()
         except GuardError as error:
@@ -67,7 +71,7 @@ class CanBridge(ManagedNode):
         self._publishing = True
         self._active_entities = [
             self.create_subscription(CableCommand, "cable/command", self._command, COMMAND),
-            # Best effort takes from reliable publishers, too.
+            # A best-effort subscription also receives from reliable publishers.
             self.create_subscription(Float32, "imu/heater", lambda m: self._driver.heater(m.data), SENSOR),
             self.create_service(Trigger, "~/home", self._trigger(lambda bridge, now: bridge.home(now))),
             self.create_service(Trigger, "~/stop", self._trigger(lambda bridge, now: bridge.stop())),
@@ -77,6 +81,7 @@ class CanBridge(ManagedNode):
         ]
 
     def deactivate(self) -> None:
+        """Set all currents to zero and stop publishing."""
         self._driver.deactivate()
         self._publishing = False
         subscriptions, services, timer = self._active_entities[:2], self._active_entities[2:-1], self._active_entities[-1]
@@ -87,6 +92,7 @@ class CanBridge(ManagedNode):
         self.destroy_timer(timer)
 
     def cleanup(self) -> None:
+        """Close the bus."""
         driver = getattr(self, "_driver", None)
         if driver is None:
             return
@@ -97,7 +103,7 @@ class CanBridge(ManagedNode):
         self._driver = None
 
     def _read_hardware(self) -> Hardware:
-        """The section `hardware` with this node's interface and channel."""
+        """Return the section `hardware` with this node's interface and channel."""
         file, p = self.robot_file, self.parameters
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         given = {key: value for key, value in (("interface", p.interface), ("channel", p.channel)) if value}
@@ -106,20 +112,20 @@ class CanBridge(ManagedNode):
     def _command(self, message: CableCommand) -> None:
         stamp = message.header.stamp
         reason = self._driver.command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
-        # Not the logger's own throttle: it looks up its caller's source each time, which costs more than the command.
-        if reason and time.monotonic() - self._refusal_told > _LOG_PERIOD:
-            self._refusal_told = time.monotonic()
+        # The logger's own throttle is not used: it looks up its caller's source each time, which takes longer than the command.
+        if reason and time.monotonic() - self._refusal_logged > _LOG_PERIOD:
+            self._refusal_logged = time.monotonic()
             self.get_logger().warning(f"command refused: {reason}")
 
-    def _trigger(self, action):
-        def serve(_, response):
+    def _trigger(self, action: Callable[[Bridge, float], tuple[bool, str]]) -> Callable:
+        def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             response.success, response.message = self._driver.request(action)
             return response
 
         return serve
 
     def _publish(self) -> None:
-        """From the driver's queue to the topics, until the queue ends."""
+        """Publish the entries of the driver's queue until the queue ends."""
         count = 0
         while (entry := self._driver.queue.get()) is not None:
             if not self._publishing:
@@ -180,8 +186,8 @@ class CanBridge(ManagedNode):
             control_overruns=driver.overruns,
             command_delay_ms=round(1e3 * driver.delay, 2),
         )
-        if sentence != self._told:
-            self._told = sentence
+        if sentence != self._logged:
+            self._logged = sentence
             if level == OK and not fault:
                 self.get_logger().info(sentence)
             else:
@@ -193,6 +199,7 @@ def _time(nanoseconds: int) -> Time:
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(CanBridge)
 
 

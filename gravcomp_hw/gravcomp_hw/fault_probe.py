@@ -1,15 +1,17 @@
-"""The hand of the fault campaign in the graph: reads orders from standard input, one JSON object a line, and tells what it sees.
+"""The fault campaign's process in the graph. It reads orders from standard input and prints events, one JSON object per line.
 
-    {"do": "fault", "fault": {"kind": "drop", "frames": "imu"}}     to virtual/fault; "clear" ends all
-    {"do": "call", "service": "can_bridge/stop"}                    a std_srvs/Trigger; the answer is told
-    {"do": "enable", "on": false}                                   inverse_controller/enable
-    {"do": "command", "displacement": [...], "count": 20}           cable/command at 100 Hz
-    {"do": "flood", "messages": 10000}                              hostile messages to every input of the graph
-    {"do": "match"}                                                 wait until faults and commands have a taker and the bridge is heard
-    {"do": "count"}                                                 commands seen since the start
-    {"do": "displacement"}                                          of the cables, as cable/state has it
+    {"do": "fault", "fault": {"kind": "drop", "frames": "imu"}}     publish on virtual/fault; "clear" ends all faults
+    {"do": "call", "service": "can_bridge/stop"}                    call a std_srvs/Trigger service and print its answer
+    {"do": "enable", "on": false}                                   call inverse_controller/enable
+    {"do": "command", "displacement": [...], "count": 20}           publish on cable/command at 100 Hz
+    {"do": "flood", "messages": 10000}                              publish hostile messages on every input of the graph
+    {"do": "match"}                                                 wait until faults and commands have a subscriber and
+                                                                    a state of the bridge has arrived
+    {"do": "count"}                                                 print the number of commands since the start
+    {"do": "displacement"}                                          print the cable displacements of cable/state
 
-It tells, one JSON object a line: {"event": "state", "time", "state", "message"} at every change of cable/state, and answers.
+Printed are the answers, and {"event": "state", "time", "state", "message"} at every change of cable/state. Started with
+`python -m gravcomp_hw.fault_probe`; no executable is installed, because only benchmarks and tests use it.
 """
 
 import array
@@ -44,36 +46,38 @@ _FLOODED = (
     (String, "virtual/fault", QoSProfile(depth=20)),
 )
 _MATCH_TIMEOUT = 10.0  # s
-_FLOOD_PAUSE = 5e-4  # s between messages: about what six nodes can take
+_FLOOD_PAUSE = 5e-4  # s between two messages: about the rate that six nodes can process
 
 
 class FaultProbe(ManagedNode):
-    """Injects faults and hostile messages on request, and tells the bridge's states; for the fault campaign alone."""
+    """Injects faults and hostile messages on request, and prints the bridge's states."""
 
     name = "fault_probe"
     parameters_class = FaultProbeParameters
 
     def configure(self) -> None:
+        """Create publishers and clients."""
         self._random = random.Random(self.parameters.seed)
         self._commands, self._last_state, self._bridge_values, self._displacement = 0, None, {}, []
-        self._heard = 0.0
+        self._state_time = 0.0
         self._outputs = {topic: self.create_publisher(kind, topic, qos) for kind, topic, qos in _FLOODED}
         self._trigger_clients = {}
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
 
     def activate(self) -> None:
+        """Create subscriptions and start reading orders."""
         self._inputs = [
             self.create_subscription(CableState, "cable/state", self._on_state, COMMAND),
             self.create_subscription(CableCommand, "cable/command", self._on_command, QoSProfile(depth=1000)),
             self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 50),
         ]
-        threading.Thread(target=self._obey, name="orders", daemon=True).start()
-        _tell(event="ready")
+        threading.Thread(target=self._execute_orders, name="orders", daemon=True).start()
+        _print(event="ready")
 
-    def _obey(self) -> None:
+    def _execute_orders(self) -> None:
         orders = {
             "fault": self._fault, "call": self._call, "enable": self._set_enabled, "command": self._command,
-            "flood": self._flood, "match": self._match, "count": self._count, "displacement": self._tell_displacement,
+            "flood": self._flood, "match": self._match, "count": self._count, "displacement": self._print_displacement,
         }  # fmt: skip
         for line in sys.stdin:
             order = json.loads(line)
@@ -88,17 +92,18 @@ class FaultProbe(ManagedNode):
             self._trigger_clients[service] = self.create_client(Trigger, service)
         client = self._trigger_clients[service]
         if not client.wait_for_service(2.0):
-            _tell(event="answer", service=service, success=False, message="no such service")
+            _print(event="answer", service=service, success=False, message="no such service")
             return
         sent = time.time()
         future = client.call_async(Trigger.Request())
         future.add_done_callback(
-            lambda f: _tell(event="answer", service=service, sent=sent, success=f.result().success, message=f.result().message)
+            lambda f: _print(event="answer", service=service, sent=sent, success=f.result().success, message=f.result().message)
         )
 
     def _set_enabled(self, on: bool) -> None:
-        """Asked until it is answered: a controller that was started anew does not hear at once, though the dead one's service still is
-        on the list.
+        """Call the service until it answers.
+
+        A restarted controller does not receive calls immediately, while the service of its killed predecessor is still listed.
         """
         end, done = time.monotonic() + _MATCH_TIMEOUT, False
         while not done and time.monotonic() < end:
@@ -106,7 +111,7 @@ class FaultProbe(ManagedNode):
                 answered = threading.Event()
                 self._enable.call_async(SetBool.Request(data=on)).add_done_callback(lambda _, answered=answered: answered.set())
                 done = answered.wait(1.0)
-        _tell(event="enabled", on=on, success=done)
+        _print(event="enabled", on=on, success=done)
 
     def _command(self, displacement: list[float], count: int = 1) -> None:
         for _ in range(count):
@@ -118,10 +123,10 @@ class FaultProbe(ManagedNode):
             kind, topic, _ = self._random.choice(_FLOODED)
             self._outputs[topic].publish(self._hostile(kind()))
             time.sleep(_FLOOD_PAUSE)
-        _tell(event="flooded", messages=messages)
+        _print(event="flooded", messages=messages)
 
     def _hostile(self, message: object) -> object:
-        """Every field filled with what no honest node would send."""
+        """Return the message with every field filled with hostile values."""
         for name, kind in message.get_fields_and_field_types().items():
             setattr(message, name, self._hostile_value(kind, getattr(message, name)))
         return message
@@ -144,29 +149,30 @@ class FaultProbe(ManagedNode):
         return value
 
     def _match(self) -> None:
-        """A message before the middleware has matched publisher and subscriber goes nowhere, and neither does a state before this node
-        has found a bridge that was started anew.
+        """Wait until the middleware has connected this process with the robot and with the bridge.
+
+        Messages sent earlier are lost, and so are the states of a restarted bridge.
         """
         begin = time.monotonic()
         needed = [self._outputs[topic] for topic in ("virtual/fault", "cable/command")]
         matched = False
         while not matched and time.monotonic() < begin + _MATCH_TIMEOUT:
             time.sleep(0.01)
-            matched = self._heard > begin and all(output.get_subscription_count() for output in needed)
-        _tell(event="matched", success=matched)
+            matched = self._state_time > begin and all(output.get_subscription_count() for output in needed)
+        _print(event="matched", success=matched)
 
     def _count(self) -> None:
-        _tell(event="count", commands=self._commands, bridge=self._bridge_values)
+        _print(event="count", commands=self._commands, bridge=self._bridge_values)
 
-    def _tell_displacement(self) -> None:
-        _tell(event="displacement", displacement=self._displacement)
+    def _print_displacement(self) -> None:
+        _print(event="displacement", displacement=self._displacement)
 
     def _on_state(self, message: CableState) -> None:
-        self._displacement, self._heard = list(message.displacement), time.monotonic()
+        self._displacement, self._state_time = list(message.displacement), time.monotonic()
         state = (message.state, message.message)
         if state != self._last_state:
             self._last_state = state
-            _tell(event="state", time=time.time(), state=message.state, message=message.message)
+            _print(event="state", time=time.time(), state=message.state, message=message.message)
 
     def _on_command(self, _: CableCommand) -> None:
         self._commands += 1
@@ -177,11 +183,12 @@ class FaultProbe(ManagedNode):
                 self._bridge_values = {value.key: value.value for value in status.values}
 
 
-def _tell(**what: object) -> None:
+def _print(**what: object) -> None:
     print(json.dumps(what), flush=True)
 
 
 def main() -> int:
+    """Run the probe; return the exit code."""
     return run(FaultProbe)
 
 

@@ -1,4 +1,7 @@
-"""graph_probe: looks at a running graph for a few seconds and prints what it finds as JSON: rates, delays, fitting QoS."""
+"""Observe a running graph for a few seconds and print the findings as JSON: rates, delays and compatibility of the QoS.
+
+Started with `python -m gravcomp_hw.graph_probe` by `./gravcomp doctor --graph`; no executable is installed.
+"""
 
 import dataclasses
 import importlib
@@ -20,7 +23,7 @@ _TOLERANCE = 0.05
 
 
 class GraphProbe:
-    """Listens to every topic that keeps a rate."""
+    """Measures every topic with a declared rate."""
 
     def __init__(self) -> None:
         self._node = rclpy.create_node("graph_probe")
@@ -28,7 +31,7 @@ class GraphProbe:
         self._ports = {port.name: port for entry in NODES for port in entry.publishes if port.rate is not None}
 
     def examine(self) -> list[Finding]:
-        """One finding a topic, one for the QoS of all."""
+        """Return one finding per topic with a declared rate, and those about incompatible QoS."""
         self._spin(_DISCOVERY)
         for port in self._ports.values():
             self._listen(port)
@@ -65,7 +68,7 @@ class GraphProbe:
                     if fits == QoSCompatibility.ERROR:
                         pair = f"{publisher.node_name} to {subscriber.node_name}: {reason}"
                         findings.append(Finding("missing", name, pair, "give both the same reliability and durability"))
-        return findings or [Finding("ok", "QoS", "every subscription fits its publishers")]
+        return findings or [Finding("ok", "QoS", "every subscription is compatible with its publishers")]
 
     def _spin(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -79,6 +82,7 @@ def _message_class(kind: str) -> type:
 
 
 def main() -> int:
+    """Print the findings; return the exit code."""
     rclpy.init()
     print(json.dumps([dataclasses.asdict(finding) for finding in GraphProbe().examine()]))
     rclpy.try_shutdown()

@@ -1,17 +1,20 @@
-"""judge: plays sag and compensation on a running graph, and judges it by the virtual robot's truth.
+"""Node judge: runs release and compensation on a running graph, and evaluates them with the virtual robot's ground truth.
 
-It steers by the controller's services alone, gives nothing to the loop, and ends by itself with the figures in its result file.
+It controls the run only through the controller's services, publishes nothing to the loop, and exits after writing the figures to
+its result file.
 """
 
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.polled import Polled
 from lifecycle_msgs.srv import GetState
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
 from rclpy.time import Time
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
@@ -26,28 +29,30 @@ from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp_msgs.msg import CableCommand
 from gravcomp_node import ManagedNode, run
 
-# Messages that the middleware keeps between two looks, a tenth of a second apart.
+# Messages that the middleware keeps between two reads, which are 0.1 s apart.
 _KEPT = 100
 _STRAIGHT = np.array([0.0, 0.0, 1.0])
 
 
 class Judge(ManagedNode):
-    """Plays the demo's scenario and measures it against the truth."""
+    """Runs the demo's scenario and evaluates it with the ground truth."""
 
     name = "judge"
     parameters_class = JudgeParameters
 
     def configure(self) -> None:
+        """Prepare the tracks and, if the delay is measured, the CAN listener."""
         self._truth_tip, self._model_tip = Track(3), Track(3)
         self._truth_gravity, self._gravity = Track(3), Track(3)
         self._imu, self._commands = Track(0), Track(0)
         self._states: dict[str, str] = {}
-        self._phase, self._begin, self._compensated_at = "waiting for the truth", None, None
+        self._phase, self._begin, self._compensated_at = "waiting for the ground truth", None, None
         self._pending = None
         self._target = self.robot_file.robot.length * _STRAIGHT
         self._delay = DelayListener(self._can()) if self.parameters.measure_delay else None
 
     def activate(self) -> None:
+        """Create subscriptions, clients and timers."""
         self._waiting_since = self._now()
         kept = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=_KEPT)
         self._sources = [
@@ -64,26 +69,27 @@ class Judge(ManagedNode):
         self._relax = self.create_client(Trigger, "inverse_controller/relax")
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
         self._state_clients = {name: self.create_client(GetState, f"{name}/get_state") for name in self.parameters.nodes}
-        self.create_timer(0.1, self._play)
+        self.create_timer(0.1, self._run_scenario)
         self.create_timer(0.5, self._observe)
         if self._delay:
             self._delay.start()
 
     def deactivate(self) -> None:
+        """Stop the CAN listener."""
         if self._delay:
             self._delay.stop()
 
     # The scenario.
 
-    def _play(self) -> None:
+    def _run_scenario(self) -> None:
         self._take()
         p = self.parameters
         if self._begin is None:
             if self._now() - self._waiting_since > p.start_timeout:
-                raise ConfigError(f"no truth/tip for {p.start_timeout:g} s: is virtual_robot running on the same bus?")
+                raise ConfigError(f"no message on truth/tip for {p.start_timeout:g} s: is virtual_robot running on the same bus?")
             return
         elapsed = self._now() - self._begin
-        if self._phase == "waiting for the truth" and self._relax.service_is_ready():
+        if self._phase == "waiting for the ground truth" and self._relax.service_is_ready():
             self._phase = "sagging" if p.relax_time > 0.0 else self._phase
             if p.relax_time > 0.0:
                 self._relax.call_async(Trigger.Request())
@@ -96,7 +102,7 @@ class Judge(ManagedNode):
             self.finished = True
 
     def _observe(self) -> None:
-        """Lifecycle states, and the state of the run for whoever watches."""
+        """Query the lifecycle states and write the state of the run to the result file."""
         for name, client in self._state_clients.items():
             if client.service_is_ready():
                 client.call_async(GetState.Request()).add_done_callback(lambda future, name=name: self._on_state(name, future))
@@ -105,13 +111,13 @@ class Judge(ManagedNode):
         if self._phase != "done":
             self._write({})
 
-    def _on_state(self, name: str, future) -> None:
+    def _on_state(self, name: str, future: Future) -> None:
         answer = future.result()
         if answer is not None:
             self._states[name] = answer.current_state.label
 
     def _take(self) -> None:
-        """What has come since the last look; the first truth begins the run."""
+        """Read the messages since the last call; the first ground truth starts the run."""
         for polled, track, values in self._sources:
             for received in polled.take_all():
                 track.add(_seconds(received.message), *values(received.message))
@@ -123,19 +129,19 @@ class Judge(ManagedNode):
     def _figures(self) -> dict:
         p = self.parameters
         end = self._begin + p.duration
-        # The last third of the time with released cables: the robot has come to rest by then.
+        # The last third of the time with released cables, when the robot is at rest.
         at_rest = self._begin + 2.0 / 3.0 * p.relax_time
         released_until = self._begin + p.relax_time
         counted_from = (self._compensated_at or end) + p.settle_time
-        left = figures.residual(self._truth_tip, self._target, _STRAIGHT, counted_from, end)
+        residual = figures.residual(self._truth_tip, self._target, _STRAIGHT, counted_from, end)
         _, gravity = self._truth_gravity.between(counted_from, end)
         delays = 1e3 * np.array(self._delay.delays) if self._delay and self._delay.delays else None
         error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
         return {
             "sag_mm": _mm(figures.sag(self._truth_tip, self._target, at_rest, released_until)),
-            "residual_lateral_mm": _mm(left and left[0]),
-            "residual_axial_mm": _mm(left and left[1]),
-            "tip_error_with_mm": _mm(left and float(np.hypot(*left))),
+            "residual_lateral_mm": _mm(residual and residual[0]),
+            "residual_axial_mm": _mm(residual and residual[1]),
+            "tip_error_with_mm": _mm(residual and float(np.hypot(*residual))),
             "tip_error_without_mm": _mm(released_tip_error(self.robot_file, gravity, self._target)),
             "correlation": _rounded(figures.correlation(self._truth_tip, self._model_tip, self._begin, end), 5),
             "imu_rate_hz": _rounded(figures.rate(self._imu.between(counted_from, end)[0]), 2),
@@ -171,7 +177,7 @@ class Judge(ManagedNode):
         return self.get_clock().now().nanoseconds * 1e-9
 
 
-def _seconds(message) -> float:
+def _seconds(message: Any) -> float:
     return Time.from_msg(message.header.stamp).nanoseconds * 1e-9
 
 
@@ -192,6 +198,7 @@ def _rounded(value: float | None, digits: int) -> float | None:
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(Judge)
 
 

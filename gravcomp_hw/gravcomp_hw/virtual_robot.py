@@ -1,7 +1,7 @@
-"""The virtual robot as a node: CAN frames on the bus as the hardware sends them, and the truth for judging.
+"""Node virtual_robot: sends CAN frames as the hardware does, and publishes the ground truth for evaluation.
 
-Physics, motors, board and faults are in `gravcomp.virtual`; a thread of `RealtimeRobot` steps them. No node of the loop may
-take truth/*.
+Mechanics, motors, board and faults are in `gravcomp.virtual`; a thread of `RealtimeRobot` steps them. No node of the loop
+subscribes to truth/*.
 """
 
 import dataclasses
@@ -29,17 +29,18 @@ from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.truth import Truth
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
-# Faults come one after the other and each counts.
+# Several faults may arrive in a row, and none must be lost.
 _FAULTS = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
 
 
 class VirtualRobotNode(ManagedNode):
-    """The robot that is not there: rod, cables, motors and IMU board behind CAN frames."""
+    """Simulates the hardware: rod, cables, motors and IMU board behind CAN frames."""
 
     name = "virtual_robot"
     parameters_class = VirtualRobotNodeParameters
 
     def configure(self) -> None:
+        """Create the robot and the publishers. Raises ConfigError for a wrong robot file or recording."""
         source = self.robot_file.source
         hardware = parse_hardware(self.robot_file.section("hardware"), source=source, cables=self.robot_file.robot.cable_names)
         parameters = from_mapping(
@@ -60,12 +61,13 @@ class VirtualRobotNode(ManagedNode):
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
-        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate, self._steer)
+        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate, self._commanded_base)
         self._base: Polled | None = None
 
     def activate(self) -> None:
-        # Who offers to steer sees by the subscription whether anybody obeys. The robot's thread asks for it: an arm steers a hundred times
-        # a second, and an executor that woke each time would take as much of a processor as the robot.
+        """Join the bus and start the robot's thread. Raises ConfigError when the bus cannot be opened."""
+        # The publisher of the orientation sees by the subscription whether it has an effect. The robot's thread polls the topic:
+        # an arm publishes 100 times per second, and an executor that wakes each time would use as much CPU time as the robot.
         if self.parameters.steerable or self.parameters.motion == "topic":
             self._base = Polled(self, QuaternionStamped, "virtual/base_orientation", COMMAND)
         try:
@@ -76,6 +78,7 @@ class VirtualRobotNode(ManagedNode):
         self._watch = self.create_timer(0.5, self._report)
 
     def deactivate(self) -> None:
+        """Stop the robot's thread and leave the bus."""
         self.destroy_timer(self._watch)
         self.destroy_subscription(self._fault_orders)
         self._live.stop()
@@ -84,13 +87,14 @@ class VirtualRobotNode(ManagedNode):
             self._base = None
 
     def cleanup(self) -> None:
+        """Destroy the publishers."""
         for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity"):
             if hasattr(self, name):
                 self.destroy_publisher(getattr(self, name))
                 delattr(self, name)
 
     def _publish(self, truth: Truth) -> None:
-        """Called from the robot's thread."""
+        """Publish the ground truth on the topics that have a subscriber. Called from the robot's thread."""
         stamp, frame = self.get_clock().now().to_msg(), self.parameters.base_frame
         messages = []
         if self._publisher_tip.get_subscription_count():
@@ -106,8 +110,8 @@ class VirtualRobotNode(ManagedNode):
             message.header.stamp, message.header.frame_id = stamp, frame
             publisher.publish(message)
 
-    def _steer(self) -> np.ndarray | None:
-        """Called from the robot's thread."""
+    def _commanded_base(self) -> np.ndarray | None:
+        """Return the newest commanded rotation (3, 3) of the base, or None. Called from the robot's thread."""
         received = self._base.take() if self._base is not None else None
         if received is None:
             return None
@@ -119,7 +123,7 @@ class VirtualRobotNode(ManagedNode):
             return None
 
     def _inject(self, message: String) -> None:
-        """`{kind: drop, frames: imu, duration: 2}` begins a fault, `clear` ends all."""
+        """`{kind: drop, frames: imu, duration: 2}` starts a fault, `clear` ends all faults."""
         try:
             if message.data.strip() == "clear":
                 with self._live.lock:
@@ -156,13 +160,14 @@ class VirtualRobotNode(ManagedNode):
         )
 
 
-def _pose(position: object, orientation: object) -> Pose:
+def _pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
     x, y, z = position.tolist()
     qx, qy, qz, qw = orientation.tolist()
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(VirtualRobotNode)
 
 

@@ -1,4 +1,4 @@
-"""The node can_bridge as a process, on a bus with a stand-in for motors and board: topics, services, refusals, ends."""
+"""The node can_bridge as a process, on a bus with simulated motors and board: topics, services, refusals, exit."""
 
 import os
 import signal
@@ -22,15 +22,23 @@ from gravcomp.description.hardware import CanInterface
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR
 
-# Children of a run under nohup would ignore it.
+# A test run under nohup would pass the ignored SIGHUP on to its children.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 ZERO = bytes(8)
-STATUS = dict(protocol=1, firmware_major=1, firmware_minor=0, accelerometer_range=1, gyroscope_range=0, heater_duty=0, flags=0)
+STATUS = {
+    "protocol": 1,
+    "firmware_major": 1,
+    "firmware_minor": 0,
+    "accelerometer_range": 1,
+    "gyroscope_range": 0,
+    "heater_duty": 0,
+    "flags": 0,
+}
 
 
 class Board:
-    """Six motors that stand still and an IMU at rest, in a thread; `currents` are the last frames by id."""
+    """Six motors and an IMU at rest, simulated in a thread; `currents` holds the last frame of each id."""
 
     def __init__(self, channel: str):
         self.link = CanLink(CanInterface(channel=channel), [0x200, 0x1FF, 0x320])
@@ -92,7 +100,7 @@ class Bench:
             rclpy.spin_once(self.node, timeout_sec=0.01)
 
     def drive(self):
-        """Commands with a little expected tension, so that the currents are not zero."""
+        """Publish a command with an expected tension, so that the currents are not zero."""
         imu = self.heard.get("imu/data_raw")
         if imu is not None:
             self.commands.publish(CableCommand(header=imu.header, displacement=[0.0] * 6, tension=[0.5] * 6))

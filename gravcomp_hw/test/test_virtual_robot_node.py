@@ -104,7 +104,7 @@ def test_faults_begin_end_and_are_refused_in_words():
 
 
 @pytest.mark.parametrize(
-    "parameter, words",
+    ("parameter", "words"),
     [
         ("motion:=dance", "allowed: one of static"),
         ("motion:=recording", "'recording' is empty"),

@@ -18,7 +18,7 @@ OK, WARN, ERROR = (bytes([level]) for level in (0, 1, 2))
 class ManagedNode(LifecycleNode):
     """Base of all nodes. A subclass sets `name` and `parameters_class` and overrides the hooks it needs.
 
-    `parameters`: the current values (frozen data class); `robot_file`: the robot file; `finished`: set it to True to end the process.
+    `parameters`: the current values (frozen data class); `robot_file`: the robot file; `finished`: set it to end the process.
     """
 
     name: str
