@@ -195,7 +195,7 @@ def test_without_a_known_zero_nothing_is_driven(bench):
         ("interface:=semaphore", "CAN interface 'semaphore' is not available"),
         ("zero:=sometimes", "allowed: one of start, home, home_at_start"),
         ("control_rate:=20.0", "allowed: 200 to 1000 Hz"),
-        ("robot:=nobody", "give the path of a robot's YAML"),
+        ("robot:=nobody", "give the path of a robot file"),
         ("chanel:=can0", "unknown parameter 'chanel'"),
     ],
 )
