@@ -7,7 +7,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from gravcomp.config import ConfigError, DeclaredParameter, convert, declared_parameters, from_mapping
+from gravcomp.config import ConfigError, DeclaredParameter, convert, declared_parameters, from_mapping, unknown_key
 
 
 def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
@@ -66,7 +66,7 @@ def check_defaults(cls: type, defaults: dict, source: str) -> None:
     leaves = {leaf.key: leaf for leaf in declared_parameters(cls)}
     for key, value in _flatten(defaults).items():
         if key not in leaves:
-            raise ConfigError(f"{source}: unknown key '{key}'; allowed: {', '.join(sorted(leaves))}")
+            raise ConfigError(f"{source}: {unknown_key(key, {leaf.key: leaf.earlier_key for leaf in leaves.values()})}")
         convert(value, leaves[key].type, leaves[key].parameter, source=source, key=key)
 
 

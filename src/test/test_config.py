@@ -78,3 +78,13 @@ class Drive:
 def test_a_renamed_key_is_refused_and_the_error_names_the_new_key():
     with pytest.raises(ConfigError, match=r"f.yaml: key 'drive\.stroke_mm' has been renamed; write 'travel_mm' instead"):
         from_mapping(Drive, {"stroke_mm": 4.0}, source="f.yaml", key="drive")
+
+
+@dataclass(frozen=True)
+class Winch:
+    drive: Drive = parameter(default_factory=Drive, description="drive")
+
+
+def test_a_declared_parameter_has_the_dotted_key_of_its_earlier_name():
+    (leaf,) = declared_parameters(Winch)
+    assert (leaf.key, leaf.earlier_key) == ("drive.travel_mm", "drive.stroke_mm")

@@ -2,7 +2,7 @@
 
 from gravcomp.config.declaration import Parameter, parameter
 from gravcomp.config.errors import ConfigError
-from gravcomp.config.reading import convert, from_mapping
+from gravcomp.config.reading import convert, from_mapping, unknown_key
 from gravcomp.config.writing import DeclaredParameter, declared_parameters, to_mapping
 from gravcomp.config.yaml_file import load_yaml
 
@@ -16,4 +16,5 @@ __all__ = [
     "load_yaml",
     "parameter",
     "to_mapping",
+    "unknown_key",
 ]

@@ -9,6 +9,7 @@ import difflib
 import math
 import types
 import typing
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of
@@ -33,7 +34,8 @@ def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T
     fields = {key_of(f): f for f in dataclasses.fields(cls) if f.init}
     for name in mapping:
         if name not in fields:
-            raise ConfigError(f"{source}: {_unknown(name, fields, key)}")
+            earlier = {current: declared.renamed_from for current, f in fields.items() if (declared := parameter_of(f))}
+            raise ConfigError(f"{source}: {unknown_key(name, dict.fromkeys(fields) | earlier, key)}")
     values = {}
     for name, field in fields.items():
         here, declared = joined(key, name), parameter_of(field)
@@ -81,14 +83,17 @@ def convert(value: Any, kind: Any, declared: Parameter | None, *, source: str, k
     return _scalar(value, kind, declared, source=source, key=key)
 
 
-def _unknown(name: Any, fields: dict[str, dataclasses.Field], key: str) -> str:
-    for current, field in fields.items():
-        declared = parameter_of(field)
-        if declared is not None and name == declared.renamed_from:
+def unknown_key(name: Any, allowed: Mapping[str, str | None], key: str = "") -> str:
+    """Return the sentence for a key `name` of the mapping at `key` that is not allowed.
+
+    `allowed` maps the allowed keys to their earlier names (None: never renamed).
+    """
+    for current, earlier in allowed.items():
+        if earlier is not None and name == earlier:
             return f"key '{joined(key, name)}' has been renamed; write '{current}' instead"
-    near = difflib.get_close_matches(str(name), fields, n=1)
+    near = difflib.get_close_matches(str(name), allowed, n=1)
     hint = f" (did you mean '{near[0]}'?)" if near else ""
-    return f"unknown key '{joined(key, name)}'{hint}; allowed: {', '.join(sorted(fields))}"
+    return f"unknown key '{joined(key, name)}'{hint}; allowed: {', '.join(sorted(allowed))}"
 
 
 def _scalar(value: Any, kind: type, declared: Parameter, *, source: str, key: str) -> Any:

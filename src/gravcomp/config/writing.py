@@ -19,6 +19,12 @@ class DeclaredParameter:
     default: Any
     parameter: Parameter
 
+    @property
+    def earlier_key(self) -> str | None:
+        """Dotted key before the parameter was renamed, or None."""
+        prefix, earlier = self.key.rpartition(".")[0], self.parameter.renamed_from
+        return None if earlier is None else joined(prefix, earlier)
+
 
 def to_mapping(value: "DataclassInstance") -> dict:
     """Return the inverse of `from_mapping`: edge keys, edge units and plain types, ready for YAML."""
