@@ -163,7 +163,8 @@ def test_topics_and_services_exist(name):
             assert word in services, f"no service {word}"
 
 
-@pytest.mark.parametrize("name", NAMES)
+# The changelog names old keys as well.
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "CHANGELOG.md"])
 def test_parameters_and_keys_exist(name):
     article = load_yaml(shipped_robots()["article"])
     hardware = {f"hardware.{leaf.key}" for leaf in declared_parameters(Hardware)}
