@@ -100,7 +100,7 @@ def warming(monkeypatch):
         temperature_stamp_ns=stamp[::10],
         temperature=temperature[::10],
     )
-    monkeypatch.setattr("gravcomp.recordings.read_recording", lambda path, topic: recording)
+    monkeypatch.setattr("gravcomp.recordings.imu.read_recording", lambda path, topic: recording)
 
 
 def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkeypatch):
@@ -119,11 +119,11 @@ def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkey
     "arguments, words",
     [
         (["missing.npz"], "missing.npz: does not exist"),
-        (["poses.npz", "--up", "0", "0", "1"], "holds 6 distinct resting pose(s); 1 direction(s)"),
+        (["poses.npz", "--up", "0", "0", "1"], "has 6 distinct pose(s) at rest, but 1 direction(s)"),
         (["poses.npz", "--up", "0", "0", "0"], "other than zero"),
         (["poses.npz", "--bias-model", "b.json"], "contains no imu/temperature"),
         (["poses.npz", "--write", "nowhere/robot.yaml"], "cannot be written"),
-        (["in_g.npz"], "a wrong unit (m/s^2 are needed)"),
+        (["in_g.npz"], "wrong unit (m/s^2 is needed)"),
         (["hand.npz"], "never rests"),
     ],
 )

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 from gravcomp.orientation import quaternion as quat
-from gravcomp.orientation.calibration import (
-    CalibrationError,
-    RestingPose,
-    fit_accelerometer,
-    fit_gyro_offset,
-    fit_mount,
-    resting_poses,
-)
+from gravcomp.orientation.calibration import fit_accelerometer, fit_gyro_offset, fit_mount
+from gravcomp.orientation.errors import CalibrationError
+from gravcomp.orientation.resting_poses import RestingPose, resting_poses
 from gravcomp.recordings.imu import Recording
 
 SIX = np.vstack([np.eye(3), -np.eye(3)])
@@ -72,7 +67,7 @@ def test_a_recording_without_rest_is_refused():
     recording = Recording(
         "hand.npz", np.arange(500) * 10_000_000, random.normal(0, 1.0, (500, 3)), random.normal(0, 5.0, (500, 3))
     )
-    with pytest.raises(CalibrationError, match="hand.npz: the sensor never rests for 1.5 s"):
+    with pytest.raises(CalibrationError, match=r"hand.npz: the sensor never rests for 1.5 s"):
         resting_poses(recording)
 
 

@@ -1,1 +1,1 @@
-"""The whole closed loop on the virtual robot in one process, stepped in the virtual robot's time."""
+"""The whole closed loop on the virtual robot in one process, in virtual time."""

@@ -1,9 +1,10 @@
-"""The whole closed loop in one process, stepped in the virtual robot's time: as fast as the machine computes, the same run each time.
+"""The whole closed loop in one process, in virtual time: as fast as the machine computes, with the same result each time.
 
-    virtual robot --CAN frames--> IMU stream -> orientation filter -> simulator -> inverse problem -> bridge --CAN frames--> virtual robot
+    virtual robot --CAN frames--> IMU stream -> orientation filter -> simulator -> inverse problem
+                  <--CAN frames-- bridge <----------------------------------------------- command
 
-Every part is the one that runs in the graph: frames, bridge state machine, position loops and filter; only the middleware between
-them is missing, whose delay `delay` stands for. The truth of the virtual robot is recorded for judging and never enters the loop.
+All parts are those of the graph: frames, state machine of the bridge, position loops, filter. Only the middleware is missing;
+`delay` represents its latency. The ground truth of the virtual robot is recorded for evaluation and does not enter the loop.
 
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)))
     loop.release(); loop.run(4.0)
@@ -13,14 +14,15 @@ them is missing, whose delay `delay` stands for. The truth of the virtual robot 
 
 import collections
 import dataclasses
-from dataclasses import dataclass
 
+import can
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
 from gravcomp.inverse import InverseController, Target
 from gravcomp.inverse.limits import within_limits
 from gravcomp.motors.bridge import Bridge
@@ -30,46 +32,26 @@ from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.thermal import HeaterControl
 from gravcomp.virtual.motion import BaseMotion
+from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 
 SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
-_CONTROL_STEPS = 2  # bus steps a control period of the bridge: 250 Hz
+_CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _HEATER_PERIOD = 0.1  # s
-_IDLE = 2e-3  # N
+_IDLE = 2e-3  # N, tension below which a cable counts as idle
 RELEASE_SLACK = 5e-3
-"""m: released cables are paid out so far beyond their paths that nothing of the robot ever tightens them."""
-
-
-@dataclass(frozen=True)
-class Trace:
-    """What happened, one row a sample; t samples, b backbone points, m cables. SI, soft_base; `model_` is what the simulator says."""
-
-    time: np.ndarray  # (t,)
-    compensating: np.ndarray  # (t,) bool
-    tip_position: np.ndarray  # (t, 3) true
-    tip_direction: np.ndarray  # (t, 3) true
-    backbone: np.ndarray  # (t, b, 3) true
-    base_orientation: np.ndarray  # (t, 4) x y z w, true
-    gravity: np.ndarray  # (t, 3) true
-    tension: np.ndarray  # (t, m) true
-    estimated_gravity: np.ndarray  # (t, 3)
-    model_tip_position: np.ndarray  # (t, 3)
-    model_tip_direction: np.ndarray  # (t, 3)
-    command: np.ndarray  # (t, m)
-
-    def between(self, start: float, end: float = np.inf) -> "Trace":
-        """The rows with start <= time < end."""
-        rows = (self.time >= start - 1e-9) & (self.time < end - 1e-9)
-        return Trace(*(getattr(self, name)[rows] for name in Trace.__dataclass_fields__))
+"""m: released cables are paid out by this length beyond their paths, so that no motion of the robot makes them taut."""
 
 
 class ClosedLoop:
-    """The loop's state. Public: trace, time, shape (the simulator's last)."""
+    """State of the loop. `shape` is the last result of the simulator."""
 
     def __init__(self, setup: Setup, motion: BaseMotion, *, delay: int = 0, heating: bool = True, warm: bool = True):
-        """delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature and the filter has seen a rest.
+        """Start the bridge and the filter; virtual time advances until both run.
+
+        delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
+        starts at its target temperature. Raises RuntimeError where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -79,18 +61,18 @@ class ClosedLoop:
         self._stream = ImuStream()
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
-        # A board that starts warm cannot tell the surroundings' temperature by its first reading.
+        # The first reading of a board that starts warm is not the ambient temperature.
         ambient = setup.truth.board.thermal.ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot)
         self._problem = InverseController(setup.robot, setup.controller.inverse)
         self._target: Target | None = None
         self._weightless = False
-        self._cables = np.zeros(len(setup.robot.cables))  # what drives the model's
+        self._cables = np.zeros(len(setup.robot.cables))  # m, displacement of the model's cables
         self._sent = self._cables
-        self._arriving: collections.deque = collections.deque([None] * delay)
+        self._arriving: collections.deque[tuple[np.ndarray, np.ndarray] | None] = collections.deque([None] * delay)
         self._rows: list[tuple] = []
-        self._outgoing: list = []
+        self._outgoing: list[can.Message] = []
         self._steps = 0
         self._gravity = np.zeros(3)
         self.shape: Shape | None = None
@@ -100,25 +82,27 @@ class ClosedLoop:
 
     @property
     def time(self) -> float:
-        """s of the virtual robot's clock."""
+        """Virtual time, s."""
         return self._virtual.time
 
     @property
     def trace(self) -> Trace:
-        """What has happened since the beginning or `forget`."""
+        """Record since the start or the last `forget`."""
         return Trace(*(np.array(column) for column in zip(*self._rows)))
 
     def forget(self) -> None:
-        """Begin a new trace."""
+        """Begin a new record."""
         self._rows.clear()
 
     def release(self) -> None:
-        """Pay the cables out and leave the robot to gravity: 'without compensation'."""
+        """Pay the cables out: the robot is without compensation."""
         self._target = None
 
     def hold(self, target: Target, *, weightless: bool = False) -> None:
-        """Compensate: keep the target. weightless: the model knows of no gravity and idle cables are released, without pretension, which is what
-        bending the robot without compensation means.
+        """Compensate and keep the target.
+
+        weightless: the robot is bent without compensation. The model has no gravity, idle cables are released, and there is no
+        pretension.
         """
         if self._target is None:
             self._problem.reset(self._cables)
@@ -127,13 +111,13 @@ class ClosedLoop:
         self._target, self._weightless = target, weightless
 
     def run(self, duration: float) -> None:
-        """Advance by `duration` s."""
+        """Advance by `duration` s. Raises RuntimeError where the bridge refuses a command."""
         end = self.time + duration
         while self.time < end - 1e-9:
             self._bus_step()
 
     def _settle(self) -> None:
-        """Until the bridge drives and the filter has started."""
+        """Advance until the bridge drives and the filter has started."""
         self._waiting = True
         while self._bridge.state not in DRIVING or self.shape is None:
             self._bus_step()
@@ -168,8 +152,8 @@ class ClosedLoop:
             self._gravity = np.array(estimate.gravity)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
-        self.shape = self._simulator.step(gravity, None if released else self._cables)
-        self._cables, tension = self._released() if released else self._compensated()
+        self.shape = shape = self._simulator.step(gravity, None if self._target is None else self._cables)
+        self._cables, tension = self._released(shape) if self._target is None else self._compensated(shape, self._target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
         self._arriving.append((self._sent, tension))
         arrived = self._arriving.popleft()
@@ -177,20 +161,19 @@ class ClosedLoop:
             refused = self._bridge.command(arrived[0].tolist(), arrived[1].tolist(), self.time)
             if refused:
                 raise RuntimeError(f"the bridge refused a command at {self.time:.2f} s: {refused}")
-        self._record()
+        self._record(shape)
 
-    def _released(self) -> tuple[np.ndarray, np.ndarray]:
-        free = self.shape.response.displacement_free - RELEASE_SLACK
+    def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+        free = shape.response.displacement_free - RELEASE_SLACK
         displacement = (
             self._cables if self._waiting else within_limits(free, self._cables, self.setup.robot.limits, SAMPLE_PERIOD)
         )
         return displacement, np.zeros(len(free))
 
-    def _compensated(self) -> tuple[np.ndarray, np.ndarray]:
-        shape = self.shape
+    def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
         command = self._problem.step(
             shape.response,
-            self._target,
+            target,
             backbone_station=shape.backbone_station,
             tension=shape.cable_tension,
             interval=SAMPLE_PERIOD,
@@ -202,8 +185,8 @@ class ClosedLoop:
         wanted = np.where(tension > _IDLE, self._cables, self._cables - RELEASE_SLACK)
         return within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
 
-    def _record(self) -> None:
-        truth, shape = self._virtual.truth, self.shape
+    def _record(self, shape: Shape) -> None:
+        truth = self._virtual.truth
         self._rows.append(
             (
                 truth.time,
@@ -222,8 +205,8 @@ class ClosedLoop:
         )
 
 
-def _truth(setup: Setup, warm: bool):
-    """The virtual robot's parameters; `warm`: the board starts at the heater's target."""
+def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:
+    """Return the parameters of the virtual robot; `warm`: the board starts at the target temperature of the heater."""
     truth = setup.truth
     if not warm:
         return truth

@@ -1,4 +1,4 @@
-"""What an experiment works with: the robot as the controller believes it to be, and the virtual robot that stands for the real one."""
+"""Setup of an experiment: the robot in the model of the controller, and the virtual robot in place of the real one."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from gravcomp.virtual.parameters import VirtualRobotParameters
 
 @dataclass(frozen=True)
 class Setup:
-    """One robot with both its sides.
+    """Model and virtual robot of one robot.
 
-    robot: what model and controller know; nominal: the shape that the virtual robot is built from (its deviations stand in `truth`);
-    both are the same until a calibration or another geometry changes them.
+    robot: the robot in model and controller; nominal: the robot from which the virtual robot is built, with the deviations in
+    `truth`. Both are equal unless a calibration changes `robot`.
     """
 
     source: str
@@ -31,7 +31,7 @@ class Setup:
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
-        """The setup that a robot's file describes. Raises ConfigError."""
+        """Return the setup of a robot file; seed: of the virtual robot, default: that of the file. Raises ConfigError."""
 
         def section(kind: type, name: str) -> Any:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
@@ -49,10 +49,6 @@ class Setup:
             seed=truth.seed if seed is None else seed,
         )
 
-    def believing(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
-        """The same virtual robot under a controller that knows `robot` (and the motors' offsets of `hardware`)."""
+    def with_model(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
+        """Return the same virtual robot with another model, and with the motor offsets of `hardware` where it is given."""
         return dataclasses.replace(self, robot=robot, hardware=hardware or self.hardware)
-
-    def with_geometry(self, robot: Robot) -> "Setup":
-        """Model and virtual robot both of another geometry, the same materials and deviations."""
-        return dataclasses.replace(self, robot=robot, nominal=robot)

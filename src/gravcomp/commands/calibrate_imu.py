@@ -44,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError, from_mapping
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
-    from gravcomp.orientation.calibration import CalibrationError, calibrate
+    from gravcomp.orientation.calibration import calibrate
+    from gravcomp.orientation.errors import CalibrationError
     from gravcomp.recordings.imu import RecordingError, read_recording
 
     file = load_robot_file(args.robot)

@@ -1,10 +1,11 @@
-"""The sense of gravity: orientation of an IMU from its gyroscope and accelerometer, and gravity in the robot's base frame."""
+"""Orientation of an IMU from its gyroscope and accelerometer, and gravity in the frame of the robot's base."""
 
 from gravcomp.orientation.bias_model import BiasModelError, BiasTemperatureModel
-from gravcomp.orientation.calibration import ImuCalibration
+from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.estimator import EstimatorOptions, GravityEstimate, GravityEstimator
-from gravcomp.orientation.filter import Estimate, OrientationFilter
+from gravcomp.orientation.filter import OrientationFilter
 from gravcomp.orientation.guard import Problem
+from gravcomp.orientation.imu_calibration import ImuCalibration
 from gravcomp.orientation.offline import EstimatedRecording, estimate_recording
 from gravcomp.orientation.options import FilterOptions
 

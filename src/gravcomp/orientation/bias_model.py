@@ -1,17 +1,16 @@
-"""The gyroscope's bias over temperature: learned at rest while the chip warms, kept on disk, subtracted from the next start on.
+"""Bias of the gyroscope over temperature: learned at rest while the chip warms up, saved, and subtracted from the next start on.
 
-The mean bias is kept for each degree; between them a polynomial by weighted least squares,
+The model holds the mean bias at each degree; a polynomial by weighted least squares interpolates,
 
     b(T) = c0 + c1 (T - T0) + c2 (T - T0)^2,
 
-of the order that the learned span of temperature bears; beyond the span its end value holds.
+with an order that depends on the learned span of temperature; beyond the span the value at its end holds.
 """
 
 import json
 import math
 import os
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,42 +18,43 @@ import numpy as np
 FORMAT = "gravcomp bias over temperature 1"
 LINEAR_FROM = 3.0  # degC of span
 QUADRATIC_FROM = 12.0  # degC of span
-MEMORY = 60.0  # s: the weight of what is known of one degree, so that an ageing sensor is followed
-RESIDUAL_STD = math.radians(0.1)  # rad/s: what the model leaves, from start to start
+MEMORY = 60.0  # s: largest weight of the values at one degree, so that the model follows an ageing sensor
+RESIDUAL_STD = math.radians(0.1)  # rad/s: error of the model, from start to start
 
 
 class BiasModelError(ValueError):
-    """A file that is not a bias model; the text names it."""
+    """A file that is not a bias model; the text names the file."""
 
 
 class BiasTemperatureModel:
-    """Bias (rad/s) by temperature (degC)."""
+    """Bias (rad/s) as a function of temperature (degC)."""
 
-    def __init__(self):
+    def __init__(self) -> None:
+        """Start with nothing learned."""
         self._bins: dict[int, tuple[float, float, np.ndarray]] = {}  # degree -> weight s, mean degC, mean bias (3,)
         self._coefficients: np.ndarray | None = None  # (order + 1, 3)
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """Lowest and highest learned temperature, degC; None: nothing learned."""
+        """Lowest and highest learned temperature, degC; None where nothing is learned."""
         means = [mean for _, mean, _ in self._bins.values()]
         return (min(means), max(means)) if means else None
 
-    def learn(self, temperature: float, bias: Sequence[float], duration: float) -> None:
-        """Take a bias (3,) rad/s seen at rest for `duration` s at this temperature."""
+    def learn(self, temperature: float, bias: np.ndarray, duration: float) -> None:
+        """Take a bias (3,) rad/s that was measured at rest for `duration` s at this temperature (degC)."""
         key = round(temperature)
-        bias = np.asarray(bias, float)
-        weight, mean, mean_bias = self._bins.get(key, (0.0, temperature, bias))
+        measured = np.asarray(bias, float)
+        weight, mean, mean_bias = self._bins.get(key, (0.0, temperature, measured))
         gain = duration / (min(weight, MEMORY) + duration)
         self._bins[key] = (
             min(weight + duration, MEMORY),
             mean + gain * (temperature - mean),
-            mean_bias + gain * (bias - mean_bias),
+            mean_bias + gain * (measured - mean_bias),
         )
         self._coefficients = None
 
     def bias(self, temperature: float) -> np.ndarray | None:
-        """The bias at this temperature, (3,) rad/s; None: nothing learned."""
+        """Return the bias (3,) rad/s at this temperature (degC); None where nothing is learned."""
         span = self.span
         if span is None:
             return None
@@ -64,17 +64,17 @@ class BiasTemperatureModel:
         return offset ** np.arange(len(self._coefficients)) @ self._coefficients
 
     def merge(self, other: "BiasTemperatureModel") -> None:
-        """Take what the other one has learned, with its weight."""
+        """Take the values of the other model with their weights."""
         for weight, mean, bias in other._bins.values():
             self.learn(mean, bias, weight)
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Remove all values."""
         self._bins.clear()
         self._coefficients = None
 
     def save(self, path: str | Path) -> None:
-        """Write the file in one step: a reader finds the old or the new one."""
+        """Write the file atomically: a reader finds either the old or the new one."""
         path = Path(path).expanduser()
         path.parent.mkdir(parents=True, exist_ok=True)
         rows = [
@@ -88,7 +88,7 @@ class BiasTemperatureModel:
 
     @classmethod
     def load(cls, path: str | Path) -> "BiasTemperatureModel":
-        """The model in the file; an empty one when there is none yet. Raises BiasModelError."""
+        """Return the model in the file, an empty one where the file does not exist. Raises BiasModelError for another file."""
         path = Path(path).expanduser()
         model = cls()
         try:
@@ -104,7 +104,7 @@ class BiasTemperatureModel:
         except FileNotFoundError:
             return model
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise BiasModelError(f"{path}: is not a bias model ({error}); delete it to learn anew") from error
+            raise BiasModelError(f"{path}: is not a bias model ({error}); delete it to learn the bias again") from error
         return model
 
     def _fit(self, span: tuple[float, float]) -> np.ndarray:

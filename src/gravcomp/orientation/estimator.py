@@ -1,4 +1,4 @@
-"""The whole way from raw samples to gravity in the robot's base frame; the node and the offline command both run this.
+"""Raw IMU samples to gravity in the frame of the robot's base; the node and the offline command both use this.
 
     calibration -> bias over temperature -> orientation filter -> prediction -> mounting rotation
 
@@ -14,15 +14,16 @@ import numpy as np
 
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.bias_model import RESIDUAL_STD, BiasTemperatureModel
-from gravcomp.orientation.calibration import ImuCalibration
-from gravcomp.orientation.filter import Estimate, OrientationFilter
+from gravcomp.orientation.estimate import Estimate
+from gravcomp.orientation.filter import OrientationFilter
 from gravcomp.orientation.guard import Problem
+from gravcomp.orientation.imu_calibration import ImuCalibration
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.prediction import PredictionOptions, Predictor
 
-# A temperature counts for samples that much younger: whatever order messages arrive in, it has arrived by then.
+# A temperature counts for samples later than it by this time; by then it has arrived, in any order of the messages.
 TEMPERATURE_LAG_NS = 100_000_000
-# The temperature stands still when the readings of so long a time differ by one count of the chip at most.
+# The temperature is stable when its readings over this time differ by at most one count of the chip.
 STABLE_TIME_NS = 20_000_000_000
 STABLE_SPAN = 0.13  # degC
 LEARN_EVERY = 1.0  # s at rest between two entries of the bias model
@@ -30,7 +31,7 @@ LEARN_EVERY = 1.0  # s at rest between two entries of the bias model
 
 @dataclass(frozen=True)
 class EstimatorOptions:
-    """Everything that the result depends on."""
+    """All parameters that the result depends on."""
 
     filter: FilterOptions = field(default_factory=FilterOptions)
     calibration: ImuCalibration = field(default_factory=ImuCalibration)
@@ -39,17 +40,17 @@ class EstimatorOptions:
 
 @dataclass(frozen=True, slots=True)
 class GravityEstimate:
-    """An Estimate and what the robot needs of it."""
+    """An Estimate, and gravity in the frame of the robot's base."""
 
-    imu: Estimate  # bias without the calibration's offset and the bias model's part
-    gravity: tuple[float, float, float]  # m/s^2, soft_base, a horizon ahead of the stamp
-    bias: tuple[float, float, float]  # rad/s, the whole bias of the raw rate
-    accel: tuple[float, float, float]  # m/s^2, calibrated specific force, IMU frame
-    calibrated: bool  # |a| at rest is gravity, as far as is known
+    imu: Estimate  # its bias is without the calibration's offset and the bias model's part
+    gravity: quat.Vector  # m/s^2, soft_base, one horizon after the stamp
+    bias: quat.Vector  # rad/s, the whole bias of the raw rate
+    accel: quat.Vector  # m/s^2, calibrated specific force, IMU frame
+    calibrated: bool  # |a| at rest is gravity, or is not known yet
 
 
 class GravityEstimator:
-    """Takes samples and temperatures by stamp. Fed with the same values it gives the same results, bit for bit."""
+    """Takes samples and temperatures by stamp. The same values give the same results, bit for bit."""
 
     def __init__(
         self,
@@ -57,7 +58,7 @@ class GravityEstimator:
         mount: Sequence[float] = quat.IDENTITY,
         bias_model: BiasTemperatureModel | None = None,
     ):
-        """`mount`: w x y z, IMU to soft_base. `bias_model` is read, never changed; what this run shows collects in `learned`."""
+        """`mount`: w x y z, IMU to soft_base. `bias_model` is not changed; `learned` collects what this run learns."""
         self.options = options or EstimatorOptions()
         self.filter = OrientationFilter(self.options.filter)
         self.learned = BiasTemperatureModel()
@@ -68,12 +69,12 @@ class GravityEstimator:
         self._mount = quat.normalised(mount)
         self._temperatures: deque[tuple[int, float]] = deque(maxlen=1000)
         self._temperature: float | None = None
-        self._span = (-math.inf, math.inf, 0)  # lowest and highest reading, degC, since a stamp, ns; at first too wide
+        self._span = (-math.inf, math.inf, 0)  # lowest and highest reading, degC, since a stamp, ns; at first wider than any span
         self._compensation = self._gyro_offset
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: yaw 0, no bias; the temperature and what is known of the bias over it stay."""
+        """Start again with yaw 0 and no bias; temperature and bias model stay."""
         self.filter.reset()
         if self._temperature is not None and self._model is not None and self._model.span is not None:
             self.filter.reset_bias(std=RESIDUAL_STD)
@@ -83,7 +84,7 @@ class GravityEstimator:
 
     @property
     def bias_estimation(self) -> bool:
-        """Whether the filter estimates the bias; may be switched while running."""
+        """Whether the filter estimates the bias; can be switched while running."""
         return self.filter.bias_estimation
 
     @bias_estimation.setter
@@ -91,26 +92,30 @@ class GravityEstimator:
         self.filter.set_bias_estimation(on)
 
     def set_prediction(self, options: PredictionOptions) -> None:
-        """Change the prediction while running; the orientation goes on unbroken."""
+        """Change the prediction while running; the orientation is not affected."""
         self._predictor.options = options
 
     def add_temperature(self, stamp_ns: int, temperature: float) -> None:
-        """Take a temperature reading, degC; it counts for samples 0.1 s younger and more."""
+        """Take a temperature reading, degC; it counts for samples at least 0.1 s later."""
         if math.isfinite(temperature):
             self._temperatures.append((stamp_ns, float(temperature)))
 
     def update(self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float]) -> GravityEstimate | Problem:
-        """Take a raw sample, gyro (3,) rad/s and accel (3,) m/s^2 in the IMU's frame; the Problem alone: it cannot be used."""
+        """Take a raw sample and return the estimate, or only the Problem when the sample cannot be used.
+
+        stamp_ns: ns; gyro (3,) rad/s and accel (3,) m/s^2 in the IMU's frame.
+        """
         self._follow_temperature(stamp_ns)
         compensation, offset, scale = self._compensation, self._offset, self._scale
-        accel = (scale[0] * (accel[0] - offset[0]), scale[1] * (accel[1] - offset[1]), scale[2] * (accel[2] - offset[2]))
+        force = (scale[0] * (accel[0] - offset[0]), scale[1] * (accel[1] - offset[1]), scale[2] * (accel[2] - offset[2]))
         rate = (gyro[0] - compensation[0], gyro[1] - compensation[1], gyro[2] - compensation[2])
-        estimate = self.filter.update(stamp_ns, rate, accel)
+        estimate = self.filter.update(stamp_ns, rate, force)
         if isinstance(estimate, Problem):
             return estimate
         if estimate.problem is Problem.CLOCK_RESTARTED:
             self._temperatures.clear()
-        bias = tuple(b + c for b, c in zip(estimate.bias, compensation))
+        bx, by, bz = estimate.bias
+        bias = (bx + compensation[0], by + compensation[1], bz + compensation[2])
         self._learn(estimate, bias)
 
         self._predictor.update(stamp_ns, estimate.angular_velocity)
@@ -121,7 +126,7 @@ class GravityEstimator:
             imu=estimate,
             gravity=quat.rotate(self._mount, gravity),
             bias=bias,
-            accel=accel,
+            accel=force,
             calibrated=norm is None or abs(norm - self.options.filter.gravity) <= self.options.calibration.norm_tolerance,
         )
 
@@ -135,7 +140,8 @@ class GravityEstimator:
             self._temperature = newest
             modelled = self._model.bias(newest) if self._model is not None else None
             if modelled is not None:
-                self._compensation = tuple(o + float(m) for o, m in zip(self._gyro_offset, modelled))
+                x, y, z = (o + float(m) for o, m in zip(self._gyro_offset, modelled))
+                self._compensation = (x, y, z)
                 if first:
                     self.filter.reset_bias(std=RESIDUAL_STD)
 
@@ -148,7 +154,7 @@ class GravityEstimator:
         self._span = (lowest, highest, since_ns)
         self.filter.temperature_stable = stamp_ns - since_ns >= STABLE_TIME_NS
 
-    def _learn(self, estimate: Estimate, bias: tuple) -> None:
+    def _learn(self, estimate: Estimate, bias: quat.Vector) -> None:
         dt = 0.0 if self._last_ns is None else (estimate.stamp_ns - self._last_ns) * 1e-9
         self._last_ns = estimate.stamp_ns
         if not estimate.rest or not self.bias_estimation or self._temperature is None:

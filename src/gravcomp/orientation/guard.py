@@ -1,27 +1,27 @@
-"""What can be wrong with a sample before a filter takes it: stamps, values, and sensors that no longer change."""
+"""Checks of a sample before the filter takes it: stamps, values, and sensors whose values no longer change."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 from gravcomp.orientation.options import SensorOptions
+from gravcomp.orientation.quaternion import Vector
 
-SATURATED_FROM = 0.995  # of full scale: the last counts before the stop
-RESTART_AFTER = 10  # samples in a row, older than the newest: the clock went back, the stream is a new one
+SATURATED_FROM = 0.995  # of full scale
+RESTART_AFTER = 10  # samples in a row, older than the newest: the clock was set back, a new stream begins
 
 
 class Problem(Enum):
-    """What is wrong with a sample; the value is said to people."""
+    """Problem of a sample; the value is the text for the user."""
 
     NONE = ""
     NOT_FINITE = "the sample holds NaN or infinity"
     OUT_OF_RANGE = "the sample is beyond the sensor's range: a wrong unit (rad/s and m/s^2 are needed) or a wrong range"
-    REPEATED_STAMP = "the stamp repeats the one before"
-    REORDERED_STAMP = "the stamp is older than the one before"
-    CLOCK_RESTARTED = "the stamps went back for good: started anew"
-    GAP = "samples are missing: the inclination started anew"
-    CONTRADICTED = "a sensor at rest contradicts the inclination: started anew"
+    REPEATED_STAMP = "the stamp repeats the previous one"
+    REORDERED_STAMP = "the stamp is older than the previous one"
+    CLOCK_RESTARTED = "the clock of the stamps was set back: restarted"
+    GAP = "samples are missing: the inclination is restarted"
+    CONTRADICTED = "the sensor at rest contradicts the inclination: restarted"
     GYRO_SATURATED = "the gyroscope is saturated"
     ACCEL_SATURATED = "the accelerometer is saturated"
     GYRO_STUCK = "the gyroscope is stuck: it repeats the same values"
@@ -35,33 +35,34 @@ RESTARTED = frozenset({Problem.CLOCK_RESTARTED, Problem.GAP})
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a filter may do with the sample: `problem` in REJECTED: nothing; in RESTARTED: begin anew with it."""
+    """Result of the checks. `problem` in REJECTED: the sample must not be used; in RESTARTED: the filter starts again with it."""
 
     problem: Problem
     dt: float = 0.0  # s since the last sample taken; 0 for the first
     gyro_saturated: bool = False
     accel_saturated: bool = False
-    gyro_stuck: bool = False  # for `stuck_time`: it may also be a simulated sensor without noise
+    gyro_stuck: bool = False  # for `stuck_time`; a simulated sensor without noise looks the same
     accel_stuck: bool = False
 
 
 class SampleGuard:
-    """Judges one sample after the other."""
+    """Checks one sample after the other."""
 
     def __init__(self, options: SensorOptions):
         self._options = options
         self.reset()
 
     def reset(self) -> None:
-        """Forget the stream: the next sample is the first."""
+        """Reset the stream: the next sample is the first."""
         self._stamp_ns: int | None = None
         self._older = 0
         self._older_ns = 0
-        self._gyro = self._accel = (math.nan,) * 3
+        self._gyro: Vector = (math.nan, math.nan, math.nan)
+        self._accel: Vector = (math.nan, math.nan, math.nan)
         self._gyro_same = self._accel_same = 0.0
 
-    def judge(self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float]) -> Verdict:
-        """Judge the sample; gyro (3,) rad/s, accel (3,) m/s^2 as Python floats."""
+    def check(self, stamp_ns: int, gyro: Vector, accel: Vector) -> Verdict:
+        """Check the sample with the stamp in ns; gyro in rad/s, accel in m/s^2."""
         options = self._options
         if not all(map(math.isfinite, gyro)) or not all(map(math.isfinite, accel)):
             return Verdict(Problem.NOT_FINITE)
@@ -104,7 +105,7 @@ class SampleGuard:
     def _backward(self, stamp_ns: int) -> Problem:
         if stamp_ns == self._stamp_ns:
             return Problem.REPEATED_STAMP
-        # A stream that went back advances from there; single late samples do not.
+        # After the clock was set back the stamps advance; those of single late samples do not.
         self._older = self._older + 1 if self._older and stamp_ns > self._older_ns else 1
         self._older_ns = stamp_ns
         return Problem.CLOCK_RESTARTED if self._older >= RESTART_AFTER else Problem.REORDERED_STAMP

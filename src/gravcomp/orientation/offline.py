@@ -1,6 +1,6 @@
-"""The estimator over a whole recording at full speed: what the node would give for it."""
+"""The estimator over a whole recording, as fast as possible; the result is that of the node."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ PROGRESS_EVERY = 2000  # samples
 
 @dataclass(frozen=True)
 class EstimatedRecording:
-    """One row a sample; a rejected sample repeats the row before, NaN before the first estimate."""
+    """One row for each sample; a rejected sample repeats the previous row; NaN before the first estimate."""
 
     stamp_ns: np.ndarray  # (n,) int64, ns
     orientation: np.ndarray  # (n, 4) w x y z, sensor to earth
@@ -22,13 +22,13 @@ class EstimatedRecording:
     bias: np.ndarray  # (n, 3) rad/s, of the raw rate
     rest: np.ndarray  # (n,) bool
     inclination_std: np.ndarray  # (n,) rad
-    problems: dict[str, int]  # what was wrong -> samples
+    problems: dict[str, int]  # text of the problem -> number of samples
 
 
 def estimate_recording(
     recording: Recording, estimator: GravityEstimator | None = None, progress: Callable[[float], None] | None = None
 ) -> EstimatedRecording:
-    """Run the estimator (default: one with default options) over the recording; `progress` is told the fraction done."""
+    """Return the results of the estimator (default: one with default options); `progress` receives the completed fraction."""
     estimator = estimator or GravityEstimator()
     count = len(recording)
     rows = np.full((count, 12), np.nan)
@@ -36,7 +36,7 @@ def estimate_recording(
     row: tuple | None = None
     temperatures = _temperatures(recording)
     next_temperature = next(temperatures, None)
-    # Python numbers: a sample through NumPy scalars takes half as long again.
+    # Python numbers: with NumPy scalars a sample takes 1.5 times as long.
     samples = zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist())
     for i, (stamp_ns, gyro, accel) in enumerate(samples):
         while next_temperature is not None and next_temperature[0] <= stamp_ns:
@@ -65,7 +65,7 @@ def estimate_recording(
     )
 
 
-def _temperatures(recording: Recording):
-    if recording.temperature is None:
+def _temperatures(recording: Recording) -> Iterator[tuple[int, float]]:
+    if recording.temperature is None or recording.temperature_stamp_ns is None:
         return iter(())
     return zip(recording.temperature_stamp_ns.tolist(), recording.temperature.tolist())

@@ -1,7 +1,7 @@
-"""The parameters of the orientation filter: one set, in physical units, for all motions and all rates.
+"""Parameters of the orientation filter: one set, in physical units, for all motions and all sample rates.
 
-Noise is given as the root of a spectral density, so a sample of period dt gets the variance density^2 / dt (measurements)
-or adds density^2 dt (states), whatever the rate.
+Noise is given as the root of a spectral density: at the sample period dt a measurement has the variance density^2 / dt, and a
+state receives the variance density^2 dt, at any rate.
 """
 
 from dataclasses import dataclass, field
@@ -11,10 +11,10 @@ from gravcomp.config import parameter
 
 @dataclass(frozen=True)
 class RestOptions:
-    """When the sensor counts as being at rest."""
+    """Conditions for the sensor to count as at rest."""
 
     time_constant: float = parameter(
-        0.5, unit="s", minimum=0.05, maximum=10, description="of the low-pass that deviations count from"
+        0.5, unit="s", minimum=0.05, maximum=10, description="of the low-pass from which deviations are measured"
     )
     gyro_deviation: float = parameter(
         2.0, edge="deg/s", minimum=0.01, maximum=100, description="largest deviation of a rate at rest"
@@ -29,33 +29,33 @@ class RestOptions:
         maximum=1,
         description="largest drift of the mean specific force since rest began: 0.3 deg of tilt",
     )
-    minimum_time: float = parameter(1.5, unit="s", minimum=0.1, maximum=60, description="how long it must be still")
+    minimum_time: float = parameter(1.5, unit="s", minimum=0.1, maximum=60, description="time for which the conditions must hold")
     largest_bias: float = parameter(
-        3.0, edge="deg/s", minimum=0.1, maximum=20, description="a mean rate above it is motion, not bias"
+        3.0, edge="deg/s", minimum=0.1, maximum=20, description="a larger mean rate is motion, not bias"
     )
 
 
 @dataclass(frozen=True)
 class SensorOptions:
-    """What the IMU can measure; beyond it a sample is saturated or of a wrong unit."""
+    """Ranges and timing of the IMU; a sample beyond a range is saturated or has a wrong unit."""
 
     gyro_range: float = parameter(2000.0, edge="deg/s", minimum=10, maximum=10000, description="full scale of the gyroscope")
     accel_range: float = parameter(235.0, unit="m/s^2", minimum=15, maximum=4000, description="full scale of the accelerometer")
     delay: float = parameter(
         2.5, edge="ms", minimum=0, maximum=50,
-        description="group delay of the IMU's own low-pass (about 2 to 3 ms at 116 Hz), made good with the measured rate",
+        description="group delay of the IMU's own low-pass (about 2 to 3 ms at 116 Hz), compensated with the measured rate",
     )  # fmt: skip
     stuck_time: float = parameter(
-        1.0, unit="s", minimum=0.02, maximum=60, description="the same values for so long: the sensor is stuck"
+        1.0, unit="s", minimum=0.02, maximum=60, description="the same values for this time: the sensor is stuck"
     )
     largest_gap: float = parameter(
-        0.5, unit="s", minimum=0.02, maximum=10, description="a longer gap between samples makes the inclination start anew"
+        0.5, unit="s", minimum=0.02, maximum=10, description="after a longer gap between samples the inclination is restarted"
     )
 
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """Noise of the model and of the sensor."""
+    """Noise of model and sensor, and the conditions of rest."""
 
     gravity: float = parameter(9.81, unit="m/s^2", minimum=9.7, maximum=9.9, description="local gravity")
     gyro_noise: float = parameter(
@@ -80,7 +80,7 @@ class FilterOptions:
         edge="deg/s",
         minimum=0,
         maximum=1,
-        description="the same, per sqrt(s), while the temperature is known to stand still",
+        description="the same, per sqrt(s), while the temperature is stable",
     )
     bias_initial: float = parameter(
         1.0, edge="deg/s", minimum=0.001, maximum=20, description="standard deviation of the bias at the start"
@@ -90,7 +90,7 @@ class FilterOptions:
         unit="m/s sqrt(s)",
         minimum=0.001,
         maximum=100,
-        description="density of 'the velocity is about zero': the sensor moves, but stays about",
+        description="density of 'the velocity is about zero': the sensor moves, but stays near one place",
     )
     rest_noise: float = parameter(
         0.05, edge="deg/s", minimum=1e-4, maximum=10, description="density of 'the mean rate at rest is the bias', times sqrt(s)"

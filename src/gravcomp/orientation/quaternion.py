@@ -1,6 +1,7 @@
-"""Unit quaternions w x y z, Hamilton's product, as sequences of four Python floats: the fast way for one sample at a time.
+"""Unit quaternions w x y z, Hamilton's product, as tuples of Python floats; for one sample at a time this is the fastest form.
 
-q = (cos(t/2), sin(t/2) axis) turns vectors from the sensor's to the earth's frame: v_earth = R(q) v_sensor.
+q = (cos(t/2), sin(t/2) axis) rotates vectors from the sensor's to the earth's frame: v_earth = R(q) v_sensor. For arrays of
+rotations scipy.spatial.transform.Rotation is used instead.
 """
 
 import math
@@ -9,11 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 Quaternion = tuple[float, float, float, float]
+Vector = tuple[float, float, float]
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 def multiply(a: Sequence[float], b: Sequence[float]) -> Quaternion:
-    """a b: first the turn b, then the turn a."""
+    """Return the product a b: the rotation b, then the rotation a."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (
@@ -25,12 +27,12 @@ def multiply(a: Sequence[float], b: Sequence[float]) -> Quaternion:
 
 
 def conjugate(q: Sequence[float]) -> Quaternion:
-    """The turn back."""
+    """Return the inverse rotation."""
     return (q[0], -q[1], -q[2], -q[3])
 
 
 def exponential(x: float, y: float, z: float) -> Quaternion:
-    """The turn by the rotation vector (x, y, z), rad."""
+    """Return the rotation by the rotation vector (x, y, z), rad."""
     angle_squared = x * x + y * y + z * z
     if angle_squared < 1e-8:
         scale = 0.5 - angle_squared / 48.0
@@ -43,14 +45,14 @@ def exponential(x: float, y: float, z: float) -> Quaternion:
 
 
 def normalised(q: Sequence[float]) -> Quaternion:
-    """q / |q|."""
+    """Return q / |q|."""
     w, x, y, z = q
     scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
     return (w * scale, x * scale, y * scale, z * scale)
 
 
-def rotate(q: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
-    """R(q) vector."""
+def rotate(q: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Return R(q) vector."""
     w, x, y, z = q
     a, b, c = vector
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -58,7 +60,7 @@ def rotate(q: Sequence[float], vector: Sequence[float]) -> tuple[float, float, f
 
 
 def matrix(q: Sequence[float]) -> np.ndarray:
-    """R(q), (3, 3)."""
+    """Return R(q), (3, 3)."""
     w, x, y, z = q
     return np.array(
         (
@@ -70,7 +72,7 @@ def matrix(q: Sequence[float]) -> np.ndarray:
 
 
 def from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """The turn by roll about x, then pitch about y, then yaw about z, all in the fixed frame (REP-103), rad."""
+    """Return the rotation by roll about x, then pitch about y, then yaw about z, all in the fixed frame (REP-103), rad."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -83,12 +85,12 @@ def from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def level(accel: Sequence[float], yaw: float = 0.0) -> Quaternion:
-    """The orientation of a sensor at rest that measures this specific force, with the given yaw (rad)."""
+    """Return the orientation of a sensor at rest that measures this specific force, with the given yaw (rad)."""
     x, y, z = accel
     return from_roll_pitch_yaw(math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), yaw)
 
 
 def yaw_of(q: Sequence[float]) -> float:
-    """The yaw of q in roll, pitch, yaw, rad."""
+    """Return the yaw of q (of roll, pitch, yaw), rad."""
     w, x, y, z = q
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

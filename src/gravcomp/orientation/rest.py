@@ -1,8 +1,9 @@
-"""Telling rest from motion, so that the mean rate can be taken for the bias.
+"""Detection of rest, at which the mean rate is the bias.
 
-At rest, for `minimum_time`: every rate and specific force stays near its own low-pass; the mean rate is small and,
-where the bias is already known, agrees with it; the mean specific force does not drift. The last two tell a slow, steady turn from a bias.
-`calm` is the same without the bias: about the vertical it may be such a turn, but the specific force is gravity, whatever is believed.
+The sensor is at rest when, for `minimum_time`: every rate and specific force stays near its own low-pass; the mean rate is small
+and agrees with the bias where that is known; the mean specific force does not drift. The last two distinguish a bias from a slow,
+steady rotation. `calm` is the same without the bias: the sensor may rotate slowly about the vertical, but its specific force is
+gravity in any case.
 """
 
 import math
@@ -10,49 +11,54 @@ from collections.abc import Sequence
 
 from gravcomp.orientation.options import RestOptions
 
-CONSISTENT_SIGMAS = 4.0  # of the bias: a mean rate farther away from it is a turn
+CONSISTENT_SIGMAS = 4.0  # of the bias: a mean rate that differs more is a rotation
 CONSISTENT_FLOOR = math.radians(0.15)  # rad/s
 
 
 def consistent_within(bias_std: float) -> float:
-    """How far (rad/s) a mean rate at rest may be from a bias that is known to `bias_std` (rad/s)."""
+    """Return the largest difference (rad/s) of a mean rate at rest from a bias with the standard deviation `bias_std` (rad/s)."""
     return CONSISTENT_SIGMAS * bias_std + CONSISTENT_FLOOR
 
 
 def agrees(mean_gyro: Sequence[float], bias: Sequence[float], bias_std: Sequence[float]) -> bool:
-    """Whether the mean rate (3,) rad/s is that of a sensor at rest with this bias."""
+    """Return whether the mean rate (3,) rad/s is that of a sensor at rest with this bias (3,) rad/s."""
     return all(abs(m - b) <= consistent_within(s) for m, b, s in zip(mean_gyro, bias, bias_std))
 
 
 class RestDetector:
-    """Low-passed rate and specific force, and for how long they have been still."""
+    """Low-passed rate and specific force, and the time for which they have not changed."""
 
     def __init__(self, options: RestOptions):
         self._options = options
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was seen."""
-        self.mean_gyro: list[float] | None = None  # rad/s
-        self.mean_accel: list[float] = []  # m/s^2
+        """Reset all state."""
+        self.mean_gyro: list[float] = []  # rad/s, empty before the first sample
+        self.mean_accel: list[float] = []  # m/s^2, as well
         self._reference: list[float] = []
         self._calm_reference: list[float] = []
         self._still = self._calm = 0.0
 
     @property
     def resting(self) -> bool:
+        """Whether the sensor is at rest."""
         return self._still >= self._options.minimum_time
 
     @property
     def calm(self) -> bool:
+        """Whether the sensor is at rest or rotates slowly about the vertical."""
         return self._calm >= self._options.minimum_time
 
     def update(
         self, dt: float, gyro: Sequence[float], accel: Sequence[float], bias: Sequence[float], bias_std: Sequence[float]
     ) -> bool:
-        """Take one sample; `bias` and its standard deviation (rad/s) are what the filter believes. Returns whether it rests."""
+        """Take a sample `dt` s after the last one and return whether the sensor is at rest.
+
+        gyro (3,) rad/s, accel (3,) m/s^2; bias, bias_std (3,) rad/s: estimate of the filter.
+        """
         options = self._options
-        if self.mean_gyro is None:
+        if not self.mean_gyro:
             self.mean_gyro, self.mean_accel = list(gyro), list(accel)
             self._reference, self._calm_reference = list(accel), list(accel)
             return False

@@ -1,9 +1,9 @@
-"""The IMU board: a BMI088 with its errors, the heater, and the frames that the board sends (canbus/FRAMES.md).
+"""The virtual IMU board: a BMI088 with its errors, the heater, and the frames that the board sends (canbus/FRAMES.md).
 
     counts = round(((1 + s) C^T x + b + d (T - 25 degC) + noise) / scale), limited to int16
 
-x is the specific force or the angular rate in imu_link, C a small misalignment, s, b, d drawn once with the seed, T the chip's
-temperature. A sample that comes from a recording is quantised only: it carries its own errors.
+x is the specific force or the angular rate in imu_link, C a small misalignment, T the temperature of the chip; s, b and d are
+drawn once with the seed. A sample from a recording is quantised only, because it contains its own errors.
 """
 
 import math
@@ -27,8 +27,10 @@ FIRMWARE = (1, 0)
 
 
 class VirtualBoard:
-    """The board's state. Its faults are attributes: `imu_fault` one of None, 'stuck', 'saturated', 'invalid', 'silent';
-    `heater_fault` None, 'dead', 'stuck_on'; `temperature_stuck`.
+    """State of the board.
+
+    Its faults are attributes: `imu_fault` is None, 'stuck', 'saturated', 'invalid' or 'silent'; `heater_fault` is None, 'dead' or
+    'stuck_on'; `temperature_stuck` is True while the temperature reading does not change.
     """
 
     def __init__(self, parameters: Board, random: np.random.Generator):
@@ -52,29 +54,32 @@ class VirtualBoard:
         return self._plant.temperature
 
     def restart(self) -> None:
-        """As after a loss of supply: time, sequence and heater begin anew; the chip keeps its temperature."""
+        """Restart as after a loss of supply: time, sequence and heater start again; the chip keeps its temperature."""
         self._time, self._sequence, self._duty, self._commanded, self._since_command = 0.0, 0, 0.0, 0.0, math.inf
         self._over_temperature = False
         self._counts = np.zeros(6, dtype=np.int64)
         self._reading = self._plant.reading
 
     def command_heater(self, duty: float) -> None:
-        """A HeaterCommand has arrived, duty 0 to 1."""
+        """Take a HeaterCommand; duty is limited to 0 to 1."""
         self._commanded, self._since_command = min(1.0, max(0.0, duty)), 0.0
 
     def sample(self, rate: np.ndarray, force: np.ndarray, recorded: bool) -> list[can.Message]:
-        """Advance by one sample period and send the sample.
+        """Advance by one sample period and return the frames of the sample.
 
-        rate (3,) rad/s, force (3,) m/s^2, specific force, both in imu_link; `recorded`: measured ones, not true ones.
+        rate (3,) rad/s and force (3,) m/s^2, the specific force, are in imu_link; `recorded`: they are measured values, not true
+        ones.
         """
         self._time += SAMPLE_PERIOD
         self._since_command += SAMPLE_PERIOD
         self._heat()
         if self.imu_fault != "stuck":
             self._counts = self._measure(rate, force, recorded)
-        counts = {"saturated": np.array([32767, -32768, 32767] * 2), "invalid": np.full(6, -32768)}.get(
-            self.imu_fault, self._counts
-        )
+        counts = self._counts
+        if self.imu_fault == "saturated":
+            counts = np.array([32767, -32768, 32767] * 2)
+        elif self.imu_fault == "invalid":
+            counts = np.full(6, -32768)
         if not self.temperature_stuck:
             self._reading = self._plant.reading
         sequence, self._sequence = self._sequence, (self._sequence + 1) % 256
@@ -89,7 +94,7 @@ class VirtualBoard:
         ]
 
     def skip(self, samples: int) -> None:
-        """Let the time of so many samples pass without sending them."""
+        """Let the time of `samples` samples pass without sending them."""
         for _ in range(samples):
             self._time += SAMPLE_PERIOD
             self._since_command += SAMPLE_PERIOD
@@ -97,7 +102,7 @@ class VirtualBoard:
         self._sequence = (self._sequence + samples) % 256
 
     def status(self) -> can.Message:
-        """The BoardStatus frame."""
+        """Return the BoardStatus frame."""
         flags = _FLAG_SILENT_IMU if self.imu_fault == "silent" else 0
         flags |= _FLAG_CUT_OFF if self._over_temperature else 0
         flags |= _FLAG_NO_COMMAND if self._since_command > _HEATER_TIMEOUT else 0

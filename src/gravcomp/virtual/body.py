@@ -1,12 +1,12 @@
-"""The rod that a robot's description and the virtual robot's own parameters make.
+"""Data of the rod from the description of the robot and the parameters of the virtual robot.
 
 Stiffness of a tube: E A, E I, G J with J = 2 I, and the shear stiffness k G A with Cowper's coefficient for hollow circles
 (G. R. Cowper, "The shear coefficient in Timoshenko's beam theory", J. Appl. Mech. 33, 1966):
 
     k = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),   m = inner / outer radius
 
-A clamped face cannot shrink across the axis, which stiffens the tube next to it; against three-dimensional finite elements
-(CalculiX) this amounts to a clamp 0.39 nu^2 R_o farther out.
+A clamped face cannot contract across the axis, which stiffens the tube next to it. Compared with three-dimensional finite
+elements (CalculiX) this has the effect of a clamp that lies 0.39 nu^2 R_o farther along the axis.
 """
 
 import math
@@ -15,15 +15,16 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Robot
-from gravcomp.virtual.dynamics import RodMaterial, TendonFriction
+from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.rod import RodModel
+from gravcomp.virtual.tendon_friction import TendonFriction
 
 _CLAMP_COEFFICIENT = 0.39
 
 
 def build_rod(robot: Robot, parameters: VirtualRobotParameters) -> RodModel:
-    """The rod model. Raises ConfigError for robots that it cannot be: bodies from a mesh, cables through via points."""
+    """Return the rod model. Raises ConfigError for a body from a file and for cables through via points."""
     if robot.body is not None:
         raise ConfigError(f"robot '{robot.name}' has a body from a file; the virtual robot needs segments")
     for cable in robot.cables:
@@ -50,33 +51,35 @@ def build_rod(robot: Robot, parameters: VirtualRobotParameters) -> RodModel:
 
 
 def build_material(model: RodModel, parameters: VirtualRobotParameters) -> RodMaterial:
-    """What the material does over time."""
+    """Return damping, creep and slip of the material."""
     body = parameters.body
     slip = body.slip_ratio * model.stiffness[:, 3]
     return RodMaterial(np.array(body.creep_ratio), np.array(body.creep_time), body.damping_time, slip, slip * body.slip_curvature)
 
 
 def build_friction(parameters: VirtualRobotParameters) -> TendonFriction:
-    """How the tendons rub."""
+    """Return the friction of the tendons."""
     tendons = parameters.tendons
     return TendonFriction(tendons.friction, tendons.guide_angle, tendons.presliding)
 
 
 def _element_ends(robot: Robot, longest: float) -> np.ndarray:
-    """Positions (n + 1,) along the axis: every end of a segment, cap or cable is one."""
+    """Return the positions (n + 1,) of the element ends along the axis; every end of a segment, cap or cable is one."""
     marks = {0.0}
     for segment in robot.segments:
         marks |= {max(marks) + segment.length, max(marks) + segment.full_length}
     for cable in robot.cables:
         marks |= {cable.start, robot.cable_end(cable)}
-    marks = sorted(round(mark, 9) for mark in marks)
-    marks = [a for a, b in zip(marks, [*marks[1:], math.inf]) if b - a > 1e-6]
-    ends = [np.linspace(a, b, max(1, math.ceil((b - a) / longest - 1e-9)), endpoint=False) for a, b in zip(marks, marks[1:])]
-    return np.append(np.concatenate(ends), marks[-1])
+    rounded = sorted(round(mark, 9) for mark in marks)
+    distinct = [a for a, b in zip(rounded, [*rounded[1:], math.inf]) if b - a > 1e-6]
+    ends = [
+        np.linspace(a, b, max(1, math.ceil((b - a) / longest - 1e-9)), endpoint=False) for a, b in zip(distinct, distinct[1:])
+    ]
+    return np.append(np.concatenate(ends), distinct[-1])
 
 
 def _section(robot: Robot, parameters: VirtualRobotParameters, z: float) -> tuple[list[float], float, list[float]]:
-    """Stiffness (6,), mass and rotational inertia (3,) a metre of the cross-section at z."""
+    """Return stiffness (6,), mass and rotational inertia (3,) per metre of the cross-section at z m."""
     start = 0.0
     for segment in robot.segments:
         if z < start + segment.full_length:
@@ -97,12 +100,13 @@ def _section(robot: Robot, parameters: VirtualRobotParameters, z: float) -> tupl
 
 
 def _tendons(robot: Robot, parameters: VirtualRobotParameters, ends: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Offset (m, 3), first element (m,), the element after the last (m,), spring stiffness (m,)."""
+    """Return offset (m, 3) m, first element (m,), the element after the last (m,) and stiffness (m,) N/m of each tendon."""
 
     def element_at(z: float) -> int:
         return int(np.argmin(np.abs(ends - z)))
 
     def offset(cable: Cable) -> list[float]:
+        assert cable.radius is not None and cable.angle is not None  # `build_rod` refused via points
         radius, angle = cable.radius + tendons.radius_offset, cable.angle + tendons.angle_offset
         return [radius * math.cos(angle), radius * math.sin(angle), 0.0]
 

@@ -1,8 +1,8 @@
-"""Static equilibrium of the rod: where it comes to rest under gravity and its tendons, long after the last motion.
+"""Static equilibrium of the rod under gravity and its tendons, after all motion and creep.
 
-The minimum of the potential energy of rod, tendons and weight, found by Newton's iteration on the residual of `rod.assemble`
-with the long-term stiffness and without friction. Each step is turned until it leads downhill and shortened until the energy
-falls: cables go taut and slack by turns, and a straight rod under strong cables is unstable:
+It is the minimum of the potential energy of rod, tendons and weight, with the long-term stiffness and without friction. Newton's
+iteration runs on the residual of `assemble` of forces.py. Each increment is changed until it is a direction of descent, and
+shortened until the energy falls, because cables change between taut and slack and a straight rod under strong cables is unstable:
 
     U = sum_e L/2 (epsilon - e_z)^T K (epsilon - e_z) + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2) - sum_k m_k g p_k
 """
@@ -12,14 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from gravcomp.virtual.rod import RodModel, assemble, newton_step, strains, tendon_lengths
-from gravcomp.virtual.se3 import motion_exp
+from gravcomp.virtual.band_solver import newton_step
+from gravcomp.virtual.forces import assemble
+from gravcomp.virtual.rod import RodModel, strains, tendon_lengths
+from gravcomp.virtual.se3 import advance, motion_exp
 
 _MOST_ITERATIONS = 200
 _MOST_HALVINGS = 12
 _MOST_ADDITIONS = 8
 _ROUNDING = 1e-13  # J; the energies are some 1e-3 J
-_LARGEST_TURN = 0.3  # rad a cross-section and iteration; beyond it the linearisation says little
+_LARGEST_TURN = 0.3  # rad for each cross-section and iteration; beyond it the linearisation is poor
 _FORCE_TOLERANCE = 1e-8  # N and N m; the robot weighs 0.06 N
 
 
@@ -30,17 +32,17 @@ class RodShape:
     orientation: np.ndarray  # (n + 1, 3, 3)
     position: np.ndarray  # (n + 1, 3) m
     tension: np.ndarray  # (m,) N, at the base
-    displacement: np.ndarray  # (m,) m, by which the tendons' paths have become shorter than in the straight rod
+    displacement: np.ndarray  # (m,) m, by how much the tendons' paths are shorter than in the straight rod
     iterations: int
 
     @property
     def tip(self) -> np.ndarray:
-        """(3,) m."""
+        """Position (3,) of the tip, m."""
         return self.position[-1]
 
 
 class NoEquilibrium(RuntimeError):
-    """The iteration did not come to rest."""
+    """The iteration did not converge; the message holds gravity, displacement and tension."""
 
 
 def equilibrium(
@@ -51,10 +53,12 @@ def equilibrium(
     tension: np.ndarray | None = None,
     start: RodShape | None = None,
 ) -> RodShape:
-    """The rod at rest under `gravity` (3,) m/s^2 in the base's frame.
+    """Return the rod at rest under `gravity` (3,) m/s^2 in the frame of its base.
 
-    displacement (m,) m: wound in at the capstans, tendons that only pull and that stretch; or tension (m,) N, given; or
-    neither: released. `start` is the shape to begin from (a neighbouring one saves iterations). Raises NoEquilibrium.
+    The tendons are given by displacement (m,) m, wound in at the capstans, or by tension (m,) N; with neither they are released.
+    The iteration begins at `start` (a similar shape saves iterations), without it at the straight rod. Raises ValueError for
+    values of the wrong shape, for values that are not finite and for both of displacement and tension; raises NoEquilibrium where
+    the iteration does not converge.
     """
     m = model.tendons
     if displacement is not None and tension is not None:
@@ -88,26 +92,30 @@ def equilibrium(
 def _tendon_values(values: np.ndarray, m: int, name: str) -> np.ndarray:
     values = np.asarray(values, float)
     if values.shape != (m,) or not np.all(np.isfinite(values)):
-        raise ValueError(f"{name} is {values}; {m} finite values are needed, one a tendon")
+        raise ValueError(f"{name} is {values}; {m} finite values are needed, one for each tendon")
     return values
 
 
 @njit(cache=True, error_model="numpy")
 def _settle(
-    orientation,
-    position,
-    length,
-    stiffness,
-    mass,
-    tendon_offset,
-    tendon_start,
-    tendon_end,
-    tendon_rest,
-    spring,
-    wound,
-    preload,
-    gravity,
-):
+    orientation: np.ndarray,
+    position: np.ndarray,
+    length: np.ndarray,
+    stiffness: np.ndarray,
+    mass: np.ndarray,
+    tendon_offset: np.ndarray,
+    tendon_start: np.ndarray,
+    tendon_end: np.ndarray,
+    tendon_rest: np.ndarray,
+    spring: np.ndarray,
+    wound: np.ndarray,
+    preload: np.ndarray,
+    gravity: np.ndarray,
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Move orientation and position to the equilibrium, in place; return iterations, tension (m,), shortened (m,).
+
+    The number of iterations is _MOST_ITERATIONS where no equilibrium was found.
+    """
     n, m = length.shape[0], tendon_end.shape[0]
     strain, path, direction = np.empty((n, 6)), np.empty((m, n)), np.zeros((m, n, 3))
     gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
@@ -151,8 +159,8 @@ def _settle(
         )
         if np.max(np.abs(residual[1:])) < _FORCE_TOLERANCE:
             return iteration, tension, shortened
-        # Where the tangent is not positive definite (a straight rod under strong cables), its own diagonal is added until the
-        # step descends.
+        # Where the tangent is not positive definite (a straight rod under strong cables), multiples of its own diagonal are added
+        # until the increment descends.
         addition = 0.0
         for _ in range(_MOST_ADDITIONS):
             factors[:] = band
@@ -188,7 +196,19 @@ def _settle(
 
 
 @njit(cache=True, error_model="numpy")
-def _energy(position, strain, length, stiffness, path, tendon_rest, spring, wound, preload, force):
+def _energy(
+    position: np.ndarray,
+    strain: np.ndarray,
+    length: np.ndarray,
+    stiffness: np.ndarray,
+    path: np.ndarray,
+    tendon_rest: np.ndarray,
+    spring: np.ndarray,
+    wound: np.ndarray,
+    preload: np.ndarray,
+    force: np.ndarray,
+) -> float:
+    """Return the potential energy in J."""
     energy = 0.0
     for e in range(length.shape[0]):
         for i in range(6):
@@ -202,15 +222,3 @@ def _energy(position, strain, length, stiffness, path, tendon_rest, spring, woun
         for i in range(3):
             energy -= force[k, i] * position[k, i]
     return energy
-
-
-@njit(cache=True, error_model="numpy")
-def advance(orientation, position, turn, shift, work):
-    """The pose (orientation (3, 3), position (3,)) moved in its own frame by (turn, shift), in place."""
-    for i in range(3):
-        position[i] += orientation[i, 0] * shift[0] + orientation[i, 1] * shift[1] + orientation[i, 2] * shift[2]
-        for j in range(3):
-            work[i, j] = orientation[i, 0] * turn[0, j] + orientation[i, 1] * turn[1, j] + orientation[i, 2] * turn[2, j]
-    for i in range(3):
-        for j in range(3):
-            orientation[i, j] = work[i, j]

@@ -1,4 +1,4 @@
-"""Choosing the motion of the base by the parameters of the node."""
+"""Choice of the motion of the base by the parameters of the node."""
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from gravcomp.virtual.recorded_motion import RecordedMotion
 
 
 def make_motion(parameters: VirtualRobotNodeParameters, mount: np.ndarray, seed: int) -> BaseMotion:
-    """The motion that the parameters name; mount (3, 3) turns imu_link's vectors into soft_base.
+    """Return the motion that the parameters name; mount (3, 3): soft_base from imu_link; seed: of the tremor.
 
-    Raises ConfigError, RecordingError.
+    Raises ConfigError where the recording is not named, RecordingError where it cannot be used.
     """
     start = base_orientation(parameters.inclination, parameters.roll)
     if parameters.motion == "recording":

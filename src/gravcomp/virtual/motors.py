@@ -1,15 +1,15 @@
-"""C610 speed controllers, M2006 motors, gears with backlash, and capstans: from currents to wound-in cable.
+"""C610 speed controllers, M2006 motors, gears with backlash and capstans: from currents to wound-in cable.
 
-All angles and torques are counted in the sense that winds the cable in. At the rotor:
+Angles and torques are positive in the direction that winds the cable in. At the rotor:
 
     J dw/dt = k_t i - b w - F / N r - friction,    di/dt = (i_commanded - i) / lag
 
-with the cable's force F, the gear ratio N and the capstan's radius r. Coulomb friction (constant part and part proportional to
-the load) takes away at most the momentum there is, so that a standing rotor stays. The capstan has no inertia of its own: it
-lies on the flank that winds in while the cable is taut, and stays where it is inside the backlash while its drag is larger
-than the cable's torque.
+with the force F of the cable, the gear ratio N and the radius r of the capstan. Coulomb friction (a constant part and a part
+proportional to the load) removes at most the existing momentum, so a rotor at rest stays at rest. The capstan has no inertia of
+its own: while the cable is taut it lies on the flank that winds in; inside the backlash it stays where it is while its drag is
+larger than the torque of the cable.
 
-The speed controller keeps the last current it was told, for ever.
+The speed controller keeps the last current that it received; there is no timeout.
 """
 
 import math
@@ -25,10 +25,10 @@ _MAXIMUM_CURRENT = 10.0  # A, of the C610
 
 
 class MotorBank:
-    """The motors in the order of the cables; m of them."""
+    """The m motors in the order of the cables."""
 
     def __init__(self, parameters: Motors, hardware: Hardware, slack: np.ndarray, random: np.random.Generator):
-        """slack (m,) m: cable beyond the straight robot's length at the start. Rotors start anywhere on their turn."""
+        """slack (m,) m: length of cable beyond the straight robot's at the start. Each rotor starts at a random angle."""
         m = len(hardware.motors)
         self._parameters, self._random = parameters, random
         self._ratio = hardware.drive.gear_ratio
@@ -37,16 +37,16 @@ class MotorBank:
         self._slack = slack
         self._rotor, self._speed, self._capstan = np.zeros(m), np.zeros(m), np.zeros(m)
         self._current = np.zeros(m)
-        self.commanded = np.zeros(m)  # A, as last received, in the motor's own sense
+        self.commanded = np.zeros(m)  # A, as last received, positive as the motor counts
         self.stalled = np.zeros(m, dtype=bool)  # rotors that are blocked
 
     @property
     def wound(self) -> np.ndarray:
-        """(m,) m of cable wound in, 0: the cable just reaches through the straight robot."""
+        """Length (m,) m of cable wound in; 0: the cable has exactly the length of its path in the straight robot."""
         return self._capstan * self._parameters.capstan_radius - self._slack
 
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
-        """Advance by `ticks` of TICK, the robot's cable paths being `shortened` (m,) m, each cable a spring (m,) N/m."""
+        """Advance by `ticks` of TICK s; the cable paths are `shortened` (m,) m, the cables are springs of `spring` (m,) N/m."""
         p = self._parameters
         _step(
             ticks,
@@ -74,19 +74,21 @@ class MotorBank:
         )
 
     def jump(self, motors: np.ndarray) -> None:
-        """Let the encoders of `motors` (m,) bool jump by a third of a turn, as after a slipped magnet."""
+        """Shift the encoders of `motors` (m,) bool by a third of a turn, as when a magnet has slipped."""
         self._start_count = np.where(motors, self._start_count + COUNTS_PER_TURN // 3, self._start_count)
 
     def feedback(self) -> list[dict[str, float]]:
-        """Angle (counts), speed (rpm) and current (A) as the C610 of each motor sends them."""
+        """Return angle (counts), speed (rpm) and current (A) as the C610 of each motor sends them."""
         noise = self._parameters.current_noise * self._random.standard_normal(len(self._rotor))
         values = _feedback(self._rotor, self._speed, self._current, self._direction, self._start_count, noise)
         return [{"angle": int(angle), "speed": speed, "current": current} for angle, speed, current in values.tolist()]
 
 
 @njit(cache=True, error_model="numpy")
-def _feedback(rotor, speed, current, direction, start_count, noise):
-    """(m, 3): angle in counts, speed in rpm, current in A."""
+def _feedback(
+    rotor: np.ndarray, speed: np.ndarray, current: np.ndarray, direction: np.ndarray, start_count: np.ndarray, noise: np.ndarray
+) -> np.ndarray:
+    """Return (m, 3): angle in counts, speed in rpm, current in A."""
     values = np.empty((rotor.shape[0], 3))
     for c in range(rotor.shape[0]):
         count = math.floor(direction[c] * rotor[c] / (2 * math.pi) * COUNTS_PER_TURN) + start_count[c]
@@ -98,36 +100,36 @@ def _feedback(rotor, speed, current, direction, start_count, noise):
 
 @njit(cache=True, error_model="numpy")
 def _step(
-    ticks,
-    rotor,
-    speed,
-    capstan,
-    current,
-    commanded,
-    direction,
-    stalled,
-    shortened,
-    slack,
-    spring,
-    torque_constant,
-    inertia,
-    friction,
-    load_friction,
-    viscous,
-    no_load_speed,
-    backlash,
-    drag,
-    radius,
-    ratio,
-    current_gain,
-):
+    ticks: int,
+    rotor: np.ndarray,
+    speed: np.ndarray,
+    capstan: np.ndarray,
+    current: np.ndarray,
+    commanded: np.ndarray,
+    direction: np.ndarray,
+    stalled: np.ndarray,
+    shortened: np.ndarray,
+    slack: np.ndarray,
+    spring: np.ndarray,
+    torque_constant: float,
+    inertia: float,
+    friction: float,
+    load_friction: float,
+    viscous: float,
+    no_load_speed: float,
+    backlash: float,
+    drag: float,
+    radius: float,
+    ratio: float,
+    current_gain: float,
+) -> None:
     half = 0.5 * backlash
     for c in range(rotor.shape[0]):
         command = direction[c] * min(_MAXIMUM_CURRENT, max(-_MAXIMUM_CURRENT, commanded[c]))
         offset = shortened[c] + slack[c]
         for _ in range(ticks):
             current[c] += current_gain * (command - current[c])
-            # The back-EMF leaves less current the faster the rotor turns in the current's direction.
+            # The back-EMF limits the current, the more the faster the rotor turns in the direction of the current.
             room = 10.0 * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
             force = spring[c] * max(0.0, radius * capstan[c] - offset)
@@ -143,7 +145,7 @@ def _step(
                 speed[c] = momentum / inertia
                 rotor[c] += TICK * speed[c]
             output = rotor[c] / ratio
-            # Inside the backlash the cable draws the capstan out until its drag holds it.
+            # Inside the backlash the cable pulls the capstan out until the drag holds it.
             held = offset / radius + (drag / (spring[c] * radius * radius) if spring[c] > 0.0 else 1e9)
             drawn = min(capstan[c], max(held, output - half))
             capstan[c] = min(output + half, max(output - half, drawn))

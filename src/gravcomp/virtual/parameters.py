@@ -1,6 +1,6 @@
-"""The section `virtual_robot:` of a robot's YAML: what the virtual robot really is, and the controller does not know.
+"""Parameters of the section `virtual_robot:` of a robot file: the true values, which the controller does not have.
 
-The shape (segments, cables, motors) comes from `robot:` and `hardware:`; what stands here deviates from them or is not in them.
+Segments, cables and motors come from `robot:` and `hardware:`. The parameters here are deviations from them or are not in them.
 """
 
 import dataclasses
@@ -11,7 +11,7 @@ from gravcomp.thermal.plant import ThermalPlantOptions
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """The rod's material and fineness."""
+    """Material and element length of the rod."""
 
     youngs_modulus: float = parameter(
         0.75, edge="MPa", minimum=1e-3, maximum=1e6, description="long-term, of every segment; caps keep theirs"
@@ -38,13 +38,13 @@ class Body:
     def __post_init__(self) -> None:
         if len(self.creep_ratio) != len(self.creep_time):
             raise ValueError(
-                f"creep_ratio has {len(self.creep_ratio)} entries and creep_time {len(self.creep_time)}; they come in pairs"
+                f"creep_ratio has {len(self.creep_ratio)} entries and creep_time {len(self.creep_time)}; equally many are needed"
             )
 
 
 @dataclasses.dataclass(frozen=True)
 class Tendons:
-    """The cables as they really are."""
+    """True values of the cables."""
 
     axial_stiffness: float = parameter(
         960.0, unit="N", minimum=1.0, maximum=1e9, description="E A; nylon of 0.7 mm: 2.5 GPa x 0.385 mm^2"
@@ -58,22 +58,22 @@ class Tendons:
     )
     friction: float = parameter(0.08, minimum=0.0, maximum=2.0, description="capstan friction coefficient")
     guide_angle: float = parameter(
-        20.0, edge="deg", minimum=0.0, maximum=3600.0, description="turns of the cable between capstan and robot"
+        20.0, edge="deg", minimum=0.0, maximum=3600.0, description="angle by which the cable is bent between capstan and robot"
     )
     presliding: float = parameter(
-        0.05, edge="mm", minimum=0.001, maximum=10.0, description="distance over which friction turns its sign"
+        0.05, edge="mm", minimum=0.001, maximum=10.0, description="distance over which friction reverses"
     )
     slack: float = parameter(
-        0.0, edge="mm", minimum=-50.0, maximum=50.0, description="at the start, beyond the straight robot's length"
+        0.0, edge="mm", minimum=-50.0, maximum=50.0, description="length at the start beyond the straight robot's"
     )
     slack_spread: float = parameter(
-        0.0, edge="mm", minimum=0.0, maximum=50.0, description="standard deviation of it from cable to cable"
+        0.0, edge="mm", minimum=0.0, maximum=50.0, description="standard deviation of slack from cable to cable"
     )
 
 
 @dataclasses.dataclass(frozen=True)
 class Motors:
-    """C610 speed controllers and M2006 motors as they really are."""
+    """True values of the C610 speed controllers and M2006 motors."""
 
     feedback_rate: int = parameter(500, unit="Hz", choices=(1000, 500, 250, 125), description="as set in the C610")
     torque_constant: float = parameter(0.175, unit="N m/A", minimum=1e-3, maximum=10.0, description="at the gear's output")
@@ -85,11 +85,11 @@ class Motors:
     )
     viscous_friction: float = parameter(1.3e-6, unit="N m s", minimum=0.0, maximum=1.0, description="at the rotor")
     no_load_speed: float = parameter(
-        2000.0, unit="rad/s", minimum=1.0, maximum=1e5, description="rotor speed at which no current is left"
+        2000.0, unit="rad/s", minimum=1.0, maximum=1e5, description="rotor speed at which the current is 0"
     )
     backlash: float = parameter(0.6, edge="deg", minimum=0.0, maximum=90.0, description="of the gear, at its output")
     capstan_drag: float = parameter(
-        1e-3, unit="N m", minimum=0.0, maximum=1.0, description="friction at the capstan; holds it inside the backlash"
+        1e-3, unit="N m", minimum=0.0, maximum=1.0, description="friction that holds the capstan inside the backlash"
     )
     current_lag: float = parameter(1.0, edge="ms", minimum=0.01, maximum=100.0, description="time constant of the current loop")
     current_noise: float = parameter(
@@ -99,7 +99,7 @@ class Motors:
 
 @dataclasses.dataclass(frozen=True)
 class Board:
-    """BMI088 and heater. Noise as of the data sheet; biases are drawn with the seed, their standard deviations stand here."""
+    """BMI088 and heater. Noise is that of the data sheet; biases are drawn with the standard deviations given here."""
 
     accelerometer_range: int = parameter(1, minimum=0, maximum=3, description="range code: 0 to 3 = 3, 6, 12, 24 g")
     gyroscope_range: int = parameter(0, minimum=0, maximum=4, description="range code: 0 to 4 = 2000, 1000, 500, 250, 125 deg/s")
@@ -115,7 +115,7 @@ class Board:
     )
     gyroscope_bias: float = parameter(0.4, edge="deg/s", minimum=0.0, maximum=100.0, description="at 25 degC")
     gyroscope_drift: float = parameter(
-        0.015, edge="deg/s", minimum=0.0, maximum=10.0, description="bias over temperature, deg/s a K, +- by axis"
+        0.015, edge="deg/s", minimum=0.0, maximum=10.0, description="bias over temperature, deg/s per K, +- by axis"
     )
     gyroscope_walk: float = parameter(
         0.0005, edge="deg/s", minimum=0.0, maximum=10.0, description="bias random walk, (deg/s)/sqrt(s)"
@@ -129,10 +129,10 @@ class Board:
 
 @dataclasses.dataclass(frozen=True)
 class VirtualRobotParameters:
-    """What the virtual robot really is."""
+    """True values of the virtual robot."""
 
     body: Body = parameter(default_factory=Body, description="material of the rod")
     tendons: Tendons = parameter(default_factory=Tendons, description="cables")
     motors: Motors = parameter(default_factory=Motors, description="motors, gears and capstans")
     board: Board = parameter(default_factory=Board, description="IMU board")
-    seed: int = parameter(1, minimum=0, maximum=2**31 - 1, description="of everything random: the same seed gives the same run")
+    seed: int = parameter(1, minimum=0, maximum=2**31 - 1, description="of all random numbers: the same seed gives the same run")

@@ -1,8 +1,8 @@
-"""The virtual robot at the pace of the clock, on a real CAN bus.
+"""The virtual robot in real time, on a CAN bus.
 
-A thread of its own: every period it takes what has arrived, steps the robot, sends what the robot sent. After a pause of the
-machine it catches up, not faster than a wire of 1 Mbit/s carries the frames; what is later than `_LONGEST_LAG` is skipped:
-frames are lost then (counted in `lost_time`), but virtual time keeps to the clock, so that rates and stamps fit together.
+A thread receives the frames that have arrived, steps the robot and sends its frames, once every period. After a pause of the
+machine it catches up, but not faster than a wire of 1 Mbit/s carries the frames. A lag above `_LONGEST_LAG` is skipped: frames
+are lost (counted in `lost_time`), but virtual time follows the clock, so rates and stamps stay consistent.
 """
 
 import copy
@@ -16,11 +16,12 @@ from gravcomp.canbus.codec import layout
 from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import CanInterface
-from gravcomp.virtual.robot import Truth, VirtualRobot
+from gravcomp.virtual.robot import VirtualRobot
+from gravcomp.virtual.truth import Truth
 
-_SHORTEST_PERIOD, _LONGEST_PERIOD = 0.002, 0.004  # s, between two looks at the bus; as long as the motors' feedback in between
-_FRAME_TIME = 0.11e-3  # s on a wire of 1 Mbit/s
-_BURST = 0.02  # s of frames at once after a pause; receivers' socket buffers hold about 30 ms
+_SHORTEST_PERIOD, _LONGEST_PERIOD = 0.002, 0.004  # s, between two steps; in between, the period of the motors' feedback
+_FRAME_TIME = 0.11e-3  # s, one frame on a wire of 1 Mbit/s
+_BURST = 0.02  # s of frames sent together after a pause; receivers' socket buffers hold about 30 ms
 _LONGEST_LAG = 0.1  # s
 _STEER_PERIOD = 0.01  # s
 
@@ -28,11 +29,7 @@ RECEIVED_FRAMES = ("MotorCommand1to4", "MotorCommand5to8", "HeaterCommand")
 
 
 class RealtimeRobot:
-    """Runs `robot` on the bus `settings`; `on_truth` is called from the thread `truth_rate` times a second, and `steer` every 10 ms:
-    where to turn the base from now on, (3, 3) world from soft_base, or None.
-
-    Whoever touches the robot from outside holds `lock`.
-    """
+    """Runs a virtual robot on a CAN bus in a thread. Other threads must hold `lock` while they use the robot."""
 
     def __init__(
         self,
@@ -42,6 +39,10 @@ class RealtimeRobot:
         truth_rate: float,
         steer: Callable[[], np.ndarray | None] = lambda: None,
     ):
+        """`on_truth` is called from the thread `truth_rate` times a second, `steer` every 10 ms.
+
+        `steer` returns the orientation (3, 3), world from soft_base, to turn the base to, or None. Compiles the kernels first.
+        """
         self.robot, self.lock = robot, threading.Lock()
         self.link = CanLink(settings, [layout(name).frame_id for name in RECEIVED_FRAMES])
         self.lost_time = 0.0
@@ -50,23 +51,23 @@ class RealtimeRobot:
         self._period = min(max(robot.feedback_period, _SHORTEST_PERIOD), _LONGEST_PERIOD)
         self._on_truth, self._truth_every = on_truth, max(1, round(1.0 / truth_rate / self._period))
         self._steer_every = max(1, round(_STEER_PERIOD / self._period))
-        # A copy takes the first step, so that compiling is over before the bus is open.
+        # A copy takes the first step, so that compilation ends before the bus is opened.
         copy.deepcopy(robot).step(0.02)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Open the bus and start. Raises BusError."""
+        """Open the bus and start the thread. Raises BusError."""
         self.link.open()
-        # The thread that spins the node too: it holds the interpreter and the lock now and then, and while it waits for a processor the
-        # robot would wait for it.
+        # The calling thread, which spins the node, gets precedence, too. It occasionally holds the interpreter and the lock;
+        # while it then waited for a processor, the robot would wait, too.
         take_precedence()
         self._stop.clear()
         self._thread = threading.Thread(target=self._run, name="virtual_robot", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop and close the bus; nothing is sent afterwards."""
+        """Stop the thread and close the bus; nothing is sent afterwards."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -76,7 +77,7 @@ class RealtimeRobot:
     def _run(self) -> None:
         try:
             self._loop()
-        except Exception as error:  # the node reports it; a thread that dies silently would look like a dead bus
+        except Exception as error:  # the node reports it; a thread that ends silently would look like a dead bus
             self.error = error
 
     def _loop(self) -> None:
@@ -90,7 +91,7 @@ class RealtimeRobot:
                     skipped = self.robot.skip(now - deadline)
                 self.lost_time += skipped
                 deadline += skipped
-            # What comes meanwhile waits in the socket: it takes effect with this step anyway.
+            # Frames that arrive meanwhile wait in the socket; they take effect with this step.
             if (remaining := max(deadline, wire_free) - time.monotonic()) > 0.0:
                 time.sleep(remaining)
             frames = self.link.receive(0.0)

@@ -1,10 +1,10 @@
 """Rotations and rigid motions as the rod needs them, compiled.
 
 Twists are (translation, rotation): xi = (v, w), and exp(xi) = (V(w) v, exp(w^)) with V the left Jacobian of SO(3). The inverse
-right Jacobian of SE(3), J_r^-1(xi) = I + ad/2 + ad^2/12 - ..., is cut after the second power: the rods' elements turn by less
-than 0.2 rad, where the next term is below 3e-6. (J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state estimation in
-robotics", 2018; V. Sonneville, A. Cardona, O. Bruls, "Geometrically exact beam finite element formulated on the special
-Euclidean group SE(3)", CMAME 268, 2014.)
+right Jacobian of SE(3), J_r^-1(xi) = I + ad/2 + ad^2/12 - ..., is truncated after the second power: the elements of the rod turn
+by less than 0.2 rad, where the next term is below 3e-6. (J. Sola, J. Deray, D. Atchuthan, "A micro Lie theory for state
+estimation in robotics", 2018; V. Sonneville, A. Cardona, O. Bruls, "Geometrically exact beam finite element formulated on the
+special Euclidean group SE(3)", CMAME 268, 2014.)
 """
 
 import math
@@ -14,8 +14,8 @@ from numba import njit
 
 
 @njit(cache=True, error_model="numpy")
-def rotation_exp(w, out):
-    """out (3, 3) = exp(w^) for the rotation vector w (3,) in rad."""
+def rotation_exp(w: np.ndarray, out: np.ndarray) -> None:
+    """Write the rotation matrix exp(w^) of the rotation vector w (3,) in rad to out (3, 3)."""
     angle2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     angle = math.sqrt(angle2)
     if angle < 1e-4:
@@ -35,8 +35,8 @@ def rotation_exp(w, out):
 
 
 @njit(cache=True, error_model="numpy")
-def rotation_log(r, out):
-    """out (3,) = the rotation vector of r (3, 3), |out| < pi."""
+def rotation_log(r: np.ndarray, out: np.ndarray) -> None:
+    """Write the rotation vector of the rotation r (3, 3) to out (3,), |out| <= pi rad."""
     s0, s1, s2 = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
     sine = 0.5 * math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
     cosine = 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
@@ -49,9 +49,10 @@ def rotation_log(r, out):
 
 
 @njit(cache=True, error_model="numpy")
-def rotation_to_quaternion(r, out):
-    """out (4,) = x y z w of the rotation r (3, 3), w >= 0: the largest component from the diagonal, the others from sums
-    (Shepperd).
+def rotation_to_quaternion(r: np.ndarray, out: np.ndarray) -> None:
+    """Write the quaternion x y z w of the rotation r (3, 3) to out (4,), w >= 0.
+
+    The largest component follows from the diagonal, the others from sums and differences of entries (Shepperd).
     """
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     k = 3
@@ -75,8 +76,8 @@ def rotation_to_quaternion(r, out):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_exp(xi, rotation, translation):
-    """Rotation (3, 3), translation (3,) = exp(xi) for the twist xi (6,)."""
+def motion_exp(xi: np.ndarray, rotation: np.ndarray, translation: np.ndarray) -> None:
+    """Write exp(xi) of the twist xi (6,) to rotation (3, 3) and translation (3,)."""
     w0, w1, w2 = xi[3], xi[4], xi[5]
     rotation_exp(xi[3:], rotation)
     angle2 = w0 * w0 + w1 * w1 + w2 * w2
@@ -93,8 +94,8 @@ def motion_exp(xi, rotation, translation):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_log(rotation, translation, out):
-    """out (6,) = the twist whose exponential is (rotation (3, 3), translation (3,))."""
+def motion_log(rotation: np.ndarray, translation: np.ndarray, out: np.ndarray) -> None:
+    """Write the twist whose exponential is (rotation (3, 3), translation (3,)) to out (6,)."""
     rotation_log(rotation, out[3:])
     w0, w1, w2 = out[3], out[4], out[5]
     angle2 = w0 * w0 + w1 * w1 + w2 * w2
@@ -112,8 +113,20 @@ def motion_log(rotation, translation, out):
 
 
 @njit(cache=True, error_model="numpy")
-def inverse_jacobians(xi, left, right):
-    """left, right (6, 6) = inverse left and right Jacobians of SE(3) at the twist xi (6,)."""
+def advance(orientation: np.ndarray, position: np.ndarray, turn: np.ndarray, shift: np.ndarray, work: np.ndarray) -> None:
+    """Move the pose (orientation (3, 3), position (3,)) in its own frame by (turn, shift), in place; work (3, 3) is scratch."""
+    for i in range(3):
+        position[i] += orientation[i, 0] * shift[0] + orientation[i, 1] * shift[1] + orientation[i, 2] * shift[2]
+        for j in range(3):
+            work[i, j] = orientation[i, 0] * turn[0, j] + orientation[i, 1] * turn[1, j] + orientation[i, 2] * turn[2, j]
+    for i in range(3):
+        for j in range(3):
+            orientation[i, j] = work[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def inverse_jacobians(xi: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
+    """Write the inverse left and right Jacobians of SE(3) at the twist xi (6,) to left and right (6, 6)."""
     ad = np.zeros((6, 6))
     _fill_cross(xi[3:], ad[:3, :3])
     _fill_cross(xi[3:], ad[3:, 3:])
@@ -129,13 +142,13 @@ def inverse_jacobians(xi, left, right):
 
 
 @njit(cache=True, error_model="numpy")
-def _fill_cross(w, out):
+def _fill_cross(w: np.ndarray, out: np.ndarray) -> None:
     out[0, 1], out[0, 2], out[1, 2] = -w[2], w[1], -w[0]
     out[1, 0], out[2, 0], out[2, 1] = w[2], -w[1], w[0]
 
 
 @njit(cache=True, error_model="numpy")
-def _rotation_log_near_pi(r, out):
+def _rotation_log_near_pi(r: np.ndarray, out: np.ndarray) -> None:
     # The antisymmetric part vanishes at pi; the axis is the column of r + 1 with the largest diagonal entry.
     k = 0
     for i in range(1, 3):

@@ -1,4 +1,4 @@
-"""Compiling the virtual robot's kernels into the cache ahead of the first run, which they would hold up for half a minute."""
+"""Compilation of the virtual robot's kernels into the cache before the first run, which would otherwise wait half a minute."""
 
 from gravcomp.config import from_mapping
 from gravcomp.description.hardware import parse_hardware
@@ -8,7 +8,7 @@ from gravcomp.virtual.robot import VirtualRobot
 
 
 def warm_up() -> None:
-    """Compile everything that the shipped robot needs."""
+    """Compile all kernels that the article's robot needs."""
     file = load_robot_file("article")
     hardware = parse_hardware(file.section("hardware"), source=file.source)
     VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, hardware).step(0.02)

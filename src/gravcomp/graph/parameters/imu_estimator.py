@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 from gravcomp.config import parameter
-from gravcomp.orientation.calibration import ImuCalibration
 from gravcomp.orientation.estimator import EstimatorOptions
+from gravcomp.orientation.imu_calibration import ImuCalibration
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.prediction import PredictionOptions
 from gravcomp.thermal.heater import HeaterOptions

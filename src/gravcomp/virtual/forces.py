@@ -1,0 +1,206 @@
+"""Forces and tangent of the rod and its tendons, compiled.
+
+With the strain epsilon = theta / L of an element between the cross-sections A and B (see rod.py):
+
+    sigma = K (epsilon - e_z) + ...                                  Cosserat law; the history of the material adds to it
+    delta theta = J_r^-1(theta) eta_B - J_l^-1(theta) eta_A          eta: body-frame variations of the two cross-sections
+
+A tendon at the offset d with the tension T pulls in the element with T (t, d x t), t the unit vector along v + w x d (D. C.
+Rucker, R. J. Webster, "Statics and dynamics of continuum robots with general tendon routing and external loading", IEEE T-RO 27,
+2011).
+
+A tendon is a spring that only pulls: T_0 = k max(0, u + l - l_0) + preload, u the displacement pulled in at the base. Because of
+friction only the share s_e T_0 arrives in element e. A tendon couples all elements that it passes; `newton_step` of
+band_solver.py adds its spring to the tangent as an update of rank one.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from gravcomp.virtual.se3 import inverse_jacobians
+
+
+@njit(cache=True, error_model="numpy")
+def assemble(
+    orientation: np.ndarray,
+    length: np.ndarray,
+    strain: np.ndarray,
+    linear: np.ndarray,
+    constant: np.ndarray,
+    slip_stiffness: np.ndarray,
+    slip_moment: np.ndarray,
+    slip_strain: np.ndarray,
+    tendon_offset: np.ndarray,
+    tendon_start: np.ndarray,
+    tendon_end: np.ndarray,
+    direction: np.ndarray,
+    path: np.ndarray,
+    tension: np.ndarray,
+    share: np.ndarray,
+    force: np.ndarray,
+    gradient: np.ndarray,
+    pull: np.ndarray,
+    band: np.ndarray,
+) -> np.ndarray:
+    """Return the residual (n + 1, 6), internal minus external forces, in body-frame variations of the cross-sections.
+
+    Parameters
+    ----------
+    orientation : (n + 1, 3, 3)
+        Of the cross-sections.
+    length : (n,) m
+        Of the elements at rest.
+    strain : (n, 6)
+        Of the elements.
+    linear, constant : (n, 6)
+        Of the material's law: sigma = linear (epsilon - e_z) + constant + friction + tendons.
+    slip_stiffness, slip_moment, slip_strain : (n,) N m^2, (n,) N m, (n, 2) 1/m
+        Of the material's friction, see material.py.
+    tendon_offset, tendon_start, tendon_end : (m, 3) m, (m,), (m,)
+        Of the `RodModel`.
+    direction, path : (m, n, 3), (m, n) m
+        From `tendon_lengths`.
+    tension : (m,) N
+        At the base.
+    share : (m, n)
+        Fraction of the tension that arrives in each element.
+    force : (n + 1, 3) N
+        On the cross-sections, in the fixed frame.
+    gradient : (6 n, m)
+        Filled with d path / d eta.
+    pull : (6 n, m)
+        Filled with d residual / d tension.
+    band : (6 n, 23)
+        Filled with the tangent without the tendons' springs.
+
+    The first cross-section is clamped and has no rows in gradient, pull and band.
+    """
+    n, m = length.shape[0], tendon_end.shape[0]
+    residual = np.zeros((n + 1, 6))
+    gradient[:] = 0.0
+    pull[:] = 0.0
+    band[:] = 0.0
+    left, right = np.empty((6, 6)), np.empty((6, 6))
+    tangent, product = np.empty((6, 6)), np.empty((6, 6))
+    theta, sigma, unit = np.empty(6), np.empty(6), np.empty(6)
+    second = np.empty((3, 6))
+    for e in range(n):
+        for i in range(6):
+            theta[i] = strain[e, i] * length[e]
+            sigma[i] = linear[e, i] * (strain[e, i] - (1.0 if i == 2 else 0.0)) + constant[e, i]
+            for j in range(6):
+                tangent[i, j] = 0.0
+            tangent[i, i] = linear[e, i]
+        inverse_jacobians(theta, left, right)
+
+        k0 = slip_stiffness[e] * (strain[e, 3] - slip_strain[e, 0])
+        k1 = slip_stiffness[e] * (strain[e, 4] - slip_strain[e, 1])
+        trial = math.sqrt(k0 * k0 + k1 * k1)
+        factor = 1.0 if trial <= slip_moment[e] else slip_moment[e] / trial
+        sigma[3] += factor * k0
+        sigma[4] += factor * k1
+        tangent[3, 3] += factor * slip_stiffness[e]
+        tangent[4, 4] += factor * slip_stiffness[e]
+
+        for c in range(m):
+            if e < tendon_start[c] or e >= tendon_end[c]:
+                continue
+            here = tension[c] * share[c, e]
+            d0, d1 = tendon_offset[c, 0], tendon_offset[c, 1]
+            t0, t1, t2 = direction[c, e, 0], direction[c, e, 1], direction[c, e, 2]
+            unit[0], unit[1], unit[2] = t0, t1, t2
+            unit[3], unit[4], unit[5] = d1 * t2, -d0 * t2, d0 * t1 - d1 * t0
+            for i in range(6):
+                sigma[i] += here * unit[i]
+            # d(t)/d(epsilon) = (1 - t t^T) [1, -d^] / |v + w x d|
+            scale = here * length[e] / path[c, e]
+            for i in range(3):
+                ti = unit[i]
+                for j in range(6):
+                    second[i, j] = -ti * unit[j]
+            for i in range(3):
+                second[i, i] += 1.0
+            second[0, 5] -= d1
+            second[1, 5] += d0
+            second[2, 3] += d1
+            second[2, 4] -= d0
+            for j in range(6):
+                a0, a1, a2 = scale * second[0, j], scale * second[1, j], scale * second[2, j]
+                tangent[0, j] += a0
+                tangent[1, j] += a1
+                tangent[2, j] += a2
+                tangent[3, j] += d1 * a2
+                tangent[4, j] -= d0 * a2
+                tangent[5, j] += d0 * a1 - d1 * a0
+            for i in range(6):
+                to_a, to_b = 0.0, 0.0
+                for j in range(6):
+                    to_a -= left[j, i] * unit[j]
+                    to_b += right[j, i] * unit[j]
+                if e > 0:
+                    gradient[6 * (e - 1) + i, c] += to_a
+                    pull[6 * (e - 1) + i, c] += share[c, e] * to_a
+                gradient[6 * e + i, c] += to_b
+                pull[6 * e + i, c] += share[c, e] * to_b
+
+        for i in range(6):
+            to_a, to_b = 0.0, 0.0
+            for j in range(6):
+                to_a -= left[j, i] * sigma[j]
+                to_b += right[j, i] * sigma[j]
+            residual[e, i] += to_a
+            residual[e + 1, i] += to_b
+        for i in range(6):
+            for j in range(6):
+                tangent[i, j] /= length[e]
+        for side in range(2):  # columns: variation of A, then of B
+            jacobian = left if side == 0 else right
+            sign = -1.0 if side == 0 else 1.0
+            column = 6 * (e - 1 + side)
+            if column < 0:
+                continue
+            for i in range(6):
+                for j in range(6):
+                    value = 0.0
+                    for k in range(6):
+                        value += tangent[i, k] * jacobian[k, j]
+                    product[i, j] = sign * value
+            for i in range(6):
+                for j in range(6):
+                    # The stress turns with the strain: half of ad(d theta)^T sigma on either side.
+                    if i < 3:
+                        p, q = (i + 1) % 3, (i + 2) % 3
+                        turning = sign * (sigma[p] * jacobian[3 + q, j] - sigma[q] * jacobian[3 + p, j])
+                    else:
+                        p, q = (i - 2) % 3, (i - 1) % 3
+                        turning = sign * (sigma[p] * jacobian[q, j] - sigma[q] * jacobian[p, j])
+                        turning += sign * (sigma[3 + p] * jacobian[3 + q, j] - sigma[3 + q] * jacobian[3 + p, j])
+                    to_a, to_b = 0.5 * turning, 0.5 * turning
+                    for k in range(6):
+                        to_a -= left[k, i] * product[k, j]
+                        to_b += right[k, i] * product[k, j]
+                    if e > 0:
+                        row = 6 * (e - 1) + i
+                        band[row, column + j - row + 11] += to_a
+                    row = 6 * e + i
+                    band[row, column + j - row + 11] += to_b
+
+    for k in range(n + 1):
+        r = orientation[k]
+        f0 = r[0, 0] * force[k, 0] + r[1, 0] * force[k, 1] + r[2, 0] * force[k, 2]
+        f1 = r[0, 1] * force[k, 0] + r[1, 1] * force[k, 1] + r[2, 1] * force[k, 2]
+        f2 = r[0, 2] * force[k, 0] + r[1, 2] * force[k, 1] + r[2, 2] * force[k, 2]
+        residual[k, 0] -= f0
+        residual[k, 1] -= f1
+        residual[k, 2] -= f2
+        if k > 0:
+            row = 6 * (k - 1)
+            band[row, 15] += f2
+            band[row, 16] -= f1
+            band[row + 1, 13] -= f2
+            band[row + 1, 15] += f0
+            band[row + 2, 12] += f1
+            band[row + 2, 13] -= f0
+    return residual

@@ -1,0 +1,221 @@
+"""One time step of the moving rod, compiled.
+
+Generalized-alpha on a Lie group (O. Bruls, A. Cardona, "On the use of Lie group time integrators in multibody dynamics", J.
+Comput. Nonlinear Dyn. 5, 2010) in the fixed frame, so the inertial forces of a turning base are included:
+
+    M dv/dt - ad_v^T M v + f_int(H) - f_ext = 0,   dH/dt = H v^
+
+The internal forces are those of forces.py with the material of material.py and the tendons' friction of tendon_friction.py. The
+share of the tension that arrives in each element is that at the beginning of the step.
+"""
+
+import numpy as np
+from numba import njit
+
+from gravcomp.virtual.band_solver import newton_step
+from gravcomp.virtual.forces import assemble
+from gravcomp.virtual.material import step_law, update_history
+from gravcomp.virtual.rod import strains, tendon_lengths
+from gravcomp.virtual.se3 import advance, motion_exp
+from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
+
+_SPECTRAL_RADIUS = 0.5  # numerical damping of frequencies that the time step cannot resolve; 1: none
+_ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
+_ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
+_GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
+_BETA = 0.25 * (_GAMMA + 0.5) ** 2
+MOST_ITERATIONS = 8
+_LARGEST_TURN = 1.5  # rad in one element
+_LARGEST_VELOCITY = 2e3  # m/s and rad/s
+_FORCE_TOLERANCE = 1e-7  # N and N m; one cross-section weighs 3e-3 N
+
+
+@njit(cache=True, error_model="numpy")
+def time_step(
+    dt: float,
+    base_orientation: np.ndarray,
+    base_position: np.ndarray,
+    gravity: np.ndarray,
+    wound: np.ndarray,
+    wound_before: np.ndarray,
+    orientation: np.ndarray,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    acceleration: np.ndarray,
+    velocity_rate: np.ndarray,
+    strain: np.ndarray,
+    branch_strain: np.ndarray,
+    slip_strain: np.ndarray,
+    sliding: np.ndarray,
+    path: np.ndarray,
+    tension: np.ndarray,
+    shortened: np.ndarray,
+    length: np.ndarray,
+    stiffness: np.ndarray,
+    mass: np.ndarray,
+    inertia: np.ndarray,
+    tendon_offset: np.ndarray,
+    tendon_start: np.ndarray,
+    tendon_end: np.ndarray,
+    tendon_rest: np.ndarray,
+    spring: np.ndarray,
+    branch_ratio: np.ndarray,
+    branch_time: np.ndarray,
+    damping_time: float,
+    slip_stiffness: np.ndarray,
+    slip_moment: np.ndarray,
+    mu: float,
+    guide_angle: float,
+    presliding: float,
+) -> tuple[bool, int]:
+    """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
+
+    The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
+    of the step. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
+    material keep their values from before the step.
+    """
+    n, m = length.shape[0], tendon_end.shape[0]
+    beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
+    gamma = _GAMMA / (dt * _BETA)
+    linear, constant = step_law(dt, stiffness, strain, branch_strain, branch_ratio, branch_time, damping_time)
+    force = np.empty((n + 1, 3))
+    for k in range(n + 1):
+        for i in range(3):
+            force[k, i] = mass[k] * gravity[i]
+    share = tension_shares(strain, length, sliding, tendon_start, tendon_end, mu, guide_angle)
+
+    total_increment = np.zeros((n + 1, 6))
+    for k in range(1, n + 1):
+        for i in range(6):
+            a = (_ALPHA_F * velocity_rate[k, i] - _ALPHA_M * acceleration[k, i]) / (1.0 - _ALPHA_M)
+            total_increment[k, i] = dt * velocity[k, i] + dt * dt * ((0.5 - _BETA) * acceleration[k, i] + _BETA * a)
+            velocity[k, i] += dt * ((1.0 - _GAMMA) * acceleration[k, i] + _GAMMA * a)
+            acceleration[k, i] = a
+            velocity_rate[k, i] = 0.0
+    start_orientation, start_position = orientation.copy(), position.copy()
+    start_branch_strain, start_slip_strain = branch_strain.copy(), slip_strain.copy()
+    orientation[0] = base_orientation
+    position[0] = base_position
+
+    path_before = path.copy()
+    direction, active, work = np.zeros((m, n, 3)), np.empty(m), np.empty((3, 3))
+    gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
+    new_strain = np.empty((n, 6))
+    turn, shift = np.empty((3, 3)), np.empty(3)
+    iterations = MOST_ITERATIONS
+    for iteration in range(MOST_ITERATIONS):
+        for k in range(1, n + 1):
+            motion_exp(total_increment[k], turn, shift)
+            orientation[k] = start_orientation[k]
+            position[k] = start_position[k]
+            advance(orientation[k], position[k], turn, shift, work)
+        strains(orientation, position, length, new_strain)
+        tendon_lengths(new_strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
+        for c in range(m):
+            stretch = wound[c] + np.sum(path[c]) - tendon_rest[c]
+            active[c] = spring[c] if stretch > 0.0 else 0.0
+            tension[c] = active[c] * stretch
+        residual = assemble(
+            orientation,
+            length,
+            new_strain,
+            linear,
+            constant,
+            slip_stiffness,
+            slip_moment,
+            slip_strain,
+            tendon_offset,
+            tendon_start,
+            tendon_end,
+            direction,
+            path,
+            tension,
+            share,
+            force,
+            gradient,
+            pull,
+            band,
+        )
+        worst = 0.0
+        for k in range(1, n + 1):
+            _add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], inertia[k])
+            for i in range(6):
+                worst = max(worst, abs(residual[k, i]))
+                band[6 * (k - 1) + i, 11] += beta * (mass[k] if i < 3 else inertia[k, i - 3])
+        if worst < _FORCE_TOLERANCE:
+            iterations = iteration
+            break
+        increment = newton_step(band, residual, gradient, pull, active)
+        for k in range(1, n + 1):
+            for i in range(6):
+                change = increment[6 * (k - 1) + i]
+                total_increment[k, i] += change
+                velocity[k, i] += gamma * change
+                velocity_rate[k, i] += beta * change
+        if not np.isfinite(increment).all():
+            break
+    for k in range(1, n + 1):
+        _orthonormalise(orientation[k], work)
+        for i in range(6):
+            acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
+
+    update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
+    update_sliding(sliding, path_before, path, wound_before, wound, presliding)
+    for c in range(m):
+        shortened[c] = tendon_rest[c] - np.sum(path[c])
+    strain[:] = new_strain
+    possible = _is_possible(orientation, position, strain, velocity, length)
+    if not possible:
+        orientation[:], position[:] = start_orientation, start_position
+        branch_strain[:], slip_strain[:] = start_branch_strain, start_slip_strain
+    return possible, iterations
+
+
+@njit(cache=True, error_model="numpy")
+def _is_possible(
+    orientation: np.ndarray, position: np.ndarray, strain: np.ndarray, velocity: np.ndarray, length: np.ndarray
+) -> bool:
+    """Return whether pose, strain and velocity are within physical bounds; written so that NaN is not possible."""
+    reach = 2.0 * np.sum(length)
+    possible = True
+    for k in range(orientation.shape[0]):
+        for i in range(3):
+            possible = possible and abs(position[k, i] - position[0, i]) < reach
+            for j in range(3):
+                possible = possible and abs(orientation[k, i, j]) < 1.0 + 1e-6
+        for i in range(6):
+            possible = possible and abs(velocity[k, i]) < _LARGEST_VELOCITY
+    for e in range(length.shape[0]):
+        for i in range(3, 6):
+            possible = possible and abs(strain[e, i]) * length[e] < _LARGEST_TURN
+    return possible
+
+
+@njit(cache=True, error_model="numpy")
+def _orthonormalise(rotation: np.ndarray, work: np.ndarray) -> None:
+    """Bring rotation (3, 3) to the nearest rotation by one Newton step, R (3 - R^T R) / 2; work (3, 3) is scratch.
+
+    This keeps rounding errors from adding up over hours.
+    """
+    for i in range(3):
+        for j in range(3):
+            product = 0.0
+            for k in range(3):
+                product += rotation[k, i] * rotation[k, j]
+            work[i, j] = (1.5 if i == j else 0.0) - 0.5 * product
+    for i in range(3):
+        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+        for j in range(3):
+            rotation[i, j] = a * work[0, j] + b * work[1, j] + c * work[2, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_inertia(residual: np.ndarray, velocity: np.ndarray, rate: np.ndarray, mass: float, inertia: np.ndarray) -> None:
+    """Add M rate - ad_v^T M v of one cross-section to residual (6,); mass in kg, inertia (3,) kg m^2."""
+    v0, v1, v2, w0, w1, w2 = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
+    residual[0] += mass * (rate[0] + w1 * v2 - w2 * v1)
+    residual[1] += mass * (rate[1] + w2 * v0 - w0 * v2)
+    residual[2] += mass * (rate[2] + w0 * v1 - w1 * v0)
+    residual[3] += inertia[0] * rate[3] + (inertia[2] - inertia[1]) * w1 * w2
+    residual[4] += inertia[1] * rate[4] + (inertia[0] - inertia[2]) * w2 * w0
+    residual[5] += inertia[2] * rate[5] + (inertia[1] - inertia[0]) * w0 * w1
