@@ -1,1 +1,1 @@
-"""The sense of gravity: nodes imu_estimator and imu_replay."""
+"""Estimation side of gravcomp: the nodes imu_estimator, imu_replay and arm_gravity."""

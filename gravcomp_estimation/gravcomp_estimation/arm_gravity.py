@@ -1,10 +1,11 @@
-"""Node arm_gravity: gravity in the robot's base from the arm that carries it, in place of the IMU or as a check of it.
+"""Node arm_gravity: gravity in the robot's base from the pose of the arm that carries it, in place of the IMU or to check it.
 
-The arm knows its pose from its encoders, the IMU knows gravity by itself; where both are there and disagree, one of them is wrong: a
-loose mount, a wrong URDF, a saturated sensor.
+The arm measures its pose with encoders, the IMU measures gravity. If both are available and disagree, one of them is wrong: a
+loose mount, a wrong URDF or a saturated sensor.
 """
 
 import time
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped
@@ -12,7 +13,7 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 from gravcomp.arm.chain import Chain, angle_between, gravity_in
 from gravcomp.config import ConfigError
@@ -20,19 +21,20 @@ from gravcomp.graph.parameters.arm_gravity import ArmGravityParameters
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 
-_LOOK = 0.1  # s between two looks at arm and IMU, in a check
-_KEPT = 50  # messages of joint_states between two looks
-# Silent for longer, a source counts as gone.
+_CHECK_PERIOD = 0.1  # s, between two checks of arm and IMU
+_KEPT = 50  # messages of joint_states that are kept between two checks
+# A source without messages for longer is stale.
 STALE = 0.5  # s
 
 
 class ArmGravity(ManagedNode):
-    """Gravity from the arm's pose: published, or compared with the IMU's."""
+    """Computes gravity from the arm's pose, and publishes it or compares it with the IMU's."""
 
     name = "arm_gravity"
     parameters_class = ArmGravityParameters
 
     def configure(self) -> None:
+        """Read the URDF if the parameter gives one. Raises ConfigError when it is not usable."""
         self._chain: Chain | None = None
         if self.parameters.source == "joint_states" and self.parameters.urdf:
             try:
@@ -44,6 +46,7 @@ class ArmGravity(ManagedNode):
         self._gravity = self.create_publisher(Vector3Stamped, topic, SENSOR)
 
     def activate(self) -> None:
+        """Create the subscriptions. Raises ConfigError when the source is tf and tf2_msgs is not installed."""
         self._positions: dict[str, float] = {}
         self._frames: dict[str, tuple[str, np.ndarray]] = {}
         self._arm: tuple[float, np.ndarray] | None = None  # monotonic s, (3,)
@@ -56,16 +59,17 @@ class ArmGravity(ManagedNode):
         elif self.parameters.use == "publish":
             self._inputs = [self.create_subscription(JointState, "joint_states", self._on_joints, QoSProfile(depth=10))]
         else:
-            # A check needs no more than the newest at each look.
+            # A check needs only the newest message of each period.
             self._inputs = []
             self._polled_joints = Polled(self, JointState, "joint_states", QoSProfile(depth=_KEPT))
         if self.parameters.source == "joint_states" and not self.parameters.urdf:
             self._inputs.append(self.create_subscription(String, "robot_description", self._on_description, LATCHED))
         if self.parameters.use == "check":
             self._polled_imu = Polled(self, Vector3Stamped, "gravity", SENSOR)
-        self._watch = self.create_timer(_LOOK, self._judge)
+        self._watch = self.create_timer(_CHECK_PERIOD, self._check)
 
     def deactivate(self) -> None:
+        """Destroy timer and subscriptions."""
         self.destroy_timer(self._watch)
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
@@ -74,6 +78,7 @@ class ArmGravity(ManagedNode):
                 polled.destroy()
 
     def cleanup(self) -> None:
+        """Destroy the publisher."""
         if hasattr(self, "_gravity"):
             self.destroy_publisher(self._gravity)
 
@@ -92,9 +97,9 @@ class ArmGravity(ManagedNode):
         self._positions.update(zip(message.name, message.position))
         self._take_positions(message.header)
 
-    def _take_positions(self, header) -> None:
+    def _take_positions(self, header: Header) -> None:
         if self._chain and all(name in self._positions for name in self._chain.moving):
-            self._give(self._chain.gravity(self._positions), header)
+            self._publish_gravity(self._chain.gravity(self._positions), header)
 
     def _tf_subscriptions(self) -> list:
         try:
@@ -109,21 +114,21 @@ class ArmGravity(ManagedNode):
             self.create_subscription(TFMessage, "/tf_static", self._on_tf, latched),
         ]
 
-    def _on_tf(self, message) -> None:
+    def _on_tf(self, message: Any) -> None:
         for t in message.transforms:
             q = t.transform.rotation
             self._frames[t.child_frame_id] = t.header.frame_id, rotation_from_quaternion(q.x, q.y, q.z, q.w)
         frame, rotation = self.parameters.base_frame, np.eye(3)
         for _ in range(len(self._frames) + 1):
             if frame == self.parameters.world_frame:
-                self._give(gravity_in(rotation), message.transforms[-1].header)
+                self._publish_gravity(gravity_in(rotation), message.transforms[-1].header)
                 return
             if frame not in self._frames:
                 return
             frame, above = self._frames[frame]
             rotation = above @ rotation
 
-    def _give(self, gravity: np.ndarray, header) -> None:
+    def _publish_gravity(self, gravity: np.ndarray, header: Header) -> None:
         self._arm = time.monotonic(), gravity
         message = Vector3Stamped()
         message.header.stamp, message.header.frame_id = header.stamp, self.parameters.base_frame
@@ -132,8 +137,12 @@ class ArmGravity(ManagedNode):
 
     # The check.
 
-    def _look(self) -> None:
-        """Take what has come to be asked for. The robot's own cables are in joint_states, too, and an arm may split its joints: take all."""
+    def _read_polled(self) -> None:
+        """Read the polled topics.
+
+        All messages of joint_states are read, because the robot's cables are there as well, and an arm may publish its joints in
+        several messages.
+        """
         if self._polled_joints is not None:
             received = self._polled_joints.take_all()
             for one in received:
@@ -144,20 +153,20 @@ class ArmGravity(ManagedNode):
             v = newest.message.vector
             self._imu = time.monotonic(), np.array([v.x, v.y, v.z])
 
-    def _judge(self) -> None:
-        self._look()
+    def _check(self) -> None:
+        self._read_polled()
         now = time.monotonic()
         if self._arm is None or now - self._arm[0] > STALE:
             missing = (
-                "no URDF has come"
+                "no URDF has been received"
                 if self.parameters.source == "joint_states" and self._chain is None
-                else "no pose of the arm comes"
+                else "no pose of the arm is received"
             )
             self.report(WARN, missing)
         elif self.parameters.use == "publish":
             self.report(OK, "gravity from the arm")
         elif self._imu is None or now - self._imu[0] > STALE:
-            self.report(WARN, "no gravity comes from the IMU")
+            self.report(WARN, "no gravity is received from the IMU")
         else:
             self._compare(now)
 
@@ -177,5 +186,5 @@ class ArmGravity(ManagedNode):
 
 
 def main() -> int:
-    """Entry point."""
+    """Run the node; return the exit code."""
     return run(ArmGravity)

@@ -1,7 +1,7 @@
-"""Node imu_estimator: orientation, gravity and bias out of the IMU's samples, and the IMU's temperature kept.
+"""Node imu_estimator: estimates orientation, gravity and bias from the IMU's samples, and controls the IMU's temperature.
 
-The estimate depends on the samples' stamps and values alone; what depends on when messages arrive (staleness, the heater, the
-status) never enters it.
+The estimate depends only on the stamps and values of the samples. Whatever depends on the arrival of messages (stale streams, the
+heater, the status) does not enter it.
 """
 
 import dataclasses
@@ -23,28 +23,29 @@ from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEs
 from gravcomp.orientation import quaternion as quat
 from gravcomp.thermal import HeaterControl
 from gravcomp_estimation import messages
-from gravcomp_estimation.status import Situation, judge
+from gravcomp_estimation.status import Situation, evaluate
 from gravcomp_estimation.stream import SensorStream
 from gravcomp_msgs.msg import ImuStatus
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
-STATUS_PERIOD = 0.1  # s, also of imu/heater: the board switches off when it hears nothing
+STATUS_PERIOD = 0.1  # s, also of imu/heater: the board switches the heater off without commands
 FOLLOW_PERIOD = 0.5  # s
 SAVE_PERIOD = 60.0  # s
-BIAS_PERIOD_NS = 100_000_000  # of imu/bias: it changes over minutes
+BIAS_PERIOD_NS = 100_000_000  # of imu/bias, which changes over minutes
 LEVELS = {ImuStatus.OK: OK, ImuStatus.INITIALISING: OK, ImuStatus.UNCALIBRATED: WARN}
 
 
 class ImuEstimator(ManagedNode):
-    """Orientation, gravity and bias from imu/data_raw; keeps the IMU's temperature over imu/heater."""
+    """Estimates orientation, gravity and bias from imu/data_raw; controls the IMU's temperature through imu/heater."""
 
     name = "imu_estimator"
     parameters_class = ImuEstimatorParameters
 
     def configure(self) -> None:
-        # Whoever records a replay may want every message: qos_overrides./gravity.publisher.reliability:=reliable and so on.
+        """Create publishers, services, estimator and heater control."""
+        # To record every message of a replay: qos_overrides./gravity.publisher.reliability:=reliable and so on.
         override = QoSOverridingOptions.with_default_policies()
-        # Copies: rclpy writes what is overridden for one topic into the profile that it is given.
+        # Copies, because rclpy writes the overrides of a topic into the given profile.
         self._imu = self.create_publisher(Imu, "imu/data", copy(SENSOR), qos_overriding_options=override)
         self._gravity = self.create_publisher(Vector3Stamped, "gravity", copy(SENSOR), qos_overriding_options=override)
         self._bias = self.create_publisher(Vector3Stamped, "imu/bias", copy(SENSOR), qos_overriding_options=override)
@@ -56,6 +57,7 @@ class ImuEstimator(ManagedNode):
         self._heater = HeaterControl(self.parameters.heater, self._heater.ambient if hasattr(self, "_heater") else None)
 
     def activate(self) -> None:
+        """Reset the estimator and subscribe."""
         self._estimator.reset()
         self._estimate: GravityEstimate | None = None
         self._problem = Problem.NONE
@@ -70,7 +72,7 @@ class ImuEstimator(ManagedNode):
             SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability),
             SensorStream(self, Temperature, "imu/temperature", self._on_temperature, reliability),
         ]
-        # Wall time: the status must also tell that a replay's clock stands still.
+        # Steady clock: the status must be published also when the clock of a replay has stopped.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers_active = [
             self.create_timer(STATUS_PERIOD, self._on_status, clock=steady),
@@ -79,30 +81,33 @@ class ImuEstimator(ManagedNode):
         ]
 
     def deactivate(self) -> None:
+        """Unsubscribe, switch the heater off and save the bias model."""
         for stream in self._streams:
             stream.close()
         for timer in self._timers_active:
             self.destroy_timer(timer)
         self._heater_duty.publish(Float32(data=0.0))
-        # Latched: whoever comes later shall not take the last word for the present.
+        # Latched: late subscribers must not take the last active status for the current one.
         stopped = messages.header(self._stamp_ns, self.parameters.imu_frame)
         self._status.publish(ImuStatus(header=stopped, code=ImuStatus.NO_DATA, message="not active"))
         self._save_bias_model()
 
     def cleanup(self) -> None:
+        """Destroy publishers and services."""
         for service in (self._reset_service, self._reset_bias_service):
             self.destroy_service(service)
         for publisher in (self._imu, self._gravity, self._bias, self._status, self._heater_duty):
             self.destroy_publisher(publisher)
 
     def parameters_changed(self, old: ImuEstimatorParameters, new: ImuEstimatorParameters) -> None:
+        """Apply the parameters; rebuild the filter where a running one cannot take them."""
         if not hasattr(self, "_estimator"):
             return
         self._estimator.set_prediction(new.prediction)
         self._estimator.bias_estimation = new.filter.bias_estimation
         if _rebuilt_for(old) != _rebuilt_for(new):
             self._make_estimator()
-            self.get_logger().info("the filter starts anew with the changed parameters")
+            self.get_logger().info("the filter restarts with the changed parameters")
         if old.heater != new.heater:
             self._heater = HeaterControl(new.heater, self._heater.ambient)
 
@@ -113,7 +118,7 @@ class ImuEstimator(ManagedNode):
             try:
                 model = BiasTemperatureModel.load(self.parameters.bias_model_file)
             except BiasModelError as error:
-                self.get_logger().error(f"{error}; going on without it")
+                self.get_logger().error(f"{error}; continuing without the bias model")
         self._estimator = GravityEstimator(self.parameters.estimator, mount, model)
 
     # Samples.
@@ -151,10 +156,10 @@ class ImuEstimator(ManagedNode):
         sample_age = None if self._sample_time is None else now - self._sample_time
         alive = sample_age is not None and sample_age <= self.parameters.stale_time
         heater = self._heater.check(time.monotonic_ns()) if alive else self._heater.state
-        # Without samples nobody knows whether the reading still means anything.
+        # Without samples the temperature reading may be outdated.
         duty = heater.duty if alive else 0.0
         self._heater_duty.publish(Float32(data=duty))
-        code, sentence = judge(
+        code, sentence = evaluate(
             Situation(
                 sample_age=sample_age,
                 problem=self._problem,
@@ -202,16 +207,16 @@ class ImuEstimator(ManagedNode):
         self._estimator.reset()
         self._heater.reset()
         self._estimate = None
-        response.success, response.message = True, "orientation, bias and heater faults begin anew"
+        response.success, response.message = True, "orientation, bias and heater control restarted"
         return response
 
     def _on_reset_bias(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._estimator.filter.reset_bias()
-        response.success, response.message = True, "the bias begins anew"
+        response.success, response.message = True, "bias estimate restarted"
         return response
 
     def _save_bias_model(self) -> None:
-        """Add what this run has shown to the file; never in a replay, which must give the same result each time."""
+        """Add what this run has learned to the file; not in a replay, which must give the same result each time."""
         file, learned = self.parameters.bias_model_file, self._estimator.learned
         replayed = self.get_parameter("use_sim_time").value or self._streams[0].reliable
         if not file or learned.span is None or replayed:
@@ -221,16 +226,16 @@ class ImuEstimator(ManagedNode):
             model.merge(learned)
             model.save(Path(file))
         except (BiasModelError, OSError) as error:
-            self.get_logger().error(f"the bias model is not kept: {error}")
+            self.get_logger().error(f"the bias model cannot be saved: {error}")
         else:
             learned.clear()
 
 
 def _rebuilt_for(parameters: ImuEstimatorParameters) -> tuple:
-    """What a running filter cannot take over."""
+    """Return the parameters whose change requires a new filter."""
     return dataclasses.replace(parameters.filter, bias_estimation=True), parameters.calibration
 
 
 def main() -> int:
-    """Entry point."""
+    """Run the node; return the exit code."""
     return run(ImuEstimator)

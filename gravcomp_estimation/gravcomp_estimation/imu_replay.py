@@ -1,7 +1,7 @@
-"""Node imu_replay: plays a recording's IMU samples into the graph, at its own times or faster, with /clock.
+"""Node imu_replay: publishes the IMU samples of a recording, in real time or faster, with /clock.
 
-Published reliably and without limit of history: who subscribes the same way, as imu_estimator does, misses nothing, and is
-waited for when it is slower.
+The samples are published reliably and with unlimited history. A subscriber with the same QoS, such as imu_estimator, receives
+every sample; a slow one delays the replay.
 """
 
 import time
@@ -23,21 +23,22 @@ from gravcomp_estimation.stream import LOSSLESS
 from gravcomp_node import ManagedNode, run
 
 TICK = 0.002  # s
-LONGEST_TICK = 0.05  # s of publishing before signals and services get their turn
-# What discovery tells of a subscriber that has just come is not always right, and matching takes its time.
+LONGEST_TICK = 0.05  # s of publishing before signals and services are handled
+# Discovery may be wrong about a subscriber that has just appeared, and connecting takes time.
 SETTLE = 1.0  # s
 CLOCK_QOS = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
-# ROS takes time zero for 'not set': a recording without absolute times starts one second later.
+# ROS interprets time 0 as 'not set', so a recording without absolute times starts at 1 s.
 EARLIEST_NS = 1_000_000_000
 
 
 class ImuReplay(ManagedNode):
-    """Plays a recording into imu/data_raw and imu/temperature, with /clock."""
+    """Publishes a recording on imu/data_raw and imu/temperature, with /clock."""
 
     name = "imu_replay"
     parameters_class = ImuReplayParameters
 
     def configure(self) -> None:
+        """Read the recording. Raises ConfigError when it cannot be read."""
         parameters = self.parameters
         if not parameters.file:
             raise ConfigError(
@@ -48,7 +49,7 @@ class ImuReplay(ManagedNode):
         except RecordingError as error:
             raise ConfigError(str(error)) from error
         shift = max(0, EARLIEST_NS - int(recording.stamp_ns[0]))
-        # In the order of their stamps; a temperature before the sample of the same stamp.
+        # In the order of the stamps; a temperature precedes the sample with the same stamp.
         self._events = [(s + shift, 1, i) for i, s in enumerate(recording.stamp_ns.tolist())]
         if recording.temperature is not None:
             self._events += [(s + shift, 0, i) for i, s in enumerate(recording.temperature_stamp_ns.tolist())]
@@ -61,19 +62,22 @@ class ImuReplay(ManagedNode):
         self._clock_publisher = self.create_publisher(ClockMessage, "/clock", CLOCK_QOS) if parameters.clock else None
 
     def activate(self) -> None:
+        """Start waiting for subscribers."""
         self._next = 0
         self._shift_ns = 0
         self._begin: float | None = None  # monotonic, s
         self._waiting_since = time.monotonic()
-        self._awaited_since: float | None = None
+        self._complete_since: float | None = None
         self._ended: float | None = None
         self._timer = self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.report(OK, f"waiting for a subscriber of {self._imu.topic_name}")
 
     def deactivate(self) -> None:
+        """Stop publishing."""
         self.destroy_timer(self._timer)
 
     def cleanup(self) -> None:
+        """Destroy the publishers."""
         for publisher in (self._imu, self._temperature, self._clock_publisher):
             if publisher is not None:
                 self.destroy_publisher(publisher)
@@ -81,16 +85,16 @@ class ImuReplay(ManagedNode):
     def _tick(self) -> None:
         now = time.monotonic()
         if self._ended is not None:
-            # A moment for those who still compute what they were sent.
+            # The subscribers may still process the last samples.
             if self.parameters.exit_at_end and now - self._ended > 1.0:
                 self.finished = True
             return
         if self._begin is None:
-            if not self._awaited():
-                self._awaited_since = None
-            elif self._awaited_since is None:
-                self._awaited_since = now
-            settled = self._awaited_since is not None and now - self._awaited_since >= SETTLE
+            if not self._is_complete():
+                self._complete_since = None
+            elif self._complete_since is None:
+                self._complete_since = now
+            settled = self._complete_since is not None and now - self._complete_since >= SETTLE
             if not settled and now - self._waiting_since < self.parameters.wait_for_subscribers:
                 return
             self._begin = now
@@ -113,14 +117,14 @@ class ImuReplay(ManagedNode):
         self.get_logger().info("the recording has ended")
         self.report(OK, "the recording has ended")
 
-    def _awaited(self) -> bool:
-        """Someone is there who takes every sample, and every node that was named has begun."""
+    def _is_complete(self) -> bool:
+        """Return whether a reliable subscriber exists and every node in `wait_for` is active."""
         taken = self.get_subscriptions_info_by_topic(self._imu.topic_name)
         reliable = any(s.qos_profile.reliability == ReliabilityPolicy.RELIABLE for s in taken)
         return reliable and all(map(self._has_begun, self.parameters.wait_for))
 
     def _has_begun(self, node: str) -> bool:
-        """Nodes subscribe to what they work on when they become active."""
+        """Return whether the node is active, which its subscriptions show."""
         try:
             subscribed = self.get_subscriber_names_and_types_by_node(node, self.get_namespace())
         except NodeNameNonExistentError:
@@ -128,7 +132,7 @@ class ImuReplay(ManagedNode):
         return any(topic not in ("/clock", "/parameter_events") for topic, _ in subscribed)
 
     def _publish(self, stamp: int, kind: int, index: int) -> bool:
-        """Publish one event; False: the subscriber is slower, try again."""
+        """Publish one event; return False when the subscriber is too slow and the event must be repeated."""
         stamp += self._shift_ns
         frame = self.parameters.imu_frame
         try:
@@ -147,5 +151,5 @@ class ImuReplay(ManagedNode):
 
 
 def main() -> int:
-    """Entry point."""
+    """Run the node; return the exit code."""
     return run(ImuReplay)

@@ -1,4 +1,4 @@
-"""From samples and estimates to messages and back. Covariances and frames as REP-145 and REP-103 have them."""
+"""Conversion between samples or estimates and messages; covariances follow REP-145, frames REP-103."""
 
 from geometry_msgs.msg import Vector3, Vector3Stamped
 from sensor_msgs.msg import Imu
@@ -6,29 +6,29 @@ from std_msgs.msg import Header
 
 from gravcomp.orientation import FilterOptions, GravityEstimate
 
-UNKNOWN = -1.0  # REP-145: first entry of a covariance whose quantity is not given
+UNKNOWN = -1.0  # REP-145: first entry of the covariance of a quantity that is not given
 
 
 def stamp_ns(header: Header) -> int:
-    """The header's stamp, ns."""
+    """Return the stamp of a header in ns."""
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
 def header(stamp: int, frame: str) -> Header:
-    """A header with the stamp in ns."""
+    """Return a header with a stamp given in ns."""
     message = Header(frame_id=frame)
     message.stamp.sec, message.stamp.nanosec = divmod(stamp, 1_000_000_000)
     return message
 
 
 def sample_of(message: Imu) -> tuple[int, tuple, tuple]:
-    """Stamp in ns, rate (3,) rad/s, specific force (3,) m/s^2."""
+    """Return stamp in ns, angular rate (3,) in rad/s and specific force (3,) in m/s^2."""
     rate, accel = message.angular_velocity, message.linear_acceleration
     return stamp_ns(message.header), (rate.x, rate.y, rate.z), (accel.x, accel.y, accel.z)
 
 
 def raw_imu(stamp: int, frame: str, gyro: list[float], accel: list[float]) -> Imu:
-    """A raw sample, without orientation."""
+    """Return the message of a raw sample: rate (3,) in rad/s and specific force (3,) in m/s^2, without orientation."""
     message = Imu(header=header(stamp, frame))
     message.orientation_covariance[0] = UNKNOWN
     message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z = gyro
@@ -37,9 +37,10 @@ def raw_imu(stamp: int, frame: str, gyro: list[float], accel: list[float]) -> Im
 
 
 def imu_data(estimate: GravityEstimate, frame: str, period: float, options: FilterOptions) -> Imu:
-    """imu/data: orientation, rate without bias and calibrated specific force with covariances; `period` of the samples, s.
+    """Return imu/data: orientation, rate without bias and calibrated specific force, with covariances.
 
-    The orientation's covariance is about the earth's fixed axes; that of yaw grows without bound, as six axes do not tell it.
+    period: s, of the samples. The covariance of the orientation is about the earth-fixed axes; the one of yaw grows without
+    bound, because a six-axis IMU does not observe yaw.
     """
     imu = estimate.imu
     message = Imu(header=header(imu.stamp_ns, frame))
@@ -62,5 +63,5 @@ def imu_data(estimate: GravityEstimate, frame: str, period: float, options: Filt
 
 
 def vector(stamp: int, frame: str, value: tuple[float, float, float]) -> Vector3Stamped:
-    """A stamped vector."""
+    """Return a stamped vector; `stamp` in ns."""
     return Vector3Stamped(header=header(stamp, frame), vector=Vector3(x=value[0], y=value[1], z=value[2]))

@@ -1,8 +1,8 @@
-"""Subscribing to a sensor stream as reliably as it is offered.
+"""A subscription to a sensor stream with the reliability that its publishers offer.
 
-Live sensors publish best effort: a late sample is worth less than the next one. A replayed recording is published reliably, and then
-nothing may be lost, or the result would differ from one time to the next. QoS is fixed at creation, so the subscription is made anew
-when the publishers that are there ask for the other kind.
+Live sensors publish best effort, because a late sample is worth less than the next one. A replay is published reliably; no sample
+must be lost, or the results of two replays would differ. The QoS of a subscription is fixed at creation, so the subscription is
+created again when the publishers offer another reliability.
 """
 
 from collections.abc import Callable
@@ -10,23 +10,27 @@ from collections.abc import Callable
 from gravcomp_node.qos import SENSOR
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 
-# Every sample, in order, waiting for whoever is slower.
+# Every sample in order; a slow subscriber delays the publisher.
 LOSSLESS = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_ALL)
 
 
 class SensorStream:
-    """One subscription; call `follow` now and then."""
+    """One subscription; call `follow` periodically.
+
+    Attribute reliable: whether the current subscription is reliable.
+    """
 
     def __init__(self, node: Node, kind: type, topic: str, callback: Callable, reliability: str):
-        """`reliability`: auto, best_effort or reliable. `reliable` tells how it is taken now."""
+        """Subscribe to `topic`; `reliability`: auto, best_effort or reliable."""
         self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
         self._follows = reliability == "auto"
         self.reliable = reliability == "reliable"
         self._subscription = self._subscribe()
 
     def follow(self) -> None:
-        """Look at the publishers; subscribe anew if they are of the other kind."""
+        """Check the publishers; subscribe again if they offer another reliability."""
         if not self._follows:
             return
         offered = [p.qos_profile.reliability for p in self._node.get_publishers_info_by_topic(self._subscription.topic_name)]
@@ -37,9 +41,9 @@ class SensorStream:
             self._subscription = self._subscribe()
 
     def close(self) -> None:
-        """End the subscription."""
+        """Destroy the subscription."""
         self._node.destroy_subscription(self._subscription)
 
-    def _subscribe(self):
+    def _subscribe(self) -> Subscription:
         qos = LOSSLESS if self.reliable else SENSOR
         return self._node.create_subscription(self._kind, self._topic, self._callback, qos)

@@ -1,4 +1,4 @@
-"""The status says the gravest thing that is wrong, in a sentence."""
+"""The status states the most severe problem in one sentence."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("gravcomp_msgs.msg", reason="the workspace is not built or not sourced")
 
-from gravcomp_estimation.status import Situation, judge
+from gravcomp_estimation.status import Situation, evaluate
 
 from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.thermal import HeaterFault, HeaterState
@@ -24,7 +24,7 @@ def situation():
 
 
 def test_all_well(situation):
-    assert judge(situation) == (ImuStatus.OK, "at rest")
+    assert evaluate(situation) == (ImuStatus.OK, "at rest")
 
 
 @pytest.mark.parametrize(
@@ -34,20 +34,20 @@ def test_all_well(situation):
         ({"sample_age": 2.0}, ImuStatus.NO_DATA, "for 2.0 s"),
         ({"problem": Problem.NOT_FINITE, "problem_age": 0.1}, ImuStatus.BAD_DATA, "NaN"),
         ({"heater": replace(HEATER, fault=HeaterFault.DEAD_HEATER)}, ImuStatus.HEATER_FAULT, "heater off"),
-        ({"estimate": None}, ImuStatus.INITIALISING, "not known"),
+        ({"estimate": None}, ImuStatus.INITIALISING, "not converged"),
     ],
 )
 def test_each_thing_that_is_wrong_has_its_code(situation, change, code, words):
-    found, sentence = judge(replace(situation, **change))
+    found, sentence = evaluate(replace(situation, **change))
     assert found == code and words in sentence
 
 
-def test_no_data_is_graver_than_a_heater_fault(situation):
+def test_no_data_precedes_a_heater_fault(situation):
     worse = replace(situation, sample_age=3.0, heater=replace(HEATER, fault=HeaterFault.DEAD_SENSOR))
-    assert judge(worse)[0] == ImuStatus.NO_DATA
+    assert evaluate(worse)[0] == ImuStatus.NO_DATA
 
 
 def test_an_accelerometer_off_by_much_is_uncalibrated(situation):
     off = replace(situation.estimate, calibrated=False)
-    code, sentence = judge(replace(situation, estimate=off))
+    code, sentence = evaluate(replace(situation, estimate=off))
     assert code == ImuStatus.UNCALIBRATED and "calibrate" in sentence
