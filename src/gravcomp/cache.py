@@ -1,9 +1,8 @@
-"""Where results that take long to make are kept: ~/.cache/gravcomp, under keys made of what they were computed from.
+"""Folder for results that take long to compute: ~/.cache/gravcomp, under keys made of what they were computed from.
 
-A key is the SHA-256 of the content (robot, mesh, options, format version), so a changed input makes a new entry and no
-entry can be stale. `GRAVCOMP_CACHE` names another folder.
+A key is the SHA-256 of the content (robot, mesh, options, format version). A changed input makes a new entry, and no entry can be
+stale. The environment variable GRAVCOMP_CACHE names another folder.
 
-    configure_numba()                                   # before the first import of numba
     path = cache_path("reduction", content_key(robot, options), ".npz")
 """
 
@@ -18,7 +17,7 @@ import numpy as np
 
 
 def cache_folder(kind: str) -> Path:
-    """The folder of one kind of entry, made when missing."""
+    """Return the folder of one kind of entry, made when missing."""
     root = os.environ.get("GRAVCOMP_CACHE")
     folder = (Path(root) if root else Path.home() / ".cache" / "gravcomp") / kind
     folder.mkdir(parents=True, exist_ok=True)
@@ -26,12 +25,12 @@ def cache_folder(kind: str) -> Path:
 
 
 def cache_path(kind: str, key: str, suffix: str) -> Path:
-    """The file of one entry; it may not exist yet."""
+    """Return the path of one entry, whose file may not exist yet."""
     return cache_folder(kind) / f"{key}{suffix}"
 
 
 def content_key(*content: Any) -> str:
-    """A key of 32 hexadecimal digits for data classes, arrays and plain values."""
+    """Return a key of 32 hexadecimal digits for data classes, arrays and plain values."""
     digest = hashlib.sha256()
     for item in content:
         if isinstance(item, np.ndarray):
@@ -44,15 +43,3 @@ def content_key(*content: Any) -> str:
             digest.update(json.dumps(plain, sort_keys=True, default=str).encode())
         digest.update(b"\0")
     return digest.hexdigest()[:32]
-
-
-def configure_numba() -> None:
-    """Let Numba keep its compiled functions in the cache; to be called before the first import of numba.
-
-    Numba looks at a function's own file alone, but functions here call those of other files: the folder is that of all their contents.
-    """
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return
-    sources = sorted(Path(__file__).parent.rglob("*.py"))
-    compiled = [text for text in (source.read_bytes() for source in sources) if b"numba" in text]
-    os.environ["NUMBA_CACHE_DIR"] = str(cache_folder("numba") / content_key(*compiled))

@@ -1,5 +1,5 @@
 """Sliding tendons: where they run, how long they are, what they pull, and when they are slack."""
 
-from gravcomp.cache import configure_numba
+from gravcomp.compiled_functions import configure_numba
 
 configure_numba()

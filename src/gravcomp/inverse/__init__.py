@@ -1,8 +1,12 @@
-"""The inverse problem: which cable displacements bring the modelled robot to its target."""
+"""The inverse problem: the cable displacements that bring the modelled robot to its target."""
 
-from gravcomp.cache import configure_numba
+# ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
 
-configure_numba()  # before the first module here imports Numba
+# ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
+
+from gravcomp.compiled_functions import configure_numba
+
+configure_numba()
 
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.controller import InverseController

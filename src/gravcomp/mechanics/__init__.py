@@ -1,5 +1,5 @@
-"""Mechanics of the soft body: elements, materials, mass, and the stiffness matrix with its factorisation."""
+"""Mechanics of the soft body: elements, mass, and the stiffness matrix with its factorisation."""
 
-from gravcomp.cache import configure_numba
+from gravcomp.compiled_functions import configure_numba
 
 configure_numba()
