@@ -1,15 +1,22 @@
-"""All tests: each worker process has a ROS domain of its own, so that tests side by side never hear each other's nodes."""
+"""Set up every test process: one thread for linear algebra, and a ROS domain of its own.
+
+With its own domain, a test does not hear the nodes of a test that runs at the same time.
+"""
 
 import os
 
 import pytest
 
+# As the commands do, and before NumPy is imported: at these sizes more threads only wait for each other.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Reserve the domain for what this process starts; one that the user has set stays."""
+    """Reserve the domain for the processes that this one starts; a domain that the user has set stays."""
     if config.pluginmanager.has_plugin("dsession"):
-        return  # it runs no test itself
+        return  # the controlling process of pytest-xdist runs no test
     from gravcomp.launcher.domain import private_domain
 
     os.environ.update(private_domain())
