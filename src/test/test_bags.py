@@ -76,7 +76,7 @@ def test_a_bag_is_mcap_of_version_9_with_the_offered_qos_and_the_hash_of_the_typ
 
 def test_a_bag_is_not_written_over(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions, count=1)
-    with pytest.raises(BagError, match="exists; a bag is not written over"):
+    with pytest.raises(BagError, match="exists; a bag is not overwritten"):
         BagWriter(path)
 
 

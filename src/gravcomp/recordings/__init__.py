@@ -1,1 +1,1 @@
-"""Reading and writing recordings: `imu` reads IMU streams, `bags` reads and writes rosbag2 folders."""
+"""Recordings: `imu` reads IMU streams, `bags` reads and writes rosbag2 folders."""

@@ -1,11 +1,13 @@
-"""Message definitions as a bag stores them, from the .msg files of the installed packages.
+"""Message definitions for bags, from the .msg files of the installed packages.
 
-`<prefix>/share/PACKAGE/msg/NAME.msg` for each prefix in AMENT_PREFIX_PATH, as ROS installs them; the hash is that of REP-2016, which
-`ros2 bag` compares with the live types.
+ROS installs them as `<prefix>/share/PACKAGE/msg/NAME.msg` for each prefix in AMENT_PREFIX_PATH. The hash is that of REP-2016,
+which `ros2 bag` compares with the types of the running graph.
 """
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -13,22 +15,22 @@ from gravcomp.recordings.bags.errors import BagError
 
 
 class Definitions:
-    """Definitions by type name ('sensor_msgs/msg/Imu'), read when they are first asked for."""
+    """Definitions by type name ('sensor_msgs/msg/Imu'), read at their first use."""
 
     def __init__(self, prefixes: list[Path] | None = None):
-        """prefixes: where packages are installed; AMENT_PREFIX_PATH when not given."""
+        """prefixes: folders of installed packages; default: AMENT_PREFIX_PATH."""
         if prefixes is None:
             prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(":") if p]
         self._prefixes = prefixes
         self._store = get_typestore(Stores.EMPTY)
 
     def of(self, name: str) -> tuple[str, str]:
-        """Definition with all it needs, and hash. Raises BagError for a type that is not installed."""
+        """Return the definition, including the types it uses, and the hash. Raises BagError for a type that is not installed."""
         self._add(name)
         return self._store.generate_msgdef(name, ros_version=2)[0], self._store.hash_rihs01(name)
 
     def add_text(self, name: str, text: str) -> None:
-        """Take the types from a definition as a bag holds it."""
+        """Add the types of a definition from a bag."""
         self._store.register(
             {key: value for key, value in get_types_from_msg(text, name).items() if key not in self._store.fielddefs}
         )
@@ -50,8 +52,8 @@ class Definitions:
         raise BagError(f"the type {name} is not installed: no share/{package}/msg/{message}.msg in any of AMENT_PREFIX_PATH")
 
 
-def _named(fields) -> set[str]:
-    """Names of message types anywhere in field descriptions."""
+def _named(fields: Iterable[tuple[str, Any]]) -> set[str]:
+    """Return the names of all message types in the descriptions of fields."""
     found = set()
     for _, (kind, what) in fields:
         if kind.name in ("ARRAY", "SEQUENCE"):

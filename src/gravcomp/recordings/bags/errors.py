@@ -1,7 +1,7 @@
-"""What goes wrong with bags."""
+"""Errors of bags."""
 
 from gravcomp.config import ConfigError
 
 
 class BagError(ConfigError):
-    """A bag that cannot be written or read; the text is for people."""
+    """A bag that cannot be written or read; the text is for the user."""

@@ -1,12 +1,20 @@
-"""QoS as bags store it, from plain names and numbers."""
+"""QoS profiles of bags, from names and numbers."""
+
+from enum import Enum
+from typing import TypeVar
 
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+
+_Kind = TypeVar("_Kind", bound=Enum)
 
 _ENDLESS = QosTime(9223372036, 854775807)
 
 
 def offered_qos(reliability: str, durability: str, history: str, depth: int) -> Qos:
-    """A publisher's offer; the names are those of ROS, 'reliable', 'transient_local', 'keep_last'...; unknown ones count as unknown."""
+    """Return the QoS profile that a publisher offers.
+
+    The names are those of ROS: 'reliable', 'transient_local', 'keep_last' and so on; any other name gives UNKNOWN.
+    """
     return Qos(
         history=_member(QosHistory, history),
         depth=depth,
@@ -20,5 +28,6 @@ def offered_qos(reliability: str, durability: str, history: str, depth: int) -> 
     )
 
 
-def _member(kind, name: str):
-    return getattr(kind, name.upper(), kind.UNKNOWN)
+def _member(kind: type[_Kind], name: str) -> _Kind:
+    members = kind.__members__
+    return members.get(name.upper(), members["UNKNOWN"])

@@ -1,4 +1,4 @@
-"""A bag's topics as arrays, one row a message."""
+"""Topics of a bag as arrays, one row for each message."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,8 +19,9 @@ SHAPE_TARGET = "gravcomp_msgs/msg/ShapeTarget"
 
 @dataclass(frozen=True)
 class Wanted:
-    """A topic of the type `kind` whose name ends with one of `names`; those earlier in the tuple go first. A name that begins with '/' is the
-    topic's full one. `optional`: it may be missing.
+    """A topic of the type `kind` whose name ends with one of `names`, of which the first that is found counts.
+
+    A name that begins with '/' is the full name. `optional`: the topic may be missing.
     """
 
     kind: str
@@ -30,7 +31,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Stream:
-    """k messages in the order of their reception. What a row of `values` holds depends on the type: see `_VALUES`."""
+    """k messages in the order of their reception. The columns of `values` depend on the type: see `_VALUES`."""
 
     topic: str
     stamp: np.ndarray  # (k,) s, of the headers
@@ -38,15 +39,16 @@ class Stream:
     values: np.ndarray  # (k, n)
 
     def at(self, time: np.ndarray) -> np.ndarray:
-        """(len(time), n) interpolated between the stamps; the first and the last row beyond them."""
+        """Return (len(time), n): the values interpolated between the stamps; before and after them the first and the last row."""
         order = np.argsort(self.stamp, kind="stable")
         return np.column_stack([np.interp(time, self.stamp[order], column[order]) for column in self.values.T])
 
 
 def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int = 2) -> dict[str, Stream | None]:
-    """The topics by the keys of `wanted`, None for an optional one that is missing. A damaged bag is read as far as it goes.
+    """Return the topics by the keys of `wanted`, None for an optional one that is missing or empty. A damaged bag is recovered.
 
-    Raises BagError, also when one that is there holds fewer than `least` messages and is not optional.
+    Raises BagError for a bag that cannot be read, for a topic that is missing, of another type or not unique, and for a topic
+    that is not optional and has fewer than `least` messages.
     """
     from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.rosbag2 import ReaderError
@@ -61,21 +63,24 @@ def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int =
             topics = {key: _topic(path, found, want) for key, want in wanted.items()}
             rows: dict[str, list] = {topic: [] for topic in topics.values() if topic}
             for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
-                message = reader.deserialize(raw, connection.msgtype)
+                message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
                 rows[connection.topic].append((stamp, 1e-9 * received, _VALUES[connection.msgtype](message)))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
         raise BagError(f"{path}: is not a readable bag: {error}") from error
     streams: dict[str, Stream | None] = {}
     for key, topic in topics.items():
-        few = topic is not None and len(rows[topic]) < (1 if wanted[key].optional else least)
-        if few and not wanted[key].optional:
-            raise BagError(f"{path}: '{topic}' holds {len(rows[topic])} messages; at least {least} are needed")
-        streams[key] = None if topic is None or few else _stream(path, topic, rows[topic])
+        if topic is None or (wanted[key].optional and not rows[topic]):
+            streams[key] = None
+            continue
+        if not wanted[key].optional and len(rows[topic]) < least:
+            raise BagError(f"{path}: '{topic}' has {len(rows[topic])} messages; at least {least} are needed")
+        streams[key] = _stream(path, topic, rows[topic])
     return streams
 
 
 def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
+    """Return the topic that `want` names among `found` (topic -> type). Raises BagError."""
     for name in want.names:
         if name.startswith("/") and name in found and found[name] != want.kind:
             raise BagError(f"{path}: '{name}' is {found[name]}; {want.kind} is needed")
@@ -83,7 +88,7 @@ def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
         topics = [
             t for t, kind in found.items() if kind == want.kind and (t == name if name.startswith("/") else t.endswith(full))
         ]
-        # The virtual robot's truth/gravity lies below the namespace of the robot's own gravity.
+        # The topic truth/gravity of the virtual robot is in a namespace below that of the robot's own gravity.
         spaces = sorted((topic[: len(topic) - len(full) + 1], topic) for topic in topics)
         if spaces and all(space.startswith(spaces[0][0]) for space, _ in spaces):
             return spaces[0][1]
@@ -102,7 +107,7 @@ def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
 def _stream(path: str | Path, topic: str, rows: list[tuple]) -> Stream:
     width = len(rows[0][2])
     if any(len(row[2]) != width for row in rows):
-        raise BagError(f"{path}: the messages of '{topic}' hold different numbers of values; one robot's are needed")
+        raise BagError(f"{path}: the messages of '{topic}' have different numbers of values; those of one robot are needed")
     stamp, received, values = zip(*rows)
     return Stream(topic, np.array(stamp), np.array(received), np.array(values, dtype=float).reshape(len(rows), width))
 
@@ -112,13 +117,13 @@ def _vector(v: Any) -> tuple[float, ...]:
 
 
 def _pose(message: Any) -> tuple[float, ...]:
-    """Position, and orientation x y z w."""
+    """Return position, and orientation x y z w."""
     q = message.pose.orientation
     return *_vector(message.pose.position), q.x, q.y, q.z, q.w
 
 
 def _shape_target(message: Any) -> tuple[float, ...]:
-    """Whether it is a bend, its angle and plane, the tip's position and direction."""
+    """Return whether the target is a bend, its angle and plane, and position and direction of the tip."""
     return message.bend, message.bend_angle, message.bend_plane, *_vector(message.tip_position), *_vector(message.tip_direction)
 
 

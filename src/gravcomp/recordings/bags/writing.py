@@ -1,4 +1,4 @@
-"""Writing bags: MCAP, version 9, on disk a second after it was received."""
+"""Writing of bags: MCAP, version 9; a message is on disk one second after its reception."""
 
 import time
 from collections.abc import Sequence
@@ -6,18 +6,22 @@ from pathlib import Path
 
 from rosbags.interfaces import Connection, Qos
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+from rosbags.rosbag2.storage_mcap import McapWriter
 
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
 
 
 class BagWriter:
-    """A bag being written; `messages` counts them. Raises BagError."""
+    """A bag that is being written; `messages` is their number."""
 
     def __init__(self, path: Path, flush_interval: float = 1.0, definitions: Definitions | None = None):
-        """`flush_interval` (s): what a kill may lose."""
+        """flush_interval (s): time of which the data are lost when the process is killed.
+
+        Raises BagError for a path that exists or cannot be written.
+        """
         if path.exists():
-            raise BagError(f"{path}: exists; a bag is not written over, name another folder")
+            raise BagError(f"{path}: exists; a bag is not overwritten, name another folder")
         self.path = path
         self.messages = 0
         self._definitions = definitions or Definitions()
@@ -31,29 +35,31 @@ class BagWriter:
     def __enter__(self) -> "BagWriter":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def add_topic(self, name: str, kind: str, qos: Sequence[Qos] = ()) -> Connection:
-        """Announce a topic with the QoS that its publishers offer."""
+        """Add a topic with the QoS that its publishers offer. Raises BagError for a type that is not installed."""
         definition, digest = self._definitions.of(kind)
         return self._writer.add_connection(name, kind, msgdef=definition, rihs01=digest, offered_qos_profiles=qos)
 
     def write(self, topic: Connection, received: int, message: bytes) -> None:
-        """A serialised message and when it was received, ns."""
+        """Write a serialised message that was received at `received` (ns)."""
         self._writer.write(topic, received, message)
         self.messages += 1
         self._dirty = True
 
     def flush(self, now: float | None = None) -> None:
-        """To be called now and then: hands what is older than the interval to the system."""
+        """Write the data to disk if the interval has passed at `now` (s, monotonic; default: the present); call it repeatedly."""
         now = time.monotonic() if now is None else now
         if self._dirty and now - self._flushed >= self._flush_interval:
-            # A closed chunk can be read without the file's end.
-            self._writer.storage.close_chunk()
-            self._writer.storage.bio.flush()
+            storage = self._writer.storage
+            assert isinstance(storage, McapWriter)
+            # A closed chunk can be read without the end of the file.
+            storage.close_chunk()
+            storage.bio.flush()
             self._flushed, self._dirty = now, False
 
     def close(self) -> None:
-        """Finish: index, footer and metadata.yaml."""
+        """Write index, footer and metadata.yaml, and close the bag."""
         self._writer.close()

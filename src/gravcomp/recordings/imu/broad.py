@@ -1,8 +1,8 @@
-"""Reading .npz files in the layout of the BROAD benchmark.
+"""Reading of .npz files in the layout of the BROAD benchmark.
 
 D. Laidig, M. Caruso, A. Cereatti, T. Seel, "BROAD - A Benchmark for Robust Inertial Orientation Estimation", Data 2021, 6(7), 72.
 Arrays: `gyr` rad/s (N, 3), `acc` m/s^2 (N, 3), `rate` Hz; where known `quat` w x y z sensor to earth (N, 4, NaN where
-occluded) and `movement` bool (N,), the samples by which a filter is judged.
+occluded) and `movement` bool (N,), the samples that count in the evaluation of a filter.
 """
 
 import zipfile
@@ -16,12 +16,12 @@ LAYOUT = "needed: gyr (N, 3) rad/s, acc (N, 3) m/s^2, rate in Hz; optional: quat
 
 
 def read_broad(path: str | Path) -> Recording:
-    """The recording in the file. Raises RecordingError."""
+    """Return the recording in the file. Raises RecordingError for a file that is not in this layout."""
     path = Path(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):
-                raise RecordingError(f"{path}: holds a single array; {LAYOUT}")
+                raise RecordingError(f"{path}: contains a single array; {LAYOUT}")
             arrays = {name: file[name] for name in ("gyr", "acc", "rate", "quat", "movement") if name in file.files}
             found = ", ".join(file.files) or "nothing"
     except RecordingError:
@@ -37,7 +37,7 @@ def read_broad(path: str | Path) -> Recording:
     gyro = _columns(arrays["gyr"], 3, "gyr", path)
     accel = _columns(arrays["acc"], 3, "acc", path)
     if len(gyro) != len(accel):
-        raise RecordingError(f"{path}: gyr has {len(gyro)} samples, acc has {len(accel)}; as many are needed")
+        raise RecordingError(f"{path}: gyr has {len(gyro)} samples, acc has {len(accel)}; equally many are needed")
     rate = _rate(arrays["rate"], path)
     movement = arrays.get("movement")
     if movement is not None and movement.dtype != bool and not np.isin(movement, (0, 1)).all():

@@ -1,4 +1,4 @@
-"""Choosing the reader by what the path is."""
+"""Choice of the reader by the kind of the path."""
 
 from pathlib import Path
 
@@ -8,9 +8,9 @@ from gravcomp.recordings.imu.rosbag import read_rosbag
 
 
 def read_recording(path: str | Path, topic: str | None = None) -> Recording:
-    """Read an .npz file in BROAD's layout or a rosbag2 folder. `topic` names the IMU topic of a bag with several.
+    """Read an .npz file in BROAD's layout or a rosbag2 folder; `topic` names the IMU topic of a bag with several.
 
-    Raises RecordingError saying what was found and what is needed.
+    Raises RecordingError, which names what was found and what is needed.
     """
     path = Path(path).expanduser()
     if not path.exists():

@@ -1,4 +1,4 @@
-"""What a recording holds, checked once so that whoever takes it needs no further checks."""
+"""An IMU recording as arrays; they are checked once, at construction."""
 
 from dataclasses import dataclass
 
@@ -6,14 +6,14 @@ import numpy as np
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be read or used; the text says what was found and what is needed."""
+    """A recording that cannot be read or used; the text names what was found and what is needed."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """An IMU stream and, where known, the truth it can be judged by. n samples, k temperature readings.
+    """An IMU stream and, where known, the ground truth of its orientation; n samples, k temperature readings.
 
-    Samples that are not finite stay in: telling and rejecting them is the filter's task.
+    Samples that are not finite are kept; the filter rejects and reports them.
     """
 
     source: str  # file or folder
@@ -23,12 +23,12 @@ class Recording:
     temperature_stamp_ns: np.ndarray | None = None  # (k,) int64, ns
     temperature: np.ndarray | None = None  # (k,) degC
     orientation: np.ndarray | None = None  # (n, 4) true w x y z, sensor to earth; NaN where unknown
-    movement: np.ndarray | None = None  # (n,) bool, where the truth counts
+    movement: np.ndarray | None = None  # (n,) bool, samples that count in the evaluation
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         count = len(self.stamp_ns)
         if count < 2:
-            raise RecordingError(f"{self.source}: holds {count} IMU samples; at least 2 are needed")
+            raise RecordingError(f"{self.source}: has {count} IMU samples; at least 2 are needed")
         for name, width in (("gyro", 3), ("accel", 3), ("orientation", 4)):
             value = getattr(self, name)
             if value is not None and value.shape != (count, width):
@@ -44,21 +44,21 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """s, first to last stamp."""
+        """Time from the first to the last stamp, s."""
         return float(self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9
 
     @property
     def rate(self) -> float:
-        """Hz, from the median distance of the stamps."""
+        """Sample rate in Hz, from the median difference of the stamps. Raises RecordingError where the stamps do not advance."""
         step = float(np.median(np.diff(self.stamp_ns)))
         if step <= 0:
             raise RecordingError(f"{self.source}: the stamps do not advance (median step {step:g} ns)")
         return 1e9 / step
 
     def averaged(self, count: int) -> "Recording":
-        """The recording at 1/count of its rate: the mean of every `count` samples, with the stamp and truth of the last.
+        """Return the recording at 1/count of its rate: the mean of every `count` samples, with the stamp and truth of the last.
 
-        An orientation at the end of the averaging window is what the window's samples lead to.
+        The truth of the last sample is the orientation to which the samples of the window lead.
         """
         whole = len(self) // count * count
         last = slice(count - 1, whole, count)

@@ -1,14 +1,19 @@
-"""Reading a rosbag2 folder (MCAP or SQLite) with the library rosbags; a damaged one as far as it goes.
+"""Reading of the IMU stream of a rosbag2 folder (MCAP or SQLite); a damaged one is recovered.
 
-Taken are the one sensor_msgs/Imu topic (of several the one ending in `imu/data_raw`), the sensor_msgs/Temperature of the
-same namespace and, as truth, `virtual/base_orientation` (geometry_msgs/QuaternionStamped). Stamps are those of the headers.
+It has one sensor_msgs/Imu topic (of several the one that ends with `imu/data_raw`), the sensor_msgs/Temperature of the same
+namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/QuaternionStamped). Stamps are those of the headers.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gravcomp.recordings.imu.recording import Recording, RecordingError
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
 
 IMU = "sensor_msgs/msg/Imu"
 TEMPERATURE = "sensor_msgs/msg/Temperature"
@@ -16,7 +21,7 @@ TRUTH = "geometry_msgs/msg/QuaternionStamped"
 
 
 def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
-    """The IMU stream in the folder; `topic` chooses among several. Raises RecordingError."""
+    """Return the IMU stream in the folder; `topic` names one of several. Raises RecordingError."""
     from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.rosbag2 import ReaderError
     from rosbags.serde import SerdeError
@@ -38,9 +43,9 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
             truths = [
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
-            rows = {name: [], **{t: [] for t in temperatures[:1] + truths}}
+            rows: dict[str, list[tuple[int, tuple[float, ...]]]] = {t: [] for t in (name, *temperatures[:1], *truths)}
             for connection, _, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
-                message = reader.deserialize(raw, connection.msgtype)
+                message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
                 rows[connection.topic].append((stamp, _values(message)))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
@@ -62,7 +67,7 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
     )
 
 
-def _choose(connections: list, topic: str | None, path: Path) -> str:
+def _choose(connections: "Sequence[Connection]", topic: str | None, path: Path) -> str:
     found = sorted({c.topic for c in connections if c.msgtype == IMU})
     if topic is not None:
         if topic not in found:
@@ -78,7 +83,7 @@ def _choose(connections: list, topic: str | None, path: Path) -> str:
     raise RecordingError(f"{path}: has several topics of type {IMU}: {', '.join(found)}; name one of them")
 
 
-def _values(message) -> tuple:
+def _values(message: Any) -> tuple[float, ...]:
     if message.__msgtype__ == IMU:
         gyro, accel = message.angular_velocity, message.linear_acceleration
         return gyro.x, gyro.y, gyro.z, accel.x, accel.y, accel.z
@@ -88,13 +93,13 @@ def _values(message) -> tuple:
     return q.w, q.x, q.y, q.z
 
 
-def _arrays(rows: list, width: int) -> tuple[np.ndarray, np.ndarray]:
+def _arrays(rows: list[tuple[int, tuple[float, ...]]], width: int) -> tuple[np.ndarray, np.ndarray]:
     stamp = np.array([row[0] for row in rows], dtype=np.int64)
     return stamp, np.array([row[1] for row in rows], dtype=float).reshape(len(rows), width)
 
 
 def _nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:
-    """The truth whose stamp is nearest to each sample's, NaN beyond the tolerance."""
+    """Return the truth whose stamp is nearest to that of each sample, NaN where they differ by more than the tolerance."""
     after = np.clip(np.searchsorted(truth_stamp, stamp), 1, max(len(truth_stamp) - 1, 1))
     after = np.minimum(after, len(truth_stamp) - 1)
     before = np.maximum(after - 1, 0)
