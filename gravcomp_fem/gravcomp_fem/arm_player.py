@@ -1,8 +1,9 @@
-"""arm_player: an arm that is not there, carrying the virtual robot through five poses twice: with released cables, then compensated.
+"""Node arm_player: simulates an arm that carries the virtual robot through five poses, first released, then compensated.
 
-It gives what an arm gives, joint_states and robot_description, turns the virtual robot's base as the arm's flange turns, and judges by the
-virtual robot's truth. The loop takes nothing of it. A pass begins when the controller has agreed to it and the bridge follows; how much of
-what was measured the bridge followed is among the figures, because a robot whose motors hold compensates nothing.
+It publishes joint_states and robot_description like an arm, rotates the virtual robot's base with the arm's flange, and
+measures the tip error with the virtual robot's ground truth. The loop receives nothing else from it. A pass begins when the
+controller has accepted the request and the bridge follows commands. The figures include the share of samples during which the
+bridge followed, because holding motors do not compensate.
 """
 
 import json
@@ -15,6 +16,7 @@ from geometry_msgs.msg import PoseStamped, QuaternionStamped
 from gravcomp_node.managed_node import OK
 from gravcomp_node.polled import Polled
 from rclpy.qos import QoSProfile
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -27,18 +29,19 @@ from gravcomp.virtual.motion import quaternion
 from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
-_RATE = 50.0  # Hz, of the joints
+_RATE = 50.0  # Hz, of joint_states
 _PASSES = ("released", "compensated")
-_ASK_AGAIN = 1.0  # s, when the controller did not agree or did not answer
+_REPEAT_REQUEST = 1.0  # s, until a refused or unanswered request is repeated
 
 
 class ArmPlayer(ManagedNode):
-    """Plays an arm's tour and measures the tip error at each pose."""
+    """Moves an arm through the poses and measures the tip error at each."""
 
     name = "arm_player"
     parameters_class = ArmPlayerParameters
 
     def configure(self) -> None:
+        """Read the URDF. Raises ConfigError when it cannot be read or has another number of joints."""
         try:
             text = Path(self.parameters.urdf).read_text(encoding="utf-8")
         except OSError as error:
@@ -47,7 +50,7 @@ class ArmPlayer(ManagedNode):
         poses = np.array(list(FIVE_POSES.values()))
         if len(self._chain.moving) != poses.shape[1]:
             raise ConfigError(
-                f"{self.parameters.urdf}: {len(self._chain.moving)} joints move '{self._chain.tip}'; the tour is for {poses.shape[1]}"
+                f"{self.parameters.urdf}: {len(self._chain.moving)} joints move '{self._chain.tip}'; {poses.shape[1]} are needed"
             )
         self._tour = Tour(poses, self.parameters.travel, self.parameters.hold)
         self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
@@ -58,11 +61,12 @@ class ArmPlayer(ManagedNode):
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
 
     def activate(self) -> None:
-        self._ready: float | None = None  # s, since when arm, robot and services are there
-        self._begin: float | None = None  # s, of the pass
+        """Subscribe and start moving."""
+        self._ready: float | None = None  # s, since when robot and services are available
+        self._begin: float | None = None  # s, start of the pass
         self._pass = 0
-        self._agreed = self._measuring = False
-        self._asked = -_ASK_AGAIN
+        self._accepted = self._measuring = False
+        self._requested = -_REPEAT_REQUEST
         self._phase = ""
         self._tip: np.ndarray | None = None
         self._bridge: CableState | None = None
@@ -75,17 +79,18 @@ class ArmPlayer(ManagedNode):
         self._ticks = self.create_timer(1.0 / _RATE, self._tick)
 
     def deactivate(self) -> None:
+        """Stop moving."""
         self.destroy_timer(self._ticks)
         self.destroy_subscription(self._reports)
         for polled in (self._truth, self._bridge_states):
             polled.destroy()
 
     def _tick(self) -> None:
-        self._look()
+        self._read_polled()
         now = self.get_clock().now().nanoseconds * 1e-9
         time = 0.0 if self._begin is None else now - self._begin
         if time >= self._tour.duration:
-            self._pass, self._begin, self._agreed, self._measuring, time = self._pass + 1, None, False, False, 0.0
+            self._pass, self._begin, self._accepted, self._measuring, time = self._pass + 1, None, False, False, 0.0
             if self._pass == len(_PASSES):
                 self._write("done", self._figures())
                 self.finished = True
@@ -103,40 +108,40 @@ class ArmPlayer(ManagedNode):
             self._followed[name].append(self._bridge.state == CableState.ACTIVE)
 
     def _prepare(self, now: float) -> None:
-        """Begin the pass as soon as everything is there, has rested for a while, and agrees."""
-        there = (
+        """Start the pass when everything is available, has rested, and the controller has accepted the request."""
+        available = (
             self._tip is not None
             and self._bridge is not None
             and self._relax.service_is_ready()
             and self._enable.service_is_ready()
         )
-        if not there:
-            self._tell("waiting for the truth")
+        if not available:
+            self._set_phase("waiting for the ground truth")
             return
-        # At rest for a while, as one starts an arm: the estimator finds gravity and the gyroscope's bias.
+        # Rest before the first motion: the estimator needs it for gravity and the gyroscope's bias.
         self._ready = now if self._ready is None else self._ready
         if now - self._ready < self.parameters.wait:
-            self._tell("at rest")
-        elif not self._agreed:
-            self._ask(now)
+            self._set_phase("at rest")
+        elif not self._accepted:
+            self._request_pass(now)
         elif self._bridge.state != CableState.ACTIVE:
-            self._tell(f"waiting for the bridge: {self._bridge.message}")
+            self._set_phase(f"waiting for the bridge: {self._bridge.message}")
         else:
             self._begin = now
-            self._tell(_PASSES[self._pass])
+            self._set_phase(_PASSES[self._pass])
 
-    def _ask(self, now: float) -> None:
-        if now - self._asked < _ASK_AGAIN:
+    def _request_pass(self, now: float) -> None:
+        if now - self._requested < _REPEAT_REQUEST:
             return
-        self._asked = now
+        self._requested = now
         client, request = (self._relax, Trigger.Request()) if self._pass == 0 else (self._enable, SetBool.Request(data=True))
         client.call_async(request).add_done_callback(self._on_answer)
 
-    def _on_answer(self, future) -> None:
+    def _on_answer(self, future: Future) -> None:
         answer = future.result()
-        self._agreed = answer.success
+        self._accepted = answer.success
         if not answer.success:
-            self._tell(f"waiting for the controller: {answer.message}")
+            self._set_phase(f"waiting for the controller: {answer.message}")
 
     def _move(self, positions: np.ndarray) -> None:
         joints = JointState(name=list(self._chain.moving), position=positions.tolist())
@@ -149,8 +154,8 @@ class ArmPlayer(ManagedNode):
         q.x, q.y, q.z, q.w = map(float, quaternion(rotation))
         self._base.publish(base)
 
-    def _look(self) -> None:
-        """The newest of tip and bridge."""
+    def _read_polled(self) -> None:
+        """Read the newest messages of tip and bridge."""
         if truth := self._truth.take():
             p = truth.message.pose.position
             self._tip = np.array([p.x, p.y, p.z])
@@ -174,7 +179,7 @@ class ArmPlayer(ManagedNode):
             "arm_and_imu_disagree_by_deg": round(max(self._disagreement), 2) if self._disagreement else None,
         }
 
-    def _tell(self, phase: str) -> None:
+    def _set_phase(self, phase: str) -> None:
         if phase != self._phase:
             self._phase = phase
             self.report(OK, phase)
@@ -189,6 +194,7 @@ class ArmPlayer(ManagedNode):
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(ArmPlayer)
 
 

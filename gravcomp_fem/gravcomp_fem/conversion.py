@@ -1,4 +1,4 @@
-"""Between the core's shapes and the messages that carry them."""
+"""Conversion between the core's shapes and targets and their messages."""
 
 from array import array
 
@@ -13,7 +13,7 @@ from gravcomp_msgs.msg import Deformation, ShapeTarget
 
 
 def deformation_message(shape: Shape, header: Header) -> Deformation:
-    """The message of a shape; `header` carries the stamp of the IMU sample and the base frame."""
+    """Return the message of a shape; `header`: stamp of the IMU sample, and base frame."""
     message = Deformation(header=header, status=int(shape.status), message=shape.message, model=shape.model)
     message.tip = pose_message(shape.tip_position, shape.tip_orientation)
     message.gravity.x, message.gravity.y, message.gravity.z = map(float, shape.gravity)
@@ -33,8 +33,10 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
 
 
 def response_of(message: Deformation) -> Response:
-    """The linear answer in a message. Raises ValueError when its arrays do not fit one another, are not finite, or tell of a cable
-    that yields nothing to a tension.
+    """Return the linearised response in a message.
+
+    Raises ValueError when the sizes of its arrays do not match, a number is not finite, or the compliance of a cable is not
+    positive.
     """
     cables, points = len(message.cable_tension), len(message.backbone_station)
     rows = 6 + 3 * points
@@ -53,7 +55,7 @@ def response_of(message: Deformation) -> Response:
 
 
 def backbone_of(message: Deformation) -> Backbone | None:
-    """The backbone in a message; None when it is not one."""
+    """Return the backbone in a message, or None when it is not valid."""
     station = np.array(message.backbone_station)
     position, orientation = np.array(message.backbone_position), np.array(message.backbone_orientation)
     if station.size < 2 or position.size != 3 * station.size or orientation.size != 4 * station.size:
@@ -64,9 +66,9 @@ def backbone_of(message: Deformation) -> Backbone | None:
 
 
 def backbone_of_poses(message: PoseArray) -> Backbone | None:
-    """A backbone given as poses from base to tip; None when they are not at least two different ones."""
-    rows = np.array([[p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w]
-                     for p in message.poses]).reshape(-1, 7)  # fmt: skip
+    """Return the backbone given as poses from base to tip, or None for fewer than two different poses."""
+    pairs = [(pose.position, pose.orientation) for pose in message.poses]
+    rows = np.array([[p.x, p.y, p.z, q.x, q.y, q.z, q.w] for p, q in pairs]).reshape(-1, 7)
     along = np.cumsum(np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1))
     if not len(along) or not np.isfinite(rows).all() or (np.diff(along, prepend=0.0) <= 0.0).any():
         return None
@@ -74,7 +76,7 @@ def backbone_of_poses(message: PoseArray) -> Backbone | None:
 
 
 def bend_message(angle: float, plane: float, tip_direction_weight: float, frame: str) -> ShapeTarget:
-    """A target of constant curvature, `angle` into the plane at `plane` (rad)."""
+    """Return a target of constant curvature: `angle` (rad) between base and tip direction, in the plane at `plane` (rad)."""
     message = ShapeTarget(
         bend=True, bend_angle=angle, bend_plane=plane, tip_position_weight=1.0, tip_direction_weight=tip_direction_weight
     )
@@ -83,7 +85,7 @@ def bend_message(angle: float, plane: float, tip_direction_weight: float, frame:
 
 
 def pose_message(position: np.ndarray, orientation: np.ndarray) -> Pose:
-    """position (3,) m, orientation (4,) x y z w."""
+    """Return a pose; position (3,) in m, orientation (4,) as x y z w."""
     pose = Pose()
     pose.position.x, pose.position.y, pose.position.z = map(float, position)
     o = pose.orientation
@@ -92,7 +94,7 @@ def pose_message(position: np.ndarray, orientation: np.ndarray) -> Pose:
 
 
 def shape_target(message: ShapeTarget, length: float) -> Target:
-    """The target in a message, for a robot of `length` (m). Raises TargetError."""
+    """Return the target in a message, for a robot of `length` (m). Raises TargetError when it is not valid."""
     stations = np.array(message.backbone_station, dtype=float)
     weights = np.array(message.backbone_weight, dtype=float)
     if message.bend:
@@ -110,7 +112,7 @@ def shape_target(message: ShapeTarget, length: float) -> Target:
     return Target(
         tip_position=np.array([message.tip_position.x, message.tip_position.y, message.tip_position.z]),
         tip_position_weight=message.tip_position_weight,
-        # A message has no 'none': a direction of length zero is not given.
+        # A message has no None: a direction of length zero means that none is given.
         tip_direction=direction if direction.any() or message.tip_direction_weight > 0.0 else None,
         tip_direction_weight=message.tip_direction_weight,
         backbone_station=stations,
@@ -120,7 +122,7 @@ def shape_target(message: ShapeTarget, length: float) -> Target:
 
 
 def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> Target:
-    """The target in a pose of the tip: its z axis is the direction. Raises TargetError."""
+    """Return the target of a tip pose, whose z axis is the direction. Raises TargetError for an orientation without unit norm."""
     q = np.array([pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w])
     norm = np.linalg.norm(q)
     if not abs(norm - 1.0) < 1e-2:
@@ -135,7 +137,7 @@ def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> 
 
 
 def doubles(values: np.ndarray) -> array:
-    """float64[] fields take an array.array without looking at each element: a hundred times faster than a list."""
+    """Return values for a float64[] field, which takes an array.array 100 times faster than a list, as it checks no elements."""
     result = array("d")
     result.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
     return result

@@ -1,17 +1,19 @@
-"""fem_simulator: the robot's shape under the virtual gravity, one equilibrium a sample of gravity.
+"""Node fem_simulator: computes the robot's shape under the virtual gravity, one equilibrium per sample of gravity.
 
-The model stands still in `soft_base` while its gravity turns; its cables are where they were commanded to be, as fast as winches can
-follow, or where the motors measure them. Before the first word of the cables they are released. In the mode `dynamic` it moves from
-one stamp to the next, beginning at rest in the first equilibrium.
+The model is fixed in `soft_base` while its gravity turns. Its cable displacements are the commanded ones, limited to the speed
+of the winches, or the measured ones. Before the first message about the cables they are released. In the mode `dynamic` the
+model moves from one stamp to the next, starting at rest in the first equilibrium.
 """
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.time import Time
+from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
@@ -23,26 +25,27 @@ from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
-# No robot is shaken harder than this; more is a broken message.
+# No base accelerates more than this; a larger value is a broken message.
 _GRAVITY_LIMIT = 100.0  # m/s^2
-# Motion over a longer gap between two stamps is not computed: it would hold up the samples that come after.
+# Motion over a longer gap between two stamps is not computed, because it would delay the following samples.
 _LONGEST_GAP = 0.1  # s
-# Commands keep the cables' speed limit; what is this much faster between two samples is no command that motors would follow.
+# Commands respect the cables' speed limit; the model follows a command at up to this multiple of it.
 _SPEED_MARGIN = 2.0
 
 
 class FemSimulator(ManagedNode):
-    """Publishes the deformation under the virtual gravity."""
+    """Publishes the robot's deformation under the virtual gravity."""
 
     name = "fem_simulator"
     parameters_class = FemSimulatorParameters
 
     def configure(self) -> None:
+        """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
         self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
-        self._cables: np.ndarray | None = None  # of the model
-        self._wanted: np.ndarray | None = None  # commanded, or measured
-        # The first step compiles what is not cached yet; better now than at the first sample.
+        self._cables: np.ndarray | None = None  # m, of the model
+        self._wanted: np.ndarray | None = None  # m, commanded or measured
+        # The first step compiles functions that are not cached yet; do it before the first sample arrives.
         for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
             self._simulator.step(np.zeros(3), cables)
         within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
@@ -52,12 +55,13 @@ class FemSimulator(ManagedNode):
         self._transforms = TransformPublisher(self)
 
     def activate(self) -> None:
+        """Reset the simulator and subscribe."""
         self._simulator.reset()
         self._refused = 0
         self._last_stamp: float | None = None
         self._last_markers = -np.inf
         self._gravity_subscription = self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR)
-        # Asked for when gravity comes: that is when the cables are needed, and waking up twice a sample costs a tenth of a processor.
+        # Read when gravity arrives, because the cables are needed then; a second wake-up per sample costs 10 % of a core.
         if self.parameters.cables_from == "command":
             self._cable_topic = Polled(self, CableCommand, "cable/command", COMMAND)
         else:
@@ -65,16 +69,18 @@ class FemSimulator(ManagedNode):
         self.report(WARN, "waiting for gravity")
 
     def deactivate(self) -> None:
+        """Unsubscribe."""
         self.destroy_subscription(self._gravity_subscription)
         self._cable_topic.destroy()
 
     def cleanup(self) -> None:
+        """Destroy the publishers."""
         for publisher in (self._deformation, self._tip, self._markers):
             self.destroy_publisher(publisher)
         self._transforms.destroy()
 
-    def _look_at_cables(self) -> None:
-        """Take what was commanded or measured since the last sample; of several the newest that can be used."""
+    def _read_cables(self) -> None:
+        """Read the displacements since the last sample; the newest valid ones are used."""
         for received in self._cable_topic.take_all():
             message = received.message
             if isinstance(message, CableCommand):
@@ -82,7 +88,7 @@ class FemSimulator(ManagedNode):
             elif message.state != CableState.UNCONFIGURED:
                 self._take_cables(message.displacement, "cable/state")
 
-    def _take_cables(self, field, topic: str) -> None:
+    def _take_cables(self, field: Sequence[float], topic: str) -> None:
         displacement = np.array(field, dtype=float)
         expected = (len(self.robot_file.robot.cables),)
         if displacement.shape != expected or not np.isfinite(displacement).all():
@@ -90,19 +96,19 @@ class FemSimulator(ManagedNode):
             return
         length = self.robot_file.robot.length
         if (np.abs(displacement) > length).any():
-            self._refuse(f"{topic} has {displacement.tolist()} m; no cable of a robot of {length:g} m is wound so far")
+            self._refuse(f"{topic} has {displacement.tolist()} m; at most the robot's length of {length:g} m is allowed")
             return
         self._wanted = displacement
 
     def _move_cables(self, interval: float) -> None:
-        """The model's cables toward where they are wanted, in `interval` s."""
+        """Move the model's cables toward the wanted displacements, for `interval` (s)."""
         if self._cables is None or self.parameters.cables_from != "command":
             self._cables = self._wanted
         else:
             self._cables = within_limits(self._wanted, self._cables, self.robot_file.robot.limits, _SPEED_MARGIN * interval)
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
-        self._look_at_cables()
+        self._read_cables()
         gravity = np.array([message.vector.x, message.vector.y, message.vector.z])
         if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
@@ -113,8 +119,10 @@ class FemSimulator(ManagedNode):
         self._move_cables(interval or _LONGEST_GAP)
         shape = self._shape(gravity, interval)
         if not np.isfinite(shape.tip_position).all():
-            self._simulator.reset()  # else the next step would begin at what is no shape
-            self._refuse(f"gravity {gravity.tolist()} m/s^2 and the cables have no shape; the simulator begins anew")
+            self._simulator.reset()  # otherwise the next step would start at an invalid shape
+            self._refuse(
+                f"gravity {gravity.tolist()} m/s^2 and the cable displacements give no finite shape; the simulator restarts"
+            )
             return
         message.header.frame_id = self.parameters.base_frame
         self._deformation.publish(deformation_message(shape, message.header))
@@ -133,17 +141,17 @@ class FemSimulator(ManagedNode):
         )
 
     def _shape(self, gravity: np.ndarray, interval: float | None) -> Shape:
-        """interval (s) since the last sample; None where that tells nothing."""
+        """Return the shape; interval: s since the last sample, or None when it is not known."""
         if not self._dynamic:
             return self._simulator.step(gravity, self._cables)
         if interval is None:
             return self._simulator.settle(gravity, self._cables)
         return self._simulator.step(gravity, self._cables, duration=interval)
 
-    def _show(self, shape, header) -> None:
+    def _show(self, shape: Shape, header: Header) -> None:
         rate = self.parameters.marker_rate
         stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
-        # A stamp that went back is a bag that began anew.
+        # A stamp that goes back means that a replay has restarted.
         if rate == 0.0 or 0.0 <= stamp - self._last_markers < 1.0 / rate:
             return
         self._last_markers = stamp
@@ -157,6 +165,7 @@ class FemSimulator(ManagedNode):
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(FemSimulator)
 
 

@@ -1,12 +1,17 @@
-"""inverse_controller: the cable displacements that bring the modelled robot to its target, one programme a deformation."""
+"""Node inverse_controller: computes the cable displacements that bring the model to its target.
+
+It solves one quadratic programme per deformation.
+"""
 
 import math
 import sys
 import time
+from collections.abc import Callable
 
 from geometry_msgs.msg import PoseStamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.time import Time
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
@@ -16,10 +21,10 @@ from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_tar
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
-# People read the status; the loop does not. A change of the code is told at once.
+# The status is for the user, not for the loop. A change of the code is published immediately.
 _STATUS_PERIOD = 0.1  # s
 _REFUSAL_SHOWN = 5.0  # s
-_INACTIVE = "not active, so nothing is sent: activate the node first"
+_INACTIVE = "the node is not active: activate it first"
 _LEVELS = {
     ControllerCode.INACTIVE: OK,
     ControllerCode.OK: OK,
@@ -29,13 +34,14 @@ _LEVELS = {
 
 
 class InverseController(ManagedNode):
-    """Solves for the cable displacements that keep the target shape."""
+    """Publishes the cable displacements that keep the target shape."""
 
     name = "inverse_controller"
     parameters_class = InverseControllerParameters
 
     def configure(self) -> None:
-        # Better now than at the first deformation.
+        """Compile the solver; create publishers and services."""
+        # Compile before the first deformation arrives.
         warm_up(self.robot_file.robot, self.parameters.inverse)
         self._problem = InverseProblem(self.robot_file.robot, self.parameters.inverse)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
@@ -49,9 +55,10 @@ class InverseController(ManagedNode):
         ]
 
     def activate(self) -> None:
+        """Reset the problem and subscribe."""
         self._problem.reset()
         self._last_stamp: float | None = None
-        self._told_code, self._told_at = None, 0.0
+        self._published_code, self._published_at = None, 0.0
         self._refusal, self._refused_at = "", -math.inf
         self._last_arrival = self.get_clock().now()
         self._inputs = [
@@ -59,23 +66,26 @@ class InverseController(ManagedNode):
             self.create_subscription(PoseStamped, "target", self._on_pose_target, COMMAND),
             self.create_subscription(ShapeTarget, "target/shape", self._on_shape_target, COMMAND),
         ]
-        self._watch = self.create_timer(0.5 * self.parameters.stale_after, self._watch_stream)
-        self._say(ControllerCode.INACTIVE, "waiting for robot/deformation")
+        self._watch = self.create_timer(0.5 * self.parameters.stale_after, self._check_stream)
+        self._publish_code(ControllerCode.INACTIVE, "waiting for robot/deformation")
 
     def deactivate(self) -> None:
+        """Unsubscribe; the motors hold."""
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
         self.destroy_timer(self._watch)
         self._refused_at = -math.inf
-        self._say(ControllerCode.INACTIVE, "not active")
+        self._publish_code(ControllerCode.INACTIVE, "not active")
 
     def cleanup(self) -> None:
+        """Destroy services and publishers."""
         for service in self._offered:
             self.destroy_service(service)
         self.destroy_publisher(self._command)
         self.destroy_publisher(self._status)
 
     def parameters_changed(self, old: InverseControllerParameters, new: InverseControllerParameters) -> None:
+        """Apply new options and a change of `enabled`."""
         if hasattr(self, "_problem"):
             self._problem.options = new.inverse
         if old.enabled != new.enabled:
@@ -93,16 +103,18 @@ class InverseController(ManagedNode):
     def _on_deformation(self, message: Deformation) -> None:
         self._last_arrival = self.get_clock().now()
         if message.status == Deformation.FAILED:
-            self._say(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
+            self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
             return
         try:
             response = response_of(message)
         except ValueError as error:
-            self._say(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
+            self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
             return
         if len(message.cable_tension) != len(self.robot_file.robot.cables):
             found, own = len(message.cable_tension), len(self.robot_file.robot.cables)
-            self._say(ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", message.header)
+            self._publish_code(
+                ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", message.header
+            )
             return
         interval = self._interval(message)
         if self._relaxing:
@@ -117,7 +129,9 @@ class InverseController(ManagedNode):
                 followed=message.status != Deformation.NOT_CONVERGED,
             )
         else:
-            self._say(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header)
+            self._publish_code(
+                ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header
+            )
             return
         self._command.publish(
             CableCommand(header=message.header, displacement=doubles(command.displacement), tension=doubles(command.tension))
@@ -125,18 +139,18 @@ class InverseController(ManagedNode):
         self._publish_status(command, message.header)
 
     def _interval(self, message: Deformation) -> float:
-        """Seconds since the last deformation by its stamps; a stamp that stands or goes back counts as one common step."""
+        """Return s between the stamps of this and the last deformation; 0.01 when the stamp has not increased."""
         stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
         interval = 0.01 if self._last_stamp is None else stamp - self._last_stamp
         self._last_stamp = stamp
         return interval if interval > 0.0 else 0.01
 
-    def _watch_stream(self) -> None:
+    def _check_stream(self) -> None:
         silence = (self.get_clock().now() - self._last_arrival).nanoseconds * 1e-9
         if silence > self.parameters.stale_after:
-            # Rates count from the displacement at which the cables were left: the bridge holds it.
+            # The rate limit restarts at the last displacements, which the bridge holds.
             self._last_stamp = None
-            self._say(ControllerCode.STALE, f"no robot/deformation for {silence:.1f} s: no command is sent")
+            self._publish_code(ControllerCode.STALE, f"no robot/deformation for {silence:.1f} s: no command is sent")
 
     # Targets and services.
 
@@ -147,7 +161,7 @@ class InverseController(ManagedNode):
     def _on_shape_target(self, message: ShapeTarget) -> None:
         self._take_target(message.header, lambda: shape_target(message, self.robot_file.robot.length))
 
-    def _take_target(self, header, make) -> None:
+    def _take_target(self, header: Header, make: Callable[[], Target]) -> None:
         if header.frame_id not in ("", self.parameters.frame):
             self._refuse(
                 f"the target is in the frame '{header.frame_id}'; '{self.parameters.frame}' is needed; the last one is kept"
@@ -161,10 +175,10 @@ class InverseController(ManagedNode):
             self._refuse(f"target refused: {error}; the last one is kept")
 
     def _refuse(self, sentence: str) -> None:
-        """Say it long enough to be seen."""
+        """Publish the refusal, and keep showing it for some seconds."""
         self._refusal, self._refused_at = sentence, time.monotonic()
         self.get_logger().warning(sentence, throttle_duration_sec=1.0)
-        self._say(ControllerCode.REFUSED, sentence)
+        self._publish_code(ControllerCode.REFUSED, sentence)
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if not self.is_active:
@@ -185,13 +199,13 @@ class InverseController(ManagedNode):
 
     # Status.
 
-    def _publish_status(self, command: Command, header) -> None:
+    def _publish_status(self, command: Command, header: Header) -> None:
         code, message = self._with_refusal(command.code, command.message)
         self.report(_LEVELS.get(code, WARN), message, solve_time_us=round(1e6 * command.solve_time))
         stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
-        if code == self._told_code and 0.0 <= stamp - self._told_at < _STATUS_PERIOD:
+        if code == self._published_code and 0.0 <= stamp - self._published_at < _STATUS_PERIOD:
             return
-        self._told_code, self._told_at = code, stamp
+        self._published_code, self._published_at = code, stamp
         self._status.publish(
             ControllerStatus(
                 header=header,
@@ -206,23 +220,24 @@ class InverseController(ManagedNode):
         )
 
     def _with_refusal(self, code: ControllerCode, sentence: str) -> tuple[ControllerCode, str]:
-        """What is told: a refusal stays for a while, also beside the reason why no command is sent, which comes again and again."""
+        """Return the status to publish: a refusal stays visible for a while, also together with a repeated other status."""
         if time.monotonic() - self._refused_at > _REFUSAL_SHOWN or self._refusal in sentence:
             return code, sentence
         if code in (ControllerCode.STALE, ControllerCode.INACTIVE, ControllerCode.SOLVER_FAILED):
             return code, f"{sentence}; {self._refusal}"
         return ControllerCode.REFUSED, self._refusal
 
-    def _say(self, code: ControllerCode, sentence: str, header=None) -> None:
+    def _publish_code(self, code: ControllerCode, sentence: str, header: Header | None = None) -> None:
         code, sentence = self._with_refusal(code, sentence)
         status = ControllerStatus(code=int(code), message=sentence)
         status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
-        self._told_code = None
+        self._published_code = None
         self._status.publish(status)
         self.report(_LEVELS.get(code, WARN), sentence)
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(InverseController)
 
 

@@ -1,4 +1,4 @@
-"""The deformed robot as markers for RViz: body, cables coloured by tension, gravity."""
+"""Markers of the deformed robot for RViz: body, cables coloured by tension, gravity."""
 
 import math
 
@@ -16,7 +16,7 @@ _GRAVITY_LENGTH = 0.04  # m, of the arrow for 9.81 m/s^2
 
 
 def markers_of(shape: Shape, robot: Robot, header: Header) -> MarkerArray:
-    """Body as beads along the backbone, one line a cable, the gravity arrow; all in `header.frame_id`."""
+    """Return the body as spheres along the backbone, one line per cable and the gravity arrow, all in `header.frame_id`."""
     diameter = max(segment.outer_diameter for segment in robot.segments) if robot.segments else 0.009
     body = _marker(header, "body", 0, Marker.SPHERE_LIST, _BODY, diameter)
     body.scale.y = body.scale.z = diameter
@@ -29,7 +29,7 @@ def markers_of(shape: Shape, robot: Robot, header: Header) -> MarkerArray:
 
 
 def _cable(header: Header, index: int, shape: Shape, robot: Robot) -> Marker:
-    # Blue when slack, red at a quarter of the limit: what compensation uses lies far below the limit.
+    # Blue: slack; red: a quarter of the limit or more, because compensation uses tensions far below the limit.
     heat = min(1.0, 4.0 * shape.cable_tension[index] / robot.limits.tension_max)
     marker = _marker(header, "cables", index, Marker.LINE_STRIP, (heat, 0.2, 1.0 - heat, 1.0), 0.0007)
     cable = robot.cables[index]
@@ -41,7 +41,7 @@ def _cable(header: Header, index: int, shape: Shape, robot: Robot) -> Marker:
 
 
 def _offset(cable: Cable, z: float) -> np.ndarray:
-    """Where the cable passes the cross-section at z, (x, y, 0) in the section's own axes."""
+    """Return the position (x, y, 0) of the cable in the axes of the cross-section at z (m)."""
     if cable.via_points is not None:
         via = np.array(cable.via_points)
         return np.array([np.interp(z, via[:, 2], via[:, 0]), np.interp(z, via[:, 2], via[:, 1]), 0.0])

@@ -1,6 +1,7 @@
-"""recorder: the graph's topics into a bag, as they come, without decoding them.
+"""Node recorder: writes the graph's topics into a bag without decoding the messages.
 
-Topics are found while it runs; each is subscribed as reliably as it is offered, and its offered QoS goes into the bag.
+It discovers topics while it runs, subscribes to each with the reliability that its publishers offer, and stores their QoS in
+the bag.
 """
 
 import importlib
@@ -12,7 +13,7 @@ from pathlib import Path
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, Qos
 
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.recorder import RecorderParameters
@@ -21,9 +22,9 @@ from gravcomp.recordings.bags.qos import offered_qos
 from gravcomp.recordings.bags.writing import BagWriter
 from gravcomp_node import ManagedNode, run
 
-_LOOK_INTERVAL = 0.25  # s, between looks for new topics
+_DISCOVERY_INTERVAL = 0.25  # s, between two searches for new topics
 _DEPTH = 1000
-_ANY = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=_DEPTH)  # takes from every publisher
+_ANY = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=_DEPTH)  # compatible with every publisher
 _GLOBAL = ("/tf", "/tf_static", "/clock", "/diagnostics", "/rosout", "/parameter_events")
 
 
@@ -34,31 +35,35 @@ class Recorder(ManagedNode):
     parameters_class = RecorderParameters
 
     def configure(self) -> None:
+        """Create the bag. Raises ConfigError when no folder is given, BagError when it cannot be created."""
         if not self.parameters.out:
             raise ConfigError("recorder: the parameter out is empty; the folder of the new bag is needed")
         self._bag = BagWriter(Path(self.parameters.out), self.parameters.flush_interval)
         self._wanted = {self.resolve_topic_name(topic) for topic in self.parameters.topics}
 
     def activate(self) -> None:
+        """Start to discover topics."""
         self._recorded: dict[str, _Recording] = {}
         self._refused: set[str] = set()
-        self._looking = self.create_timer(_LOOK_INTERVAL, self._look)
-        self._look()
+        self._discovery = self.create_timer(_DISCOVERY_INTERVAL, self._discover)
+        self._discover()
         self.get_logger().info(f"recording into {self._bag.path}")
 
     def deactivate(self) -> None:
-        self.destroy_timer(self._looking)
+        """Unsubscribe from all topics."""
+        self.destroy_timer(self._discovery)
         for recording in self._recorded.values():
             self.destroy_subscription(recording.subscription)
 
     def cleanup(self) -> None:
+        """Close the bag."""
         if hasattr(self, "_bag"):
             self._bag.close()
             self.get_logger().info(f"{self._bag.messages} messages in {self._bag.path}")
             del self._bag
 
-    def _look(self) -> None:
-        """Subscribe to what is new, and anew to what is offered otherwise; write what has waited."""
+    def _discover(self) -> None:
+        """Subscribe to new topics, and again to topics with changed QoS; write buffered messages to disk."""
         self._bag.flush()
         for topic, kinds in self.get_topic_names_and_types():
             if topic in self._refused or not self._belongs(topic):
@@ -95,13 +100,14 @@ class Recorder(ManagedNode):
     def _follow(self, recording: "_Recording", topic: str, offers: list[QoSProfile]) -> None:
         if recording.subscription is not None:
             self.destroy_subscription(recording.subscription)
-        # Who listens to a topic that nobody offers yet hears also whoever says one word there and goes, as `ros2 topic pub --once` does.
+        # A topic without a publisher is subscribed as well, to record a publisher that sends one message and exits (`ros2 topic
+        # pub --once`).
         recording.qos = _matching(offers) if offers else _ANY
 
         def write(message: bytes) -> None:
             if recording.connection is None:
-                said_by = [_stored(p.qos_profile) for p in self.get_publishers_info_by_topic(topic)]
-                recording.connection = self._bag.add_topic(topic, recording.type_name, said_by)
+                offered = [_stored(p.qos_profile) for p in self.get_publishers_info_by_topic(topic)]
+                recording.connection = self._bag.add_topic(topic, recording.type_name, offered)
             self._bag.write(recording.connection, time.time_ns(), message)
 
         recording.subscription = self.create_subscription(recording.kind, topic, write, recording.qos, raw=True)
@@ -109,17 +115,17 @@ class Recorder(ManagedNode):
 
 @dataclass
 class _Recording:
-    """A topic that goes into the bag."""
+    """A recorded topic."""
 
     kind: type
     type_name: str
-    connection: Connection | None = None  # None until the topic is offered, or something was said there
+    connection: Connection | None = None  # None until the topic has a publisher or a message
     qos: QoSProfile | None = None
     subscription: Subscription | None = None
 
 
 def _matching(offers: list[QoSProfile]) -> QoSProfile:
-    """The strongest QoS that all publishers offer."""
+    """Return the strongest QoS that all publishers offer."""
     reliable = all(q.reliability == ReliabilityPolicy.RELIABLE for q in offers)
     latched = all(q.durability == DurabilityPolicy.TRANSIENT_LOCAL for q in offers)
     return QoSProfile(
@@ -130,7 +136,7 @@ def _matching(offers: list[QoSProfile]) -> QoSProfile:
     )
 
 
-def _stored(q: QoSProfile):
+def _stored(q: QoSProfile) -> Qos:
     return offered_qos(q.reliability.name, q.durability.name, q.history.name, q.depth)
 
 
@@ -140,6 +146,7 @@ def _message_class(name: str) -> type:
 
 
 def main() -> int:
+    """Run the node; return the exit code."""
     return run(Recorder)
 
 

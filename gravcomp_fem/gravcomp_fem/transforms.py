@@ -1,5 +1,6 @@
-"""TF of the deformed robot, where tf2_msgs is installed (every ROS installation; not on PyPI)."""
+"""TF frames of the deformed robot, if tf2_msgs is installed (every ROS installation has it; it is not on PyPI)."""
 
+import numpy as np
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from std_msgs.msg import Header
@@ -14,18 +15,19 @@ except ImportError:
 
 
 class TransformPublisher:
-    """Publishes the tip and the backbone's points as frames below the base's."""
+    """Publishes the tip and the backbone points as child frames of the base."""
 
     def __init__(self, node: Node):
         self._node = node
         self._publisher = node.create_publisher(TFMessage, "/tf", 100) if TFMessage else None
 
     def destroy(self) -> None:
+        """Destroy the publisher."""
         if self._publisher:
             self._node.destroy_publisher(self._publisher)
 
     def publish(self, shape: Shape, header: Header, tip_frame: str) -> None:
-        """Frames `tip_frame` and `<base>_backbone_<i>`, where somebody listens; without tf2_msgs nothing."""
+        """Publish the frames `tip_frame` and `<base>_backbone_<i>`, if tf2_msgs is installed and /tf has a subscriber."""
         if not self._publisher or not self._publisher.get_subscription_count():
             return
         frames = [(tip_frame, shape.tip_position, shape.tip_orientation)]
@@ -34,7 +36,7 @@ class TransformPublisher:
         self._publisher.publish(TFMessage(transforms=[_transform(header, *frame) for frame in frames]))
 
 
-def _transform(header: Header, child: str, position, orientation) -> TransformStamped:
+def _transform(header: Header, child: str, position: np.ndarray, orientation: np.ndarray) -> TransformStamped:
     pose = pose_message(position, orientation)
     transform = TransformStamped(header=header, child_frame_id=child)
     transform.transform.translation.x = pose.position.x

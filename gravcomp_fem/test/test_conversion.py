@@ -108,14 +108,16 @@ from gravcomp_fem.conversion import deformation_message, response_of
 
 def signatures():
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("gravcomp.inverse")]
-    return {(name, str(s)) for module in modules for name, f in vars(module).items() if isinstance(f, Dispatcher) for s in f.signatures}
+    compiled = [(name, f) for module in modules for name, f in vars(module).items() if isinstance(f, Dispatcher)]
+    return {(name, str(signature)) for name, f in compiled for signature in f.signatures}
 
 robot = load_robot_file("article").robot
 warm_up(robot)
 before = signatures()
 assert before
 simulator, controller, cables = Simulator(robot), InverseController(robot), None
-targets = [straight_target(robot.length), bend_target(robot.length, 1, 0, tip_position_weight=1, backbone_station=[0.4], backbone_weight=[1])]
+bend = bend_target(robot.length, 1, 0, tip_position_weight=1, backbone_station=[0.4], backbone_weight=[1])
+targets = [straight_target(robot.length), bend]
 for target in targets:
     for gravity in ([0.0, 0.0, 9.81], [-9.81, 0.0, 0.0]):
         message = deformation_message(simulator.step(np.array(gravity), cables), Header())

@@ -1,4 +1,4 @@
-"""The layouts for RViz, Foxglove and PlotJuggler can be read, and show what exists: topics, services, and the fields of their messages."""
+"""The layouts for RViz, Foxglove and PlotJuggler are readable, and their topics, services and message fields exist."""
 
 import importlib
 import json
@@ -24,14 +24,14 @@ SHOWN_AS = {
 
 
 def topic_type(name: str) -> str:
-    """Of a topic, given with or without its slash at the front."""
+    """Return the type of a topic, given with or without its leading slash."""
     kind = TOPICS.get(name) or TOPICS.get(name.lstrip("/"))
     assert kind, f"no topic {name}"
     return kind
 
 
 def check_field(topic: str, path: list[str]) -> None:
-    """That a message of the topic has the field, e.g. ['cable_tension[5]'] or ['vector', 'x']."""
+    """Check that a message of the topic has the field, e.g. ['cable_tension[5]'] or ['vector', 'x']."""
     package, _, name = topic_type(topic).split("/")
     kind = getattr(importlib.import_module(f"{package}.msg"), name)
     for step in path:

@@ -1,4 +1,4 @@
-"""What people ask for on the page, carried out by the node: messages, service calls, bags; what is missing is told them."""
+"""The viewer sends the user's requests as messages, service calls and recordings, and reports a missing node."""
 
 import os
 import time
@@ -24,7 +24,7 @@ from gravcomp_node import COMMAND
 
 
 class Stand:
-    """The viewer and, where `whole`, all that it speaks to; what arrives there by topic or service."""
+    """The viewer and, if `whole`, simulated partners; `heard`: what they received by topic or service."""
 
     def __init__(self, folder, whole: bool = True):
         rclpy.init(args=["test", "--ros-args", "-p", "port:=8870", "-p", f"bag_folder:={folder}", "-p", "rate:=20.0"])
@@ -48,8 +48,8 @@ class Stand:
         for node in (self.viewer, self.other):
             self.executor.add_node(node)
         self.viewer.start()
-        # No browser looks: what would be shown there is kept here.
-        self.viewer._page.notify = lambda title, sentence, good=False: self.told.append((title, sentence, good))
+        # There is no browser: keep the notifications here.
+        self.viewer.sender.notify = lambda title, sentence, good=False: self.told.append((title, sentence, good))
 
     def _serve(self, name, value, answer):
         self.heard.setdefault(name, []).append(value)
@@ -57,7 +57,7 @@ class Stand:
         return answer
 
     def ask(self, request) -> None:
-        """As a control of the page does."""
+        """Put a request into the queue, as a control of the page does."""
         self.viewer._page._controls._requests.put(request)
 
     def until(self, done, what):
@@ -76,10 +76,11 @@ class Stand:
 @pytest.fixture
 def stand(tmp_path):
     stand = Stand(tmp_path)
-    publishers = (stand.viewer._shape_target, stand.viewer._base, stand.viewer._fault)
+    publishers = (stand.viewer.sender.shape_target, stand.viewer.sender.base, stand.viewer.sender.fault)
     stand.until(lambda: all(p.get_subscription_count() for p in publishers), "nobody listens to the viewer")
     stand.until(
-        lambda: all(c.service_is_ready() for n, c in stand.viewer._remote.items() if n != "can_bridge/release"), "no services"
+        lambda: all(c.service_is_ready() for n, c in stand.viewer.sender.services.items() if n != "can_bridge/release"),
+        "no services",
     )
     yield stand
     stand.close()
@@ -94,11 +95,11 @@ def test_a_bend_becomes_a_target(stand):
 
 
 def test_who_only_listens_is_no_virtual_robot(stand):
-    """A recorder subscribes to every topic: on hardware the page must not offer to tilt a base for that."""
-    assert stand.viewer._base.get_subscription_count() > 0
-    assert not stand.viewer._snapshot().virtual
+    """A recorder subscribes to every topic; on hardware the page must not offer to tilt the base because of it."""
+    assert stand.viewer.sender.base.get_subscription_count() > 0
+    assert not stand.viewer.observer.snapshot().virtual
     stand.other.create_publisher(Vector3Stamped, "truth/gravity", 10)
-    stand.until(lambda: stand.viewer._snapshot().virtual, "the virtual robot is not seen")
+    stand.until(lambda: stand.viewer.observer.snapshot().virtual, "the virtual robot is not seen")
 
 
 def test_the_last_of_many_tilts_turns_the_base(stand):
@@ -141,9 +142,9 @@ def test_a_fault_goes_to_the_virtual_robot_in_its_words(stand):
 
 def test_the_button_records_a_bag(stand, tmp_path):
     stand.ask(Record(True))
-    stand.until(lambda: stand.viewer._recorder is not None, "no recorder")
-    log = stand.viewer._recorder.log
-    stand.until(lambda: "recording into" in log.read_text(), "the recorder does not begin")
+    stand.until(lambda: stand.viewer.sender.recorder is not None, "no recorder")
+    log = stand.viewer.sender.recorder.log
+    stand.until(lambda: "recording into" in log.read_text(), "the recorder does not start")
     end = time.monotonic() + 2.0
     stand.until(lambda: time.monotonic() > end, "")
     stand.ask(Record(False))

@@ -1,0 +1,142 @@
+"""The viewer's subscriptions, and the snapshot of the graph that the page shows."""
+
+import time
+
+import numpy as np
+from geometry_msgs.msg import PoseArray, PoseStamped
+from gravcomp_node.polled import Polled, Received
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+
+from gravcomp.inverse import TargetError
+from gravcomp.view.backbone import arc_backbone
+from gravcomp.view.snapshot import Snapshot, TargetView
+from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target
+from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget
+from gravcomp_node import COMMAND, LATCHED
+
+_STREAM = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
+_LEVELS = {
+    ControllerStatus.INACTIVE: "off",
+    ControllerStatus.OK: "ok",
+    ControllerStatus.RELAXING: "ok",
+    ControllerStatus.SOLVER_FAILED: "error",
+}
+_MOTOR_STATES = {
+    getattr(CableState, name): name.lower()
+    for name in ("UNCONFIGURED", "INACTIVE", "HOMING", "ACTIVE", "HOLDING", "STOPPED", "FAULT")
+}
+# A stream without messages for longer is not shown.
+_STALE = 1.0  # s
+# A stamp that differs more from this clock comes from another clock: that of a replay or of another machine.
+_CLOCK_TOLERANCE = 10.0  # s
+
+
+class GraphObserver:
+    """Reads the newest message of each topic for a robot of `length` (m)."""
+
+    def __init__(self, node: LifecycleNode, length: float):
+        self._node, self._length = node, length
+        self._streams = {
+            "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
+            "command": Polled(node, CableCommand, "cable/command", _STREAM),
+            "motors": Polled(node, CableState, "cable/state", _STREAM),
+            "status": Polled(node, ControllerStatus, "controller/status", LATCHED),
+            "truth": Polled(node, PoseArray, "truth/backbone", _STREAM),
+            "target": Polled(node, PoseStamped, "target", COMMAND),
+            "shape": Polled(node, ShapeTarget, "target/shape", COMMAND),
+        }
+        self._target = TargetView(np.array([0.0, 0.0, length]), arc_backbone(length, 0.0, 0.0))
+        self._counted: tuple[float, int] | None = None
+        self._rate = 0.0
+
+    def destroy(self) -> None:
+        """Unsubscribe."""
+        for stream in self._streams.values():
+            stream.destroy()
+
+    def read(self) -> None:
+        """Read the messages since the last call."""
+        fresh = {name: stream.take() for name, stream in self._streams.items()}
+        self._take_target(fresh["target"], fresh["shape"])
+        self._measure_rate(fresh["deformation"])
+
+    def snapshot(self, recording: str = "") -> Snapshot:
+        """Return what the page shows; recording: path of the bag that is being recorded."""
+        deformation, motors, status, truth = (self._current(name) for name in ("deformation", "motors", "status", "truth"))
+        shown: dict = {}
+        if deformation:
+            d = deformation.message
+            shown.update(
+                backbone=backbone_of(d), gravity=np.array([d.gravity.x, d.gravity.y, d.gravity.z]),
+                tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
+                model=d.model, model_time=d.solve_time)  # fmt: skip
+        if motors:
+            m = motors.message
+            shown.update(
+                motors_tension=np.array(m.tension), motors_state=_MOTOR_STATES.get(m.state, "?"), motors_message=m.message
+            )
+        if status:
+            shown.update(status=status.message.message, status_level=_LEVELS.get(status.message.code, "warn"))
+        return Snapshot(
+            time=time.monotonic(),
+            truth=backbone_of_poses(truth.message) if truth else None,
+            target=self._target,
+            rate=self._rate,
+            delays=self._delays(),
+            recording=recording,
+            virtual=self._sees_virtual_robot(),
+            **shown,
+        )
+
+    def _sees_virtual_robot(self) -> bool:
+        """Return whether a virtual robot runs.
+
+        A recorder also subscribes to virtual/base_orientation, and a tracking system may publish truth/tip, but only the virtual
+        robot subscribes to the first and publishes truth/gravity.
+        """
+        return self._node.count_subscribers("virtual/base_orientation") > 0 and self._node.count_publishers("truth/gravity") > 0
+
+    def _current(self, name: str) -> Received | None:
+        received = self._streams[name].last
+        if received is None:
+            return None
+        # A latched status is valid until it is replaced.
+        return received if name == "status" or time.time_ns() - received.sent < _STALE * 1e9 else None
+
+    def _delays(self) -> dict[str, float]:
+        """Return s from the IMU sample to the message of each stage."""
+        delays = {}
+        for stage, name in (("model", "deformation"), ("command", "command"), ("motors", "motors")):
+            received = self._current(name)
+            if received is None or (stage == "motors" and received.message.state != CableState.ACTIVE):
+                continue
+            delay = (received.sent - Time.from_msg(received.message.header.stamp).nanoseconds) * 1e-9
+            if 0.0 <= delay < _CLOCK_TOLERANCE:
+                delays[stage] = delay
+        return delays
+
+    def _measure_rate(self, fresh: Received | None) -> None:
+        """Compute the model's rate (Hz) from the sequence numbers of its messages."""
+        now = time.monotonic()
+        if fresh is None:
+            if self._current("deformation") is None:
+                self._rate, self._counted = 0.0, None
+            return
+        if self._counted is None or fresh.number < self._counted[1]:
+            self._counted = now, fresh.number
+        elif now - self._counted[0] >= 1.0:
+            self._rate = (fresh.number - self._counted[1]) / (now - self._counted[0])
+            self._counted = now, fresh.number
+
+    def _take_target(self, pose: Received | None, shape: Received | None) -> None:
+        try:
+            if pose:
+                self._target = TargetView(pose_target(pose.message.pose, 1.0, 0.0).tip_position)
+            if shape:
+                target = shape_target(shape.message, self._length)
+                bent = arc_backbone(self._length, shape.message.bend_angle, shape.message.bend_plane)
+                self._target = TargetView(target.tip_position, bent if shape.message.bend else None)
+        except TargetError:
+            return  # the controller refuses it and reports it

@@ -1,0 +1,124 @@
+"""The user's requests on the page as messages, service calls and a recorder process."""
+
+import tempfile
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+from geometry_msgs.msg import QuaternionStamped
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from gravcomp.graph.parameters.viewer import ViewerParameters
+from gravcomp.launcher import LaunchError, NodeProcess, NodeSpec
+from gravcomp.view import requests
+from gravcomp.virtual.motion import base_orientation, quaternion
+from gravcomp_fem.conversion import bend_message
+from gravcomp_msgs.msg import ShapeTarget
+from gravcomp_node import COMMAND
+
+_SERVICES = {
+    "inverse_controller/enable": SetBool,
+    "inverse_controller/relax": Trigger,
+    "can_bridge/home": Trigger,
+    "can_bridge/stop": Trigger,
+    "can_bridge/release": Trigger,
+}
+
+
+class Notify(Protocol):
+    """Shows a title and a sentence on the page."""
+
+    def __call__(self, title: str, sentence: str, *, good: bool = False) -> None:
+        """Show it; good: it reports a success."""
+
+
+class RequestSender:
+    """Sends requests; reports answers and failures with `notify`.
+
+    Attributes: shape_target, base, fault (publishers), services (clients by name), recorder (its process, or None).
+    """
+
+    def __init__(self, node: LifecycleNode, parameters: ViewerParameters, notify: Notify):
+        self._node, self._parameters, self.notify = node, parameters, notify
+        self.shape_target = node.create_publisher(ShapeTarget, "target/shape", COMMAND)
+        self.base = node.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
+        faults = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
+        self.fault = node.create_publisher(String, "virtual/fault", faults)
+        self.services = {name: node.create_client(kind, name) for name, kind in _SERVICES.items()}
+        self.recorder: NodeProcess | None = None
+        self._bag = ""
+
+    def destroy(self) -> None:
+        """Destroy publishers and clients."""
+        for publisher in (self.shape_target, self.base, self.fault):
+            self._node.destroy_publisher(publisher)
+        for client in self.services.values():
+            self._node.destroy_client(client)
+
+    def send(self, request: requests.Request) -> None:
+        """Send one request."""
+        match request:
+            case requests.SetTarget(angle, plane):
+                message = bend_message(angle, plane, self._parameters.tip_direction_weight, self._parameters.frame)
+                message.header.stamp = self._node.get_clock().now().to_msg()
+                self.shape_target.publish(message)
+            case requests.TiltBase(inclination, roll):
+                self._tilt(inclination, roll)
+            case requests.InjectFault(text):
+                self.fault.publish(String(data=text))
+            case requests.Compensate("relax"):
+                self._call("inverse_controller/relax", Trigger.Request())
+            case requests.Compensate(mode):
+                self._call("inverse_controller/enable", SetBool.Request(data=mode == "compensate"))
+            case requests.BridgeService(name):
+                self._call(f"can_bridge/{name}", Trigger.Request())
+            case requests.Record(True):
+                self._start_recording()
+            case requests.Record(False):
+                self.stop_recording()
+
+    def current_bag(self) -> str:
+        """Return the path of the bag that is being recorded, or ''; report a recorder that has ended by itself."""
+        if self.recorder and self.recorder.exit_code is not None:
+            self.notify("Recording ended", self.recorder.why())
+            self.recorder = None
+        return self._bag if self.recorder else ""
+
+    def stop_recording(self) -> None:
+        """End a recording, if there is one."""
+        if self.recorder:
+            self.recorder.stop()
+            self.recorder = None
+            self.notify("Recorded", self._bag, good=True)
+
+    def _start_recording(self) -> None:
+        if self.recorder:
+            return
+        bag = Path(self._parameters.bag_folder or ".").resolve() / f"gravcomp_{datetime.now():%Y%m%d_%H%M%S}"
+        spec = NodeSpec("gravcomp_fem", "recorder", {"out": str(bag)}, self._node.get_namespace().rstrip("/"))
+        try:
+            self.recorder = NodeProcess(spec, Path(tempfile.gettempdir()) / f"{bag.name}.log")
+        except (LaunchError, OSError) as error:
+            self.notify("Not recording", str(error))
+            return
+        self._bag = str(bag)
+
+    def _tilt(self, inclination: float, roll: float) -> None:
+        message = QuaternionStamped()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        q = message.quaternion
+        q.x, q.y, q.z, q.w = map(float, quaternion(base_orientation(inclination, roll)))
+        self.base.publish(message)
+
+    def _call(self, name: str, request: Any) -> None:
+        client = self.services[name]
+        if not client.service_is_ready():
+            self.notify(name, "this service is not available: the node is not running")
+            return
+        client.call_async(request).add_done_callback(lambda future: self._show_answer(name, future.result()))
+
+    def _show_answer(self, name: str, answer: Any) -> None:
+        self.notify(name, answer.message or "done", good=answer.success)
