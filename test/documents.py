@@ -1,4 +1,4 @@
-"""The command lines that stand in the documents, for the tests that check and run them."""
+"""Command lines of the documents, for the tests that check and run them."""
 
 import re
 import shlex
@@ -12,25 +12,25 @@ NAMES = [str(path.relative_to(ROOT)) for path in DOCUMENTS]
 
 
 def blocks_of(text: str) -> list[str]:
-    """Lines of code blocks, without comments."""
+    """Return the lines of code blocks, without comments."""
     lines = re.findall(r"^ {4,7}(\S.*)$", text, re.MULTILINE)
     lines += [line for block in re.findall(r"```(?:bash|sh)?\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
     return [re.sub(r"\s+# .*", "", line).strip() for line in lines]
 
 
 def inline_of(text: str) -> list[str]:
-    """What stands between single backticks."""
+    """Return what stands between single backticks."""
     return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"```.*?```", "", text, flags=re.DOTALL))
 
 
 def code_of(path: Path) -> list[str]:
-    """Code lines, without comments, and inline code of a document."""
+    """Return the code lines, without comments, and the inline code of a document."""
     text = path.read_text()
     return blocks_of(text) + inline_of(text)
 
 
 def commands_of(path: Path) -> list[list[str]]:
-    """Every `./gravcomp ...` line with words, one for each alternative a|b."""
+    """Return the words of every `./gravcomp ...` line; a line with alternatives a|b gives one entry for each."""
     found = []
     for line in code_of(path):
         if not line.startswith("./gravcomp "):
@@ -42,15 +42,17 @@ def commands_of(path: Path) -> list[list[str]]:
 
 
 COMMAND_LINES = sorted({tuple(words) for path in DOCUMENTS for words in commands_of(path)})
-"""The words after ./gravcomp of every command line, mentions in the text included."""
+"""The words after ./gravcomp of every command line, including those in the running text."""
 
 TYPED = sorted({line for path in DOCUMENTS for line in blocks_of(path.read_text()) if re.match(r"(\./gravcomp|ros2) ", line)})
-"""Lines that stand in blocks of code, for the reader to type."""
+"""Lines in blocks of code, which the reader types."""
 
 
 def documented(line: str, **given: object) -> list[str]:
-    """The words of a line that the documents tell the reader to type, with values for what he puts in himself (FILE, ROBOT.yaml: by its
-    first word). A test that runs it this way is held to the documents, and they to it."""
+    """Return the words of a line that a document contains; fails when no document contains it.
+
+    given: values of the placeholders by their names without suffix (FILE, ROBOT for ROBOT.yaml).
+    """
     assert line in TYPED, f"no document says '{line}'"
     values = {name: str(value) for name, value in given.items()}
     return [values.get(word.partition(".")[0], word) for word in shlex.split(line)]

@@ -1,4 +1,4 @@
-"""What the documents say exists: commands with their options, links, topics, services, parameters, modules."""
+"""The documents name only what exists: commands with their options, links, topics, services, parameters, modules."""
 
 import argparse
 import ast
@@ -18,16 +18,16 @@ from gravcomp.description import shipped_robots
 from gravcomp.description.hardware import Hardware
 from gravcomp.graph.nodes import NODES, node
 
-# What stands for a value that the reader puts in.
+# Values for the placeholders of the documents.
 PLACEHOLDERS = {"COMMAND": "demo", "S": "10", "N": "1"}
 SUBCOMMANDS = {"bench": "engine", "reproduce": "static"}  # for NAME
-# Not the product's: calibrate takes it from a bag of the user's.
+# Not a topic of the product: calibrate reads it from a bag of the user.
 FOREIGN_TOPICS = {"measured/tip"}
 FOREIGN_PACKAGES = {"robot_state_publisher", "foxglove_bridge", "plotjuggler"}
 
 
 class StrictParser(argparse.ArgumentParser):
-    """Says what is wrong by an exception and takes no shortened options, in its subparsers as well."""
+    """A parser that raises ValueError and refuses abbreviated options, in its subparsers as well."""
 
     def __init__(self, **options):
         super().__init__(**{**options, "allow_abbrev": False})
@@ -37,7 +37,7 @@ class StrictParser(argparse.ArgumentParser):
 
 
 def filled(words: list[str]) -> list[str]:
-    """The words with values in place of the placeholders."""
+    """Return the words with values in place of the placeholders."""
     words = [PLACEHOLDERS.get(word, word) for word in words]
     return [SUBCOMMANDS.get(words[0], word) if word == "NAME" else word for word in words]
 
@@ -50,7 +50,7 @@ def test_there_are_commands_to_check():
 def test_a_command_line_names_what_exists(words):
     command, *rest = filled(list(words))
     assert command in COMMANDS or [command, *rest] == ["--version"]
-    if rest and rest != ["--help"]:  # a command alone may be meant as such
+    if rest and rest != ["--help"]:  # a command alone is only mentioned
         parse(parser_of(command, StrictParser), rest)
     for word in rest:
         if re.match(r"src/|test/", word):
@@ -82,7 +82,7 @@ def test_a_link_leads_somewhere(name):
 
 
 def parameters_of(executable: str) -> set[str]:
-    """Names of a node's ROS parameters."""
+    """Return the names of a node's ROS parameters."""
     return {leaf.key for leaf in node(executable).declared_parameters()}
 
 
@@ -91,7 +91,7 @@ def ports(*kinds: str) -> dict[str, str]:
 
 
 def executables_of(package: str) -> list[str]:
-    """What `ros2 run` finds in a package."""
+    """Return the executables of a package, by which `ros2 run` finds them."""
     return re.findall(r"^\s+\"(\w+) = ", (ROOT / package / "setup.py").read_text(), re.MULTILINE)
 
 
@@ -100,7 +100,7 @@ NODE_PARAMETERS = {key for entry in NODES for key in parameters_of(entry.executa
 
 
 def check_ros2(words: list[str]) -> None:
-    """Hold a `ros2 ...` line against the graph's interface."""
+    """Check that a `ros2 ...` line fits the interface of the graph."""
     match words[1:]:
         case ["run" | "launch", package, *_] if package in FOREIGN_PACKAGES:
             for word in words:
@@ -108,7 +108,8 @@ def check_ros2(words: list[str]) -> None:
                     assert (ROOT / word).exists(), f"{word} does not exist"
         case ["run", package, executable, *rest]:
             assert EXECUTABLES.get(executable) == package
-            names = {port.name for kind in ("subscribes", "publishes") for port in getattr(node(executable), kind)} | {"__ns", "__node"}
+            entry = node(executable)
+            names = {port.name for port in (*entry.subscribes, *entry.publishes)} | {"__ns", "__node"}
             for option, word in zip(rest, rest[1:]):
                 key = word.partition(":=")[0]
                 if option == "-p":
@@ -192,7 +193,7 @@ def test_modules_exist(name):
 
 
 def exists(dotted: str) -> bool:
-    """Whether `dotted` is a module, a name in a module, or an attribute of such a name."""
+    """Return whether `dotted` is a module, a name in a module, or an attribute of such a name."""
     try:
         if importlib.util.find_spec(dotted):
             return True
@@ -206,7 +207,7 @@ def exists(dotted: str) -> bool:
 
 
 def keys_of(section: object) -> set[str]:
-    """All keys of a YAML file, at any depth."""
+    """Return all keys of a YAML file, at any depth."""
     if isinstance(section, dict):
         return set(section) | {key for value in section.values() for key in keys_of(value)}
     return {key for value in section for key in keys_of(value)} if isinstance(section, list) else set()
@@ -220,7 +221,7 @@ DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time"}
 
 
 def glossary_names() -> list[str]:
-    """The names in the third column of the glossary's tables."""
+    """Return the names in the third column of the glossary's tables."""
     rows = [line for line in (ROOT / GLOSSARY).read_text().splitlines() if line.startswith("| ")]
     return sorted({word for row in rows for word in re.findall(r"`([^`]+)`", row.split(" | ")[2])})
 
@@ -241,7 +242,7 @@ def test_a_name_of_the_glossary_exists(name):
 
 
 def tree_of_the_core() -> list[list[str]]:
-    """The packages and modules of the core, line by line as src/README.md has them; without robots/, which holds data."""
+    """Return the packages and modules of the core, one list for each line of src/README.md; without robots/, which holds data."""
     rows = re.findall(r"^\| (`\S.*?) \|", (ROOT / "src/README.md").read_text(), re.MULTILINE)
     lines = [[name.strip("`/").removesuffix(".py") for name in row.split(", ")] for row in rows]
     return [[name for name in line if name != "robots"] for line in lines]
