@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Elements, load_robot_file
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
-from gravcomp.full_model.statics import CableInput
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 
 GRAVITY = np.array([-9.81, 0.0, 0.0])

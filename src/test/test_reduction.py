@@ -171,7 +171,7 @@ def test_measured_error_takes_the_reduced_model_out_of_service(built):
     serving = simulator._serving = ReducedServing(model, dataclasses.replace(serving.reduced, elasticity=wrong), simulator.solver)
     models = [simulator.step(np.array([-9.81, 0.0, 0.0])).model for _ in range(40)]
     assert models[-1] == "full"
-    assert "off by" in serving.reason
+    assert "the tip error of the reduced model is" in serving.reason
 
 
 def test_robots_without_polynomial_strain_are_refused_with_the_reason(robot, cache):

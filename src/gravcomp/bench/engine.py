@@ -12,8 +12,8 @@ import numpy as np
 
 from gravcomp.bench import engine_control
 from gravcomp.description import Robot, load_robot_file
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
-from gravcomp.full_model.statics import CableInput
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion

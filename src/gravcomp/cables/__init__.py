@@ -1,4 +1,4 @@
-"""Sliding tendons: where they run, how long they are, what they pull, and when they are slack."""
+"""Sliding tendons: routes, lengths, forces, and which cables are taut."""
 
 from gravcomp.compiled_functions import configure_numba
 

@@ -1,4 +1,4 @@
-"""Where a robot's cables run through its body at rest."""
+"""Routes of a robot's cables through its body at rest."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from gravcomp.description import Cable, Robot
 from gravcomp.mesh.embedding import Embedding, embed
 from gravcomp.mesh.mesh import Mesh, MeshError
 
-# How far outside its element a via point may lie, in local coordinates: facets cut a little off a round body.
+# Largest distance of a via point outside its element, in local coordinates: the facets of the mesh cut a little off a round body.
 _TOLERANCE = 0.1
 
 
 def route_cables(robot: Robot, mesh: Mesh) -> list[Embedding]:
-    """Via points of every cable, first to last, attached to the mesh.
+    """Return the via points of every cable, first to last, attached to the mesh.
 
-    A cable given by angle and radius slides through every station of the mesh between its start and its end.
+    A cable that is given by angle and radius slides through every station of the mesh between its start and its end.
     Raises MeshError for a cable that leaves the body.
     """
     routes = []
@@ -29,8 +29,10 @@ def route_cables(robot: Robot, mesh: Mesh) -> list[Embedding]:
 
 
 def _via_points(robot: Robot, cable: Cable, stations: np.ndarray) -> np.ndarray:
+    """Return the via points (p, 3) of a cable in m."""
     if cable.via_points is not None:
         return np.array(cable.via_points)
+    assert cable.angle is not None and cable.radius is not None  # a cable without via points has both
     end = robot.cable_end(cable)
     between = stations[(stations > cable.start + 1e-6 * robot.length) & (stations < end - 1e-6 * robot.length)]
     z = np.concatenate([[cable.start], between, [end]])

@@ -1,23 +1,23 @@
-"""Which cables are taut: complementarity of tension and slack.
+"""Complementarity of tension and slack: decides which cables are taut.
 
-A cable wound in by u allows a path no longer than L_0 - u. With the linear answer delta = W lambda + delta_free,
+A cable that is pulled in by u allows a path no longer than L_0 - u. With the linear response delta = W lambda + delta_free,
 
     lambda >= 0,    s = W lambda + delta_free - u >= 0,    lambda s = 0.
 
-W is positive definite, so there is exactly one solution; principal pivoting on the least index finds it in finitely many
-steps (Murty 1974), and starting from the last taut set it mostly takes one.
+W is positive definite, so there is exactly one solution. Principal pivoting with the least index finds it in finitely many steps
+(Murty 1974); started from the last taut set it usually takes one.
 """
 
 import numpy as np
 from numba import njit
 
-_SMALL = 1e-12  # m, of slack that is rounding
+_SMALL = 1e-12  # m of slack that is rounding error
 
 
 def taut_tensions(compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, taut: np.ndarray | None = None) -> np.ndarray:
-    """Tensions (m,) in N of cables wound in by `wound` (m,) in m; NaN there means released.
+    """Return the tensions (m,) in N of cables that are pulled in by `wound` (m,) in m; NaN: released.
 
-    compliance (m, m) in m/N; free (m,) displacements without tension in m; taut (m,) the guess of which are taut.
+    compliance (m, m) in m/N; free (m,): displacements without tension in m; taut (m,): first guess of the taut cables.
     """
     held = ~np.isnan(wound)
     guess = held & taut if taut is not None else np.zeros(len(free), dtype=np.bool_)
@@ -26,21 +26,24 @@ def taut_tensions(compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, t
 
 @njit(cache=True)
 def pivoted(compliance: np.ndarray, lack: np.ndarray, held: np.ndarray, taut: np.ndarray) -> np.ndarray:
-    """Tensions (m,) for the displacements lacking (m,); only what is `held` (m,) can be taut; the guess `taut` (m,) is changed."""
+    """Return the tensions (m,) in N.
+
+    lack (m,): missing displacement in m; held (m,): cables that can be taut; taut (m,): first guess, overwritten with the result.
+    """
     m = len(lack)
     tension = np.zeros(m)
     for _ in range(50 + 2**m):
         chosen = np.flatnonzero(taut)
         block, right = np.empty((len(chosen), len(chosen))), np.empty(len(chosen))
-        for a, i in enumerate(chosen):
-            right[a] = lack[i]
-            for b, j in enumerate(chosen):
-                block[a, b] = compliance[i, j]
+        for a in range(len(chosen)):
+            right[a] = lack[chosen[a]]
+            for b in range(len(chosen)):
+                block[a, b] = compliance[chosen[a], chosen[b]]
         tension[:] = 0.0
         if len(chosen):
             solved = np.linalg.solve(block, right)
-            for a, i in enumerate(chosen):
-                tension[i] = solved[a]
+            for a in range(len(chosen)):
+                tension[chosen[a]] = solved[a]
         wrong = -1
         for i in range(m):
             slack = compliance[i] @ tension - lack[i]

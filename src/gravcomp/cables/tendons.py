@@ -1,13 +1,13 @@
-"""Sliding tendons through via points: length, its exact Jacobian, and the stiffness that tension adds.
+"""Sliding tendons through via points: length, its exact Jacobian, and the geometric stiffness under tension.
 
-A cable runs straight between its via points P_k = sum_a w_ka x_a. With e_k = P_(k+1) - P_k = sum_a d_ka x_a, l_k = |e_k|
-and t_k = e_k / l_k, its displacement (pulled in is positive) and what it adds to the equilibrium are
+A cable runs straight between its via points P_k = sum_a w_ka x_a. With e_k = P_(k+1) - P_k = sum_a d_ka x_a, l_k = |e_k| and
+t_k = e_k / l_k, its displacement (positive: pulled in), its force and its stiffness are
 
     delta = sum_k (L_k - l_k),    H_a = d(delta)/dx_a = -sum_k d_ka t_k,    force = H^T lambda,
     K_ab  = lambda sum_k d_ka d_kb (I - t_k t_k^T) / l_k.
 
-With capstan friction the tension falls along the path, lambda_k = lambda exp(-+ mu theta_k) with the angle theta_k turned
-so far (Euler and Eytelwein): minus while the cable is pulled in, plus while it is let out.
+With capstan friction the tension changes along the path, lambda_k = lambda exp(-+ mu theta_k), where theta_k is the sum of the
+angles up to piece k (Euler and Eytelwein): minus while the cable is pulled in, plus while it is paid out.
 """
 
 import dataclasses
@@ -22,9 +22,11 @@ from gravcomp.mesh.embedding import Embedding
 
 @dataclasses.dataclass(frozen=True)
 class TendonState:
-    """At one shape: displacement (m,) in m; jacobian (m, n) of it by the unknowns; force_jacobian (m, n), whose transpose
-    times the tensions is the cables' force (the same array without friction); tangent (s, 3) and length (s,) of every
-    piece; share (s,) of the cable's tension in it.
+    """The cables at one shape.
+
+    displacement (m,) in m; jacobian (m, n): its derivative by the unknowns; force_jacobian (m, n): its transpose times the
+    tensions is the cables' force (without friction it is the same array); tangent (s, 3) and length (s,) of every piece; share
+    (s,): tension in the piece over tension of the cable.
     """
 
     displacement: np.ndarray
@@ -51,7 +53,7 @@ class Tendons:
         self._rest_length = np.zeros(self.count)
         self._rest_length = -self.state(rest).displacement
         stiffness = np.array([c.axial_stiffness or np.inf for c in cables])
-        # Elongation under unit tension, m/N: zero for an inextensible cable.
+        # m/N: elongation under unit tension, zero for an inextensible cable.
         self.axial_compliance = self._rest_length / stiffness
 
     @property
@@ -60,8 +62,9 @@ class Tendons:
         return self._rest_length
 
     def state(self, x: np.ndarray, pulling: np.ndarray | None = None) -> TendonState:
-        """Lengths and Jacobians at node positions x (n, 3); `pulling` (m,) is 1 for cables pulled in, -1 for let out, 0 for
-        no friction.
+        """Return the cables at node positions x (n, 3).
+
+        pulling (m,): 1 for a cable that is pulled in, -1 for one that is paid out, 0 for no friction.
         """
         count = len(self._cable)
         length, tangent = np.empty(count), np.empty((count, 3))
@@ -83,6 +86,7 @@ class Tendons:
         )  # fmt: skip
 
     def _shares(self, tangent: np.ndarray, friction: np.ndarray) -> np.ndarray:
+        """Return (s,) the tension in every piece over the tension of its cable; friction (m,) with its sign."""
         same = self._cable[1:] == self._cable[:-1]
         cosine = np.clip((tangent[1:] * tangent[:-1]).sum(axis=1), -1.0, 1.0)
         turn = np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)])
@@ -91,7 +95,7 @@ class Tendons:
         return np.exp(-friction[self._cable] * (turned - turned[first][self._cable]))
 
     def _scatter_positions(self, pieces: list, pattern: BlockPattern) -> np.ndarray:
-        """Where the 3 x 3 entries of each pair of nodes a >= b go; -1 where clamped or mirrored."""
+        """Return the positions of the 3 x 3 entries of each pair of nodes a >= b; -1 if clamped or mirrored."""
         rows, columns = [], []
         for nodes, _ in pieces:
             a, b = np.tril_indices(len(nodes))
@@ -113,7 +117,7 @@ class Tendons:
 
 
 def pieces_of(route: Embedding) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Nodes and weights d of every straight piece between neighbouring via points."""
+    """Return nodes and weights d of every straight piece between neighbouring via points."""
     pieces = []
     for k in range(len(route.nodes) - 1):
         nodes = np.concatenate([route.nodes[k + 1], route.nodes[k]])
@@ -126,7 +130,11 @@ def pieces_of(route: Embedding) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 @njit(cache=True)
-def _tendons(x, cable, first, nodes, weights, n_free, length, tangent, jacobian, path):
+def _tendons(
+    x: np.ndarray, cable: np.ndarray, first: np.ndarray, nodes: np.ndarray, weights: np.ndarray, n_free: int, length: np.ndarray,
+    tangent: np.ndarray, jacobian: np.ndarray, path: np.ndarray,
+) -> None:  # fmt: skip
+    """Write length and tangent of every piece and add them to the Jacobian and the path lengths of the cables."""
     e = np.empty(3)
     for k in range(len(cable)):
         e[:] = 0.0
@@ -144,7 +152,11 @@ def _tendons(x, cable, first, nodes, weights, n_free, length, tangent, jacobian,
 
 
 @njit(cache=True)
-def _force_jacobian(cable, first, nodes, weights, n_free, tangent, share, jacobian):
+def _force_jacobian(
+    cable: np.ndarray, first: np.ndarray, nodes: np.ndarray, weights: np.ndarray, n_free: int, tangent: np.ndarray,
+    share: np.ndarray, jacobian: np.ndarray,
+) -> None:  # fmt: skip
+    """Add the forces of unit tensions, with friction, to `jacobian` (m, n)."""
     for k in range(len(cable)):
         for q in range(first[k], first[k + 1]):
             if nodes[q] < n_free:
@@ -153,7 +165,11 @@ def _force_jacobian(cable, first, nodes, weights, n_free, tangent, share, jacobi
 
 
 @njit(cache=True)
-def _add_stiffness(cable, first, weights, tangent, length, share, tension, position, values):
+def _add_stiffness(
+    cable: np.ndarray, first: np.ndarray, weights: np.ndarray, tangent: np.ndarray, length: np.ndarray, share: np.ndarray,
+    tension: np.ndarray, position: np.ndarray, values: np.ndarray,
+) -> None:  # fmt: skip
+    """Add the geometric stiffness of all pieces to `values` at `position`."""
     block = np.empty((3, 3))
     entry = 0
     for k in range(len(cable)):

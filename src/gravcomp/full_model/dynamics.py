@@ -1,8 +1,8 @@
 """Motion of the full model under gravity and cables.
 
-Generalized-alpha (see `generalized_alpha`) with the consistent mass, damped by the materials' Kelvin-Voigt law and their creep
-(see `viscosity`); or, for parity with the article, by Rayleigh's alpha M + beta K alone, K being that of the start of the step. The
-cables' complementarity holds at the end of a step.
+Generalized-alpha integration (see `generalized_alpha`) with the consistent mass. Damping is either the Kelvin-Voigt law and the
+creep of the materials (see `viscosity`), or, for comparison with the article, Rayleigh's law (see `rayleigh`). The
+complementarity of the cables holds at the end of a step.
 """
 
 import dataclasses
@@ -10,58 +10,50 @@ import dataclasses
 import numpy as np
 
 from gravcomp.cables.tendons import TendonState
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
 from gravcomp.full_model.model import RobotModel
-from gravcomp.full_model.statics import CableInput
+from gravcomp.full_model.motion import Motion
+from gravcomp.full_model.rayleigh import RayleighDamping
 from gravcomp.full_model.viscosity import Viscosity
-from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 from gravcomp.mechanics.corotational import CorotationalElements
-from gravcomp.mechanics.total_lagrangian import ViscousStrain
+from gravcomp.mechanics.viscous_strain import ViscousStrain
 
-
-@dataclasses.dataclass
-class Motion:
-    """A state of motion: displacements u, velocity and acceleration (n, 3), tension (m,), the cables there, the forces g
-    (3 n_free,), the strains (k, p, 6) now and one step before and those held by the branch that creeps, that step in s, and the largest
-    force out of balance in N.
-    """
-
-    u: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    tension: np.ndarray
-    tendons: TendonState
-    force: np.ndarray
-    strain: np.ndarray
-    strain_before: np.ndarray
-    held: np.ndarray
-    step: float = 0.0
-    residual: float = 0.0
-    converged: bool = True
+_MOST_ITERATIONS = 16
+# A factor of another state is used again while each step is at most this fraction of the one before.
+_FACTOR_CONTRACTION = 0.25
 
 
 class DynamicSolver:
-    """Integrates a model's motion; it owns the matrices and the current state."""
+    """Integrates the motion of a model. Owns the matrices and the current `state`."""
 
-    def __init__(self, model: RobotModel, options: DynamicsOptions = DynamicsOptions(), tolerance: float = 1e-6):
-        """tolerance: correction of a node's displacement, as a fraction of the robot's length, that ends a step."""
+    def __init__(self, model: RobotModel, options: DynamicsOptions | None = None, tolerance: float = 1e-6):
+        """Start at rest with the straight robot.
+
+        options: default `DynamicsOptions()`; tolerance: correction of a node's displacement, as a fraction of the robot's
+        length, that ends a step. Raises ValueError for Kelvin-Voigt damping of corotational tetrahedra.
+        """
+        options = options or DynamicsOptions()
         if options.damping == "kelvin_voigt" and isinstance(model.elements, CorotationalElements):
             raise ValueError("corotational tetrahedra have no Kelvin-Voigt damping; choose damping 'rayleigh'")
         self.model = model
         self.options = options
         self._tolerance = tolerance * model.length
         self._matrix = model.new_matrix()
-        self._start = model.new_matrix()
         self._mass = model.mass_matrix()
         self._viscosity = Viscosity(model.mesh) if options.damping == "kelvin_voigt" else None
+        self._rayleigh = RayleighDamping(model, self._mass, options) if options.damping == "rayleigh" else None
         self.place(np.zeros_like(model.mesh.nodes))
 
-    def place(self, u: np.ndarray, tension: np.ndarray | None = None, gravity: np.ndarray = np.zeros(3)) -> None:
-        """Start at rest at the displacements `u` (n, 3) under `tension` (m,), with the acceleration that follows; the body has
-        crept as far as it does.
+    def place(self, u: np.ndarray, tension: np.ndarray | None = None, gravity: np.ndarray | None = None) -> None:
+        """Start at rest at the displacements u (n, 3), with the acceleration that the forces cause; creep has come to an end.
+
+        tension (m,) in N, default 0; gravity (3,) in m/s^2, default 0.
         """
         model = self.model
         tension = np.zeros(model.tendons.count) if tension is None else tension
+        gravity = np.zeros(3) if gravity is None else gravity
         tendons = model.tendons.state(model.mesh.nodes + u)
         force = self._forces(u, None, model.weight(gravity), tension, tendons)
         self._matrix.values[:] = self._mass.values
@@ -72,33 +64,35 @@ class DynamicSolver:
             u.copy(), np.zeros_like(u), acceleration, tension, tendons, force, strain, strain, np.zeros_like(strain)
         )
 
-    def go_on(self, u: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
-        """Take over a motion that another model found: displacements, velocity and acceleration (n, 3), tension (m,).
+    def take_over(self, u: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
+        """Continue a motion of another model: displacements, velocity and acceleration (n, 3), tension (m,).
 
-        The forces are taken to be those that the acceleration needs; this model's own would jar its highest frequencies.
+        The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         model = self.model
-        force, drag = -self._mass.multiply(model.free(acceleration)), self._rayleigh(u)
-        if drag:
-            force -= drag(model.free(velocity))
+        force = -self._mass.multiply(model.free(acceleration))
+        if self._rayleigh:
+            self._rayleigh.update(u)
+            force -= self._rayleigh.force(model.free(velocity))
         strain = model.elements.strains(u)
         tendons = model.tendons.state(model.mesh.nodes + u)
         self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, strain, np.zeros_like(strain))
 
     def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> Motion:
-        """One step of h seconds; `converged` is False when Newton's method did not settle, the state is then the old one."""
+        """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one."""
         model, last = self.model, self.state
         scheme = GeneralizedAlpha.of(h, self.options.spectral_radius)
-        drag = self._rayleigh(last.u)
+        if self._rayleigh:
+            self._rayleigh.update(last.u)
         viscous = self._viscous(h)
         weight = model.weight(gravity)
         u = last.u.copy()
         velocity_0, acceleration_0 = scheme.predict(model.free(last.velocity), model.free(last.acceleration))
-        # Newton starts where the step does: a straight prediction would stretch a turning body, and the stress of that
-        # stretch could make the tangent indefinite.
+        # Newton starts at the displacements of the last step: a straight prediction would stretch a rotating body, and the
+        # stress of that stretch could make the tangent indefinite.
         tension, tendons = last.tension, last.tendons
         factor, origin, size = None, last.u, np.inf
-        for _ in range(16):
+        for _ in range(_MOST_ITERATIONS):
             if factor is None:
                 factor = self._factor(u, viscous, tension, tendons, scheme, origin)
                 if factor is None:
@@ -112,8 +106,8 @@ class DynamicSolver:
             force = self._forces(u, viscous, weight, tension, tendons)
             middle = (1.0 - scheme.alpha_m) * acceleration + scheme.alpha_m * model.free(last.acceleration)
             out = self._mass.multiply(middle) + (1.0 - scheme.alpha_f) * force + scheme.alpha_f * last.force
-            if drag:
-                out += drag((1.0 - scheme.alpha_f) * velocity + scheme.alpha_f * model.free(last.velocity))
+            if self._rayleigh:
+                out += self._rayleigh.force((1.0 - scheme.alpha_f) * velocity + scheme.alpha_f * model.free(last.velocity))
             y = factor.solve(-out)
             free = tendons.displacement + jacobian @ y - (jacobian @ answer) @ tension
             wanted = cables.tensions(compliance, free, tension > 0.0)
@@ -121,7 +115,7 @@ class DynamicSolver:
             length = float(np.abs(step).max())
             if not np.isfinite(length):
                 break
-            if not fresh and length > 0.25 * size:  # a factor of elsewhere: it would lead astray
+            if not fresh and length > _FACTOR_CONTRACTION * size:
                 factor = None
                 continue
             fresh = False
@@ -134,7 +128,24 @@ class DynamicSolver:
         self.state = dataclasses.replace(last, converged=False)
         return self.state
 
-    def _finish(self, u, tension, tendons, viscous, weight, scheme: GeneralizedAlpha, residual: float) -> Motion:
+    def energy(self, gravity: np.ndarray) -> float:
+        """Return kinetic, elastic and potential energy in J of the present state under gravity (3,)."""
+        model, state = self.model, self.state
+        velocity = model.free(state.velocity)
+        kinetic = 0.5 * velocity @ self._mass.multiply(velocity)
+        return float(kinetic + model.elements.energy(state.u) - model.free(state.u) @ model.weight(gravity))
+
+    def _finish(
+        self,
+        u: np.ndarray,
+        tension: np.ndarray,
+        tendons: TendonState,
+        viscous: ViscousStrain | None,
+        weight: np.ndarray,
+        scheme: GeneralizedAlpha,
+        residual: float,
+    ) -> Motion:
+        """Set and return the state at the end of a converged step."""
         model, last = self.model, self.state
         velocity_0, acceleration_0 = scheme.predict(last.velocity, last.acceleration)
         velocity = velocity_0 + scheme.velocity_rate * (u - last.u)
@@ -145,47 +156,42 @@ class DynamicSolver:
         self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, last.strain, held, scheme.h, residual)
         return self.state
 
-    def energy(self, gravity: np.ndarray) -> float:
-        """Kinetic, elastic and potential energy in J of the present state under `gravity` (3,)."""
-        model, state = self.model, self.state
-        velocity = model.free(state.velocity)
-        kinetic = 0.5 * velocity @ self._mass.multiply(velocity)
-        return float(kinetic + model.elements.energy(state.u) - model.free(state.u) @ model.weight(gravity))
-
     def _viscous(self, h: float) -> ViscousStrain | None:
-        """Damping and creep in a step of h seconds from the present state; None where Rayleigh's law damps."""
+        """Return damping and creep of a step of h seconds from the present state; None with Rayleigh damping."""
         if self._viscosity is None:
             return None
         last = self.state
-        alike = abs(last.step - h) <= 1e-9 * h
-        return self._viscosity.step(last.strain, last.strain_before if alike else None, last.held, h)
+        same_step = abs(last.step - h) <= 1e-9 * h
+        return self._viscosity.step(last.strain, last.strain_before if same_step else None, last.held, h)
 
-    def _forces(self, u, viscous: ViscousStrain | None, weight, tension, tendons) -> np.ndarray:
-        """g = f_int - f_weight - H^T lambda (3 n_free,), f_int with the materials' damping and creep."""
+    def _forces(
+        self, u: np.ndarray, viscous: ViscousStrain | None, weight: np.ndarray, tension: np.ndarray, tendons: TendonState
+    ) -> np.ndarray:
+        """Return g = f_int - f_weight - H^T lambda (3 n_free,) in N; f_int includes the materials' damping and creep."""
         pull = tension @ tendons.force_jacobian if tension.any() else 0.0
         return self.model.free(self.model.elements.internal_force(u, viscous)) - weight - pull
 
-    def _rayleigh(self, u: np.ndarray):
-        """The function velocity (3 n_free,) -> (alpha M + beta K(u)) velocity; None where the materials damp."""
-        options = self.options
-        if options.damping != "rayleigh":
-            return None
-        self._start.values[:] = 0.0
-        self.model.elements.assemble(u, self._start)
-        self._start.values *= options.rayleigh_stiffness
-        self._start.values += options.rayleigh_mass * self._mass.values
-        return self._start.multiply
+    def _factor(
+        self,
+        u: np.ndarray,
+        viscous: ViscousStrain | None,
+        tension: np.ndarray,
+        tendons: TendonState,
+        scheme: GeneralizedAlpha,
+        origin: np.ndarray,
+    ) -> BlockCholesky | None:
+        """Return the factorised matrix of a step; None if it is not positive definite.
 
-    def _factor(self, u, viscous: ViscousStrain | None, tension, tendons, scheme: GeneralizedAlpha, origin: np.ndarray):
-        """The factorised matrix of a step; None when it is not positive definite even without the cables' stiffness."""
+        The stiffness of the cables is left out if the matrix is positive definite only without it.
+        """
         model = self.model
         for with_cables in (True, False):
             self._matrix.values[:] = 0.0
             model.elements.assemble(u, self._matrix, viscous, origin)
             if with_cables and tension.any():
                 model.tendons.add_stiffness(tendons, tension, self._matrix)
-            if self.options.damping == "rayleigh":
-                self._matrix.values += scheme.velocity_rate * self._start.values
+            if self._rayleigh:
+                self._rayleigh.add_to(self._matrix, scheme.velocity_rate)
             self._matrix.values *= 1.0 - scheme.alpha_f
             self._matrix.values += (1.0 - scheme.alpha_m) * scheme.acceleration_rate * self._mass.values
             try:

@@ -1,4 +1,4 @@
-"""The cross-sections of a mesh that are observed, and how they change with the unknowns; `observe` makes tip and backbone of them."""
+"""Observed cross-sections of a mesh and their derivatives. `observation.observe` computes tip and backbone from them."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from gravcomp.mesh.sections import section_functionals
 
 
 class Effectors:
-    """Tip and backbone of a mesh whose free nodes come first. station (n,): 0 at the base to 1 at the tip."""
+    """Sections at tip and backbone of a mesh whose free nodes come first. station (n,): 0 at the base to 1 at the tip."""
 
     def __init__(self, mesh: Mesh, station: np.ndarray):
         from scipy.sparse import csr_matrix
@@ -20,11 +20,11 @@ class Effectors:
         self._free_rows = csr_matrix(rows[:, : self.n_free])
 
     def sections(self, x: np.ndarray) -> np.ndarray:
-        """(n + 1, 3, 3) at node positions x (n, 3): p, f_1, f_2 of every backbone point and, last, of the tip."""
+        """Return (n + 1, 3, 3) p, f_1, f_2 of every backbone point and, last, of the tip, at node positions x (n, 3)."""
         return (self._rows @ x).reshape(-1, 3, 3)
 
     def section_changes(self, change: np.ndarray) -> np.ndarray:
-        """(n + 1, 3, 3, k) changes of the sections for changes (3 n_free, k) of the unknowns."""
+        """Return (n + 1, 3, 3, k) changes of the sections for changes (3 n_free, k) of the unknowns."""
         columns = change.shape[1]
         moved = self._free_rows @ change.reshape(self.n_free, 3 * columns)
         return moved.reshape(len(self.station) + 1, 3, 3, columns)

@@ -3,8 +3,8 @@
     M a_(n+1-alpha_m) + (1 - alpha_f) g_(n+1) + alpha_f g_n = 0,     g = f_int - f_weight - H^T lambda,
     q_(n+1) = q_n + h v_n + h^2 ((1/2 - beta) a_n + beta a_(n+1)),   v_(n+1) = v_n + h ((1 - gamma) a_n + gamma a_(n+1)).
 
-Second order, unconditionally stable; the spectral radius rho says how much of the highest frequencies is left after a
-step: 1 keeps all, 0 none. Low frequencies are hardly damped, unlike by implicit Euler.
+Second order and unconditionally stable. The spectral radius rho is the factor by which a step multiplies the highest
+frequencies: 1 keeps them, 0 removes them. Unlike with implicit Euler, low frequencies are hardly damped.
 """
 
 import dataclasses
@@ -16,14 +16,14 @@ from gravcomp.config import parameter
 
 @dataclasses.dataclass(frozen=True)
 class DynamicsOptions:
-    """How motion is integrated and damped."""
+    """Options of integration and damping."""
 
-    time_step: float = parameter(10.0, edge="ms", minimum=0.01, maximum=100.0, description="longest step of integration")
-    spectral_radius: float = parameter(0.9, minimum=0.0, maximum=1.0, description="what a step leaves of the highest frequencies")
+    time_step: float = parameter(10.0, edge="ms", minimum=0.01, maximum=100.0, description="longest time step of the integration")
+    spectral_radius: float = parameter(0.9, minimum=0.0, maximum=1.0, description="factor of a step on the highest frequencies")
     damping: str = parameter(
         "kelvin_voigt",
         choices=("kelvin_voigt", "rayleigh"),
-        description="objective damping by the materials' damping time, or alpha M + beta K as the article has it",
+        description="objective damping by the materials' damping time, or alpha M + beta K as in the article",
     )
     rayleigh_mass: float = parameter(0.1, unit="1/s", minimum=0.0, maximum=1e4, description="alpha of Rayleigh damping")
     rayleigh_stiffness: float = parameter(0.1, unit="s", minimum=0.0, maximum=1e3, description="beta of Rayleigh damping")
@@ -31,7 +31,7 @@ class DynamicsOptions:
 
 @dataclasses.dataclass(frozen=True)
 class GeneralizedAlpha:
-    """The scheme's coefficients for a step of h seconds."""
+    """Coefficients of the scheme for a step of h seconds."""
 
     h: float
     alpha_m: float
@@ -41,7 +41,7 @@ class GeneralizedAlpha:
 
     @staticmethod
     def of(h: float, spectral_radius: float) -> "GeneralizedAlpha":
-        """The optimal coefficients for a spectral radius."""
+        """Return the optimal coefficients for a spectral radius."""
         alpha_m = (2.0 * spectral_radius - 1.0) / (spectral_radius + 1.0)
         alpha_f = spectral_radius / (spectral_radius + 1.0)
         return GeneralizedAlpha(h, alpha_m, alpha_f, 0.25 * (1.0 - alpha_m + alpha_f) ** 2, 0.5 - alpha_m + alpha_f)
@@ -57,6 +57,6 @@ class GeneralizedAlpha:
         return 1.0 / (self.beta * self.h**2)
 
     def predict(self, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Velocity and acceleration at the end of the step if the displacement stayed what it is."""
+        """Return velocity and acceleration at the end of the step for an unchanged displacement."""
         after = -velocity / (self.beta * self.h) + (1.0 - 0.5 / self.beta) * acceleration
         return velocity + self.h * ((1.0 - self.gamma) * acceleration + self.gamma * after), after

@@ -1,6 +1,6 @@
-"""Everything about a robot that does not change while it moves: mesh, elements, cables, sections, weights.
+"""The constant part of a robot's model: mesh, elements, cables, sections, weights.
 
-Nodes are numbered level by level from the clamp, the clamped ones last; the unknowns q are the first `n_free` rows of the
+Nodes are numbered level by level from the clamp, the clamped nodes last. The unknowns q are the first `n_free` rows of the
 displacements u (n, 3), component by component within a node.
 """
 
@@ -19,12 +19,15 @@ from gravcomp.mesh import Mesh, body_mesh
 class RobotModel:
     """The finite-element model of a robot.
 
-    robot, mesh (renumbered), pattern (of the stiffness), elements, tendons, effectors, nodal_weight (n,) in kg: what
-    gravity pulls at each node, the payload included; n_free: number of free nodes.
+    Attributes: robot; mesh, renumbered; pattern of the stiffness; elements; tendons; effectors; body_weight and nodal_weight
+    (n,): mass in kg that gravity acts on at each node, without and with the payload; n_free: number of free nodes; length in m.
     """
 
     def __init__(self, robot: Robot, mesh: Mesh | None = None):
-        """`mesh` replaces the one that the robot's description gives. Raises MeshError."""
+        """Build the model; `mesh` replaces the mesh of the robot's description.
+
+        Raises MeshError for a body that cannot be meshed, a cable outside the body and parts that are not connected to the base.
+        """
         self.robot = robot
         mesh = mesh or body_mesh(robot)
         routes = route_cables(robot, mesh)
@@ -47,11 +50,11 @@ class RobotModel:
         return float(self.nodal_weight.sum())
 
     def new_matrix(self) -> BlockMatrix:
-        """Storage for a stiffness matrix."""
+        """Return storage for a stiffness matrix."""
         return BlockMatrix(self.pattern)
 
     def mass_matrix(self) -> BlockMatrix:
-        """The consistent mass of body and payload."""
+        """Return the consistent mass of body and payload."""
         matrix = self.new_matrix()
         self.elements.add_mass(matrix, 1.0)
         if self.robot.payload.mass > 0.0:
@@ -64,9 +67,9 @@ class RobotModel:
         return matrix
 
     def free(self, field: np.ndarray) -> np.ndarray:
-        """The unknowns (3 n_free,) of a field on all nodes (n, 3); a view where that is possible."""
+        """Return the unknowns (3 n_free,) of a field on all nodes (n, 3), as a view if the field is contiguous."""
         return field[: self.n_free].reshape(-1)
 
     def weight(self, gravity: np.ndarray) -> np.ndarray:
-        """(3 n_free,) forces of `gravity` (3,) in N."""
+        """Return the forces (3 n_free,) of gravity (3,) in N."""
         return np.outer(self.nodal_weight[: self.n_free], gravity).reshape(-1)

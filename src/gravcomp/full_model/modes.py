@@ -1,4 +1,4 @@
-"""Vibration of the straight robot: K phi = omega^2 M phi."""
+"""Vibration modes of the straight robot, K phi = omega^2 M phi, by shift-invert Lanczos iteration (SciPy's `eigsh`)."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from gravcomp.full_model.model import RobotModel
 
 
 def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
-    """(count,) the lowest natural frequencies in Hz, undamped, without cables and gravity."""
+    """Return the `count` lowest natural frequencies in Hz, without damping, cables and gravity."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     n = model.pattern.n
@@ -14,9 +14,9 @@ def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
     model.elements.assemble(np.zeros_like(model.mesh.nodes), stiffness)
     mass = model.mass_matrix()
     factor = stiffness.factor()
-    start = model.weight(np.array([1.0, 1.0, 1.0]))  # any start that every mode takes part in; a fixed one repeats
+    start = model.weight(np.array([1.0, 1.0, 1.0]))  # contains every mode; fixed, so that results repeat
     values = eigsh(
-        LinearOperator((n, n), matvec=lambda x: x, dtype=float),  # not used: the inverse below stands for it
+        LinearOperator((n, n), matvec=lambda x: x, dtype=float),  # not used: `OPinv` replaces it
         k=count,
         M=LinearOperator((n, n), matvec=mass.multiply, dtype=float),
         sigma=0.0,

@@ -1,7 +1,7 @@
-"""Tip and backbone from cross-sections: positions, orientations, and how they change; compiled, because it runs in every step.
+"""Positions and orientations of tip and backbone from cross-sections, with derivatives. Compiled, because it runs in every step.
 
-A section is p, f_1, f_2 (`mesh.sections`). Its z axis is d = f_1 x f_2 / |f_1 x f_2|; its x and y axes are as near to
-f_1 and f_2 as a rotation allows: x halves the right angle's misfit between f_1 and f_2 x d.
+A section is p, f_1, f_2 (`mesh.sections`). Its z axis is d = f_1 x f_2 / |f_1 x f_2|. Its x axis halves the angle between f_1
+and f_2 x d, so that x and y are as near to f_1 and f_2 as a rotation allows.
 """
 
 import numpy as np
@@ -9,10 +9,11 @@ from numba import njit
 
 
 @njit(cache=True)
-def observe(sections, moved):
-    """Effector rows (6 + 3 n,), their changes (6 + 3 n, k) and quaternions (n + 1, 4) x y z w.
+def observe(sections: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return effector rows (6 + 3 n,), their changes (6 + 3 n, k) and quaternions (n + 1, 4) x y z w.
 
     sections (n + 1, 3, 3): p, f_1, f_2 of every backbone point and, last, of the tip; moved (n + 1, 3, 3, k): their changes.
+    The rows are tip position, tip direction, backbone positions.
     """
     count, columns = sections.shape[0] - 1, moved.shape[3]
     values = np.empty(6 + 3 * count)
@@ -42,14 +43,15 @@ def observe(sections, moved):
 
 
 @njit(cache=True)
-def _cross(a, b, out):
+def _cross(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
-def _normalise(a):
+def _normalise(a: np.ndarray) -> float:
+    """Scale a (3,) to length 1 and return its length before."""
     length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     for i in range(3):
         a[i] /= length
@@ -57,7 +59,8 @@ def _normalise(a):
 
 
 @njit(cache=True)
-def _quaternion(f1, f2, z, out):
+def _quaternion(f1: np.ndarray, f2: np.ndarray, z: np.ndarray, out: np.ndarray) -> None:
+    """Write the quaternion (4,) x y z w of a section with f_1, f_2 and the axis z."""
     x, y, other = f1.copy(), f2.copy(), np.empty(3)
     _normalise(x)
     _normalise(y)
@@ -66,7 +69,7 @@ def _quaternion(f1, f2, z, out):
         x[i] += other[i]
     _normalise(x)
     _cross(z, x, y)
-    # Shepperd's method: from the largest of the four squares.
+    # Shepperd's method starts from the largest of the four squares.
     squares = (1 + x[0] - y[1] - z[2], 1 - x[0] + y[1] - z[2], 1 - x[0] - y[1] + z[2], 1 + x[0] + y[1] + z[2])
     largest = 0
     for i in range(1, 4):
@@ -81,7 +84,7 @@ def _quaternion(f1, f2, z, out):
     else:
         out[0], out[1], out[2], out[3] = y[2] - z[1], z[0] - x[2], x[1] - y[0], squares[3]
     length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
-    if out[3] < 0.0:  # of the two quaternions of a rotation the one with positive w
+    if out[3] < 0.0:  # choose the quaternion with positive w
         length = -length
     for i in range(4):
         out[i] /= length

@@ -1,6 +1,6 @@
-"""What a simulator gives: the robot's shape, and the linear answer of this shape to the cables.
+"""Output of a simulator: the robot's shape and its linear response to the cables.
 
-n: points of the backbone, m: cables, e = 6 + 3 n rows of the effector in this order: tip position (3, m), tip direction
+n: points of the backbone; m: cables; e = 6 + 3 n rows of the effector in this order: tip position (3, m), tip direction
 (3, unit vector along the robot at its tip), backbone positions (3 n, m). Frame `soft_base`, SI.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class ShapeStatus(enum.IntEnum):
-    """How a shape came about; the numbers are those of the message Deformation."""
+    """Origin of a shape; the numbers are those of the message Deformation."""
 
     OK = 0
     FALLBACK = 1
@@ -21,8 +21,9 @@ class ShapeStatus(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Linearised at a shape: displacement = compliance_aa tension + displacement_free,
-    effector = compliance_ea tension + effector_free.
+    """Linear response to the cables at a shape.
+
+    displacement = compliance_aa tension + displacement_free, effector = compliance_ea tension + effector_free.
     """
 
     compliance_aa: np.ndarray  # (m, m) m/N
@@ -33,7 +34,7 @@ class Response:
 
 @dataclasses.dataclass(frozen=True)
 class Shape:
-    """A robot's shape."""
+    """The robot's shape under a load."""
 
     tip_position: np.ndarray  # (3,) m
     tip_orientation: np.ndarray  # (4,) x y z w
@@ -53,11 +54,11 @@ class Shape:
 
     @property
     def is_equilibrium(self) -> bool:
-        """False where none was found for the load: this is the last one then."""
+        """Whether the shape is an equilibrium of its load; False: none was found, and this is the last shape."""
         return self.status in (ShapeStatus.OK, ShapeStatus.FALLBACK)
 
     @property
     def tip_direction(self) -> np.ndarray:
-        """(3,) unit vector along the robot at its tip."""
+        """Unit vector (3,) along the robot at its tip."""
         x, y, z, w = self.tip_orientation
         return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])

@@ -1,23 +1,24 @@
-"""What the material adds to its elastic stress in motion: Kelvin-Voigt damping, and one Maxwell branch that creeps.
+"""Viscous stress of the materials in motion: Kelvin-Voigt damping and one Maxwell branch that creeps.
 
     S = S_elastic(E) + C : (beta dE/dt + rho H),      dH/dt = dE/dt - H / T,
 
-H is the strain that the branch still holds: rho of the stiffness more at once, nothing of it after some T. Over a step of h the rate of
-strain is the second backward difference, dE/dt = (3 E_(n+1) - 4 E_n + E_(n-1)) / (2 h), and H what a steady rate makes of it,
+H is the strain that the branch still holds: the body is stiffer by the fraction rho at first, and that stiffness creeps away
+within some T. Over a step of length h the rate of strain is the second backward difference, dE/dt = (3 E_(n+1) - 4 E_n +
+E_(n-1)) / (2 h), and H follows from a constant rate,
 
     H_(n+1) = e^-x H_n + g (E_(n+1) - E_n),      x = h / T,   g = (1 - e^-x) / x,
 
-so that both are linear in the strain at the step's end, as `ViscousStrain` has it.
+so both are linear in the strain at the end of the step, as `ViscousStrain` needs.
 """
 
 import numpy as np
 
-from gravcomp.mechanics.total_lagrangian import ViscousStrain
+from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import Mesh
 
 
 class Viscosity:
-    """The laws of a mesh's k elements. creeps: whether any of them has a branch that creeps."""
+    """Damping and creep of a mesh's k elements. creeps: whether any of them has a creep branch."""
 
     def __init__(self, mesh: Mesh):
         def of(name: str) -> np.ndarray:
@@ -27,8 +28,9 @@ class Viscosity:
         self.creeps = bool(self._ratio.any())
 
     def step(self, strain: np.ndarray, strain_before: np.ndarray | None, held: np.ndarray, h: float) -> ViscousStrain:
-        """At the end of a step of h s from `strain` and `held` (k, p, 6); strain_before: of h s earlier, None where it is not known: then
-        the rate of strain is the first difference.
+        """Return the viscous strain at the end of a step of h s from `strain` and `held` (k, p, 6).
+
+        strain_before (k, p, 6): h s earlier; None: unknown, the rate of strain is then the first difference.
         """
         if strain_before is None:
             rate, past = 1.0 / h, strain / h
@@ -42,7 +44,7 @@ class Viscosity:
         return ViscousStrain(factor[:, 0, 0], past)
 
     def held_after(self, strain: np.ndarray, strain_before: np.ndarray, held: np.ndarray, h: float) -> np.ndarray:
-        """(k, p, 6): the strain held when a step of h s from `strain_before` and `held` has ended in `strain`."""
+        """Return the held strain (k, p, 6) after a step of h s from `strain_before` and `held` to `strain`."""
         if not self.creeps:
             return held
         decay, gain = branch(h, self._creep_time)
@@ -50,6 +52,6 @@ class Viscosity:
 
 
 def branch(h: float, creep_time: float | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
-    """e^-x and g for a step of h s."""
+    """Return e^-x and g for a step of h s."""
     x = h / creep_time
     return np.exp(-x), -np.expm1(-x) / x

@@ -2,8 +2,6 @@
 
 # ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
 
-# ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
-
 from gravcomp.compiled_functions import configure_numba
 
 configure_numba()

@@ -1,9 +1,9 @@
-"""From tensions to what the winches shall do.
+"""The command to the winches, computed from tensions.
 
-A taut cable is wound to its path, u = delta = W_aa lambda + delta_free. An idle cable is paid out along its path, u =
-delta - slack, because a cable that is held at a fixed length holds the robot up by itself as soon as its path wants to
-lengthen. Between the two u is continuous: the slack opens with the tension that the programme would take away if a
-cable could push, at the cable's own compliance, so nothing jumps when a cable goes idle.
+A taut cable is wound to its path, u = delta = W_aa lambda + delta_free. An idle cable is paid out along its path, u = delta -
+slack, because a cable of fixed length would hold the robot up as soon as its path lengthens. Between the two u is continuous:
+the slack grows with the tension that the programme would take away if a cable could push, at the cable's own compliance. So
+nothing jumps when a cable becomes idle.
 """
 
 from typing import NamedTuple
@@ -15,8 +15,10 @@ from gravcomp.inverse.status import ControllerCode
 
 
 class Command(NamedTuple):
-    """displacement (m,) m and tension (m,) N of the cables; code and message say how well the target is kept;
-    distance, lateral, axial m and tilt rad: what is predicted of the tip against its target (NaN: nothing); solve_time s.
+    """A command, with the predicted error to the target.
+
+    displacement (m,) in m and tension (m,) in N of the cables; code and message: state of the controller; solve_time in s;
+    distance, lateral and axial in m and tilt in rad: predicted errors of the tip, NaN if nothing is predicted.
     """
 
     displacement: np.ndarray
@@ -32,7 +34,9 @@ class Command(NamedTuple):
 
 @njit(cache=True)
 def cable_displacement(path: np.ndarray, compliance: np.ndarray, unwanted: np.ndarray, slack: float) -> np.ndarray:
-    """Displacement (m,) of the winches for the predicted path displacement (m,), the cables' compliance (m, m) and how much tension
-    (m,) the programme would take away if they could push.
+    """Return the displacement (m,) of the winches in m.
+
+    path (m,): predicted path displacement in m; compliance (m, m) in m/N; unwanted (m,): tension in N that the programme would
+    take away if cables could push; slack: largest slack of an idle cable in m.
     """
     return path - np.minimum(slack, np.diag(compliance) * unwanted)

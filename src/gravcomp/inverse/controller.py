@@ -1,59 +1,60 @@
-"""The inverse controller: one step from the model's linear answer and the target to what the winches shall do.
+"""The inverse controller: computes the command to the winches from the model's linear response and the target.
 
-Each step is one Gauss-Newton iteration of the inverse problem around the state that the model has reached under the
-last command: build the programme, solve it, turn its tensions into displacements, hold those to the limits and judge
-the result. The model takes the displacements with the next sample of gravity, so the iteration runs in the closed loop
-itself. Where it does not lead on, see `retreat`.
+Each step is one Gauss-Newton iteration of the inverse problem around the state that the model has reached under the last
+command: build the quadratic programme, solve it, turn its tensions into displacements, clamp these to the limits and evaluate
+the result. The model takes the displacements with the next sample of gravity, so the iteration runs in the closed loop itself.
+`retreat` recovers from states in which the iteration does not get closer to the target.
 """
 
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from gravcomp.description import Robot
-from gravcomp.inverse.command import Command, cable_displacement
+from gravcomp.inverse.command import Command
 from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.errors import backbone_missed, tip_errors
-from gravcomp.inverse.limits import held_within, limits_met, within_limits
+from gravcomp.inverse.limits import within_limits
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.outcome import outcome
 from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.retreat import Move, Retreat
-from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
-from gravcomp.inverse.status import ControllerCode, judge
+from gravcomp.inverse.status import ControllerCode, evaluate
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
     from gravcomp.full_model.shape import Response
 
-# Longer pauses between two steps allow no longer strides: the linear answer would not carry that far.
+# s. A longer pause between two steps does not allow a longer step: the linear response is not valid that far.
 _LONGEST_INTERVAL = 0.1
 
 
 class InverseController:
-    """Turns linear answers of the model into commands; remembers the last command and the last solution.
+    """Computes commands from linear responses of the model. Keeps the last command and the last solution.
 
-    robot: names and limits of the cables; options: see `InverseOptions`, replaceable at any time through `options`.
+    Attributes: robot, of which the names and limits of the cables are used; options, which may be replaced at any time.
     """
 
-    def __init__(self, robot: Robot, options: InverseOptions = InverseOptions()):
+    def __init__(self, robot: Robot, options: InverseOptions | None = None):
+        """options: default `InverseOptions()`."""
         self.robot = robot
-        self.options = options
+        self.options = options or InverseOptions()
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length)
         self.reset()
 
     def reset(self, displacement: np.ndarray | None = None) -> None:
-        """Forget the past: rates count from `displacement` (m,), or, without it, from where the cables' paths are at
-        the next step.
+        """Forget all earlier steps.
+
+        Rate limits count from `displacement` (m,) in m; None: from the displacements of the cables' paths at the next step.
         """
         self._solver.reset()
         self._damping = StepDamping()
         self._retreat.reset()
-        self._displacement = None if displacement is None else np.array(displacement, dtype=float)
+        self._displacement: np.ndarray | None = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
 
     def step(
@@ -66,12 +67,15 @@ class InverseController:
         interval: float = 0.01,
         followed: bool = True,
     ) -> Command:
-        """The command that brings the modelled robot nearest to the target.
+        """Return the command that brings the modelled robot nearest to the target.
 
-        backbone_station (n,): stations of the response's backbone rows; tension (m,) N: present tensions of the model
-        (None: those of the last command); interval (s): since the last step; followed: whether the model's shape is its equilibrium under
-        the last command, False where it found none and stayed. Never raises for a hard problem: see the
-        command's code.
+        Never raises for a hard problem; the command's code says what happened.
+
+        Parameters ---------- response : linear response of the model at its present shape target : shape to keep
+        backbone_station : (n,) stations of the response's backbone rows tension : (m,) present tensions of the model in N;
+        None: those of the last command interval : time since the last step in s followed : whether the model's shape is its
+        equilibrium under the last command; False: it found none and kept its last shape
+
         """
         started = time.perf_counter()
         limits, options = self.robot.limits, self.options
@@ -84,7 +88,7 @@ class InverseController:
         if followed:
             interval *= self._retreat.stride
         if move != Move.ONWARD:
-            return self._retreated(move, followed, response, target, previous, tension, interval, started)
+            return self._recovery_command(move, followed, response, target, previous, tension, interval, started)
         try:
             programme = build_programme(
                 response,
@@ -99,7 +103,7 @@ class InverseController:
             )
             solution = self._solver.solve(programme)
         except SolverFailed as error:
-            self._retreat.observe(np.zeros(len(previous)), interval)  # nothing moves
+            self._retreat.observe(np.zeros(len(previous)), interval)  # counts as at rest
             return Command(
                 displacement=previous,
                 tension=tension,
@@ -107,7 +111,7 @@ class InverseController:
                 message=f"{error}; the last command is kept",
                 solve_time=time.perf_counter() - started,
             )
-        tension, self._change, along, lengths, displacement, effector, met, any_met, errors = _outcome(
+        result = outcome(
             np.ascontiguousarray(response.compliance_aa),
             response.displacement_free,
             np.ascontiguousarray(response.compliance_ea),
@@ -122,23 +126,26 @@ class InverseController:
             target.tip_position,
             target.direction_or_zeros,
         )
-        self._damping.observe(along, lengths)
-        self._retreat.observe(displacement - previous, interval)
+        errors = result.errors
+        self._damping.observe(result.along, result.lengths)
+        self._retreat.observe(result.displacement - previous, interval)
         if self._retreat.stride < 1.0:
-            met[0] = False  # it is not the motors that hold it back
-        missed = max(errors.distance * (target.tip_position_weight > 0.0), backbone_missed(effector, target, backbone_station))
-        code, message = judge(
+            result.met[0] = False  # the shorter stride limits the step, not the motors
+        missed = max(
+            errors.distance * (target.tip_position_weight > 0.0), backbone_missed(result.effector, target, backbone_station)
+        )
+        code, message = evaluate(
             target=target,
             points_missed=missed,
             tilt=errors.tilt,
-            met=met if any_met else None,
+            met=result.met if result.any_met else None,
             names=self._names,
             options=options,
         )
-        self._displacement, self._tension = displacement, tension
+        self._displacement, self._tension, self._change = result.displacement, result.tension, result.change
         return Command(
-            displacement=displacement,
-            tension=tension,
+            displacement=result.displacement,
+            tension=result.tension,
             code=code,
             message=message,
             distance=errors.distance,
@@ -149,10 +156,10 @@ class InverseController:
         )
 
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
-        """Displacements (m,) on the way from `previous` (m,) to those (m,) of cables that carry nothing."""
+        """Return displacements (m,) on the way from `previous` (m,) to slack cables; free (m,): displacements of their paths."""
         return within_limits(free - self.options.slack, previous, self.robot.limits, interval)
 
-    def _retreated(
+    def _recovery_command(
         self,
         move: Move,
         followed: bool,
@@ -163,9 +170,9 @@ class InverseController:
         interval: float,
         started: float,
     ) -> Command:
-        """The command of a move that does not lead to the target."""
+        """Return the command of a move that does not go toward the target."""
         if move == Move.BACK:
-            # To the shape that stands, whichever command it was of: the model may be a sample behind.
+            # Back to the present shape, whichever command it belongs to: the model may be one sample behind.
             path = response.compliance_aa @ tension + response.displacement_free
             shape = np.where(tension > 0.0, path, path - self.options.slack)
             displacement = within_limits(shape, previous, self.robot.limits, interval)
@@ -174,16 +181,17 @@ class InverseController:
                 "the model finds no equilibrium on the way to the target: the last shape is kept",
             )
         else:
-            # Where the equilibria end, the linear answer tells little of where the cables would be free; on the straight robot they are at 0.
+            # Near a limit point the linear response is a poor estimate of the free displacements; on the straight robot they
+            # are 0.
             free = response.displacement_free if followed else np.minimum(response.displacement_free, 0.0)
             displacement = self._paid_out(free, previous, interval)
             code = ControllerCode.RELAXING
             if followed:
-                message = "no way leads on to the target: paying the cables out, to try it from a shape nearer to rest"
+                message = "the target cannot be approached from here: paying the cables out to try again nearer to rest"
             else:
                 message = "the model finds no equilibrium: paying the cables out"
         self._displacement, self._tension = displacement, tension
-        self._damping = StepDamping()  # of steps from elsewhere
+        self._damping = StepDamping()  # the old factor belongs to another shape
         effector = response.compliance_ea @ tension + response.effector_free
         return Command(
             displacement,
@@ -195,7 +203,7 @@ class InverseController:
         )
 
     def relax(self, response: "Response", *, interval: float = 0.01) -> Command:
-        """Pay the cables out, at the rates allowed, until none of them carries any tension."""
+        """Return the command that pays the cables out, within their rate limits, until none of them has tension."""
         started = time.perf_counter()
         free = response.displacement_free
         previous = free - self.options.slack if self._displacement is None else self._displacement
@@ -213,24 +221,5 @@ class InverseController:
 
 
 def _tip(response: "Response", tension: np.ndarray) -> np.ndarray:
-    """(3,) position of the tip under the tensions (m,)."""
+    """Return the position (3,) of the tip under the tensions (m,)."""
     return response.compliance_ea[:3] @ tension + response.effector_free[:3]
-
-
-@njit(cache=True)
-def _outcome(
-    compliance_aa, displacement_free, compliance_ea, effector_free, before, solution, slack, previous, last_change, travel, highest, tip,
-    direction,
-):  # fmt: skip
-    """What the solution (arguments of `unscaled`) comes to, from the tensions `before` (m,): tension (m,), change of path displacement
-    (m,), its product with the last one and that of their lengths, displacement (m,) of the winches, effector (e,), the limits met and
-    whether any is, errors of the tip. travel: longest way of a step, least and largest displacement.
-    """
-    tension, unwanted = unscaled(*solution)
-    path = compliance_aa @ tension + displacement_free
-    change = compliance_aa @ (tension - before)
-    along, lengths = (change * last_change).sum(), np.sqrt((change * change).sum() * (last_change * last_change).sum())
-    displacement = held_within(cable_displacement(path, compliance_aa, unwanted, slack), previous, *travel)
-    effector = compliance_ea @ tension + effector_free
-    met, any_met = limits_met(displacement, previous, *travel, tension, highest)
-    return tension, change, along, lengths, displacement, effector, met, any_met, tip_errors(effector, tip, direction)

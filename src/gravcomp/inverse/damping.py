@@ -1,29 +1,30 @@
-"""Damping of the steps where the model's linear answer does not carry: the steps of the closed loop are Gauss-Newton's, and
-those overshoot, back and forth, where the target is missed by far or the robot is bent a lot.
+"""Damping of the Gauss-Newton steps of the closed loop.
 
-The factor of the proximal term doubles twice for a step that undoes a good part of the one before, and falls slowly
-while steps agree, as in Levenberg's and Marquardt's method; the sign of agreement is that of successive changes of
-displacement, because the loop has no other trial.
+The steps overshoot back and forth if the target is far away or the robot is strongly bent, because the linear response is not
+valid that far. The factor of the proximal term is multiplied by four after a step that undoes a good part of the one before,
+and falls slowly while steps agree, as in the Levenberg-Marquardt method. The scalar product of successive changes of
+displacement shows whether they agree: the loop has no other trial.
 """
 
 _LARGEST = 1e4
-# A change below this is noise of the gravity's direction, not an overshoot.
+# m. A smaller change is noise of the gravity direction, not an overshoot.
 _SMALLEST_CHANGE = 5e-6
 _BACK_AND_FORTH = -0.3
 
 
 class StepDamping:
-    """Keeps the factor (1 or more) of the proximal term from one step to the next."""
+    """Factor (1 or more) of the proximal term, adapted from step to step."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.factor = 1.0
 
     def observe(self, along: float, lengths: float) -> None:
-        """Take in the changes of path displacement (m,) that the last two programmes asked for: their scalar product and the product of
-        their lengths, m^2.
+        """Update the factor with the changes of path displacement (m,) of the last two programmes.
+
+        along: their scalar product; lengths: product of their lengths; both in m^2.
         """
         if lengths <= _SMALLEST_CHANGE**2:
-            return  # settled: with less damping it might not stay so
+            return  # settled; with less damping it could start to oscillate
         if along < _BACK_AND_FORTH * lengths:
             self.factor = min(4.0 * self.factor, _LARGEST)
         elif along > 0.0:

@@ -1,6 +1,4 @@
-"""How far an effector is from its target: the tip's distance, its parts across and along the robot, its tilt, and the
-backbone's distance.
-"""
+"""Error of an effector to its target: distance, lateral and axial error and tilt of the tip, and distance of the backbone."""
 
 from typing import NamedTuple
 
@@ -12,7 +10,7 @@ from gravcomp.inverse.target import Target
 
 
 class TipErrors(NamedTuple):
-    """distance, lateral (across the axis of `tip_axis`), axial (along it, signed) in m; tilt in rad."""
+    """Errors of the tip: distance, lateral (across the axis of `tip_axis`) and axial (along it, signed) in m; tilt in rad."""
 
     distance: float
     lateral: float
@@ -22,8 +20,10 @@ class TipErrors(NamedTuple):
 
 @njit(cache=True)
 def tip_errors(effector: np.ndarray, tip: np.ndarray, direction: np.ndarray) -> TipErrors:
-    """Errors of the tip in the effector (e,), whose rows 0-2 are its position and 3-5 its direction, against the position `tip`
-    (3,) and the direction (3,) that is asked for, zeros for none.
+    """Return the errors of the tip.
+
+    effector (e,): rows 0 to 2 are the tip's position, 3 to 5 its direction; tip (3,) and direction (3,) of the target, zeros
+    for no direction.
     """
     axis = tip_axis(effector, direction)
     distance, axial, across, chord = 0.0, 0.0, 0.0, 0.0
@@ -34,12 +34,12 @@ def tip_errors(effector: np.ndarray, tip: np.ndarray, direction: np.ndarray) -> 
     for i in range(3):
         across += (effector[i] - tip[i] - axial * axis[i]) ** 2
         chord += (effector[3 + i] / length - axis[i]) ** 2
-    # Half the angle by the chord is exact where the angle is small and arccos is not.
+    # The angle from its chord is accurate for small angles; arccos is not.
     return TipErrors(np.sqrt(distance), np.sqrt(across), axial, 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(chord))))
 
 
 def backbone_missed(effector: np.ndarray, target: Target, backbone_station: np.ndarray) -> float:
-    """Largest distance (m) of a weighted backbone point from its target, 0 without any."""
+    """Return the largest distance in m of a weighted backbone point from its target, 0 without any."""
     if not target.backbone_weight.size:
         return 0.0
     used = target.backbone_weight > 0.0

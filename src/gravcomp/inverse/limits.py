@@ -1,10 +1,10 @@
-"""What is left of the cables' limits for one step.
+"""Bounds of one step that follow from the limits of the cables, and clamping of commands.
 
-A taut cable has the displacement of its path, u = delta; a slack one is longer than its path, u <= delta. Within a step
-of length h a winch reaches u_previous +- h rate. Paying out is the hard side: delta >= u_previous - h rate, or the
-cable would be taut against the will of the programme. Pulling in is not: a cable whose path has become shorter than the
-winch can follow merely stays slack, so that side is never tighter than the path is now. With that the present tensions
-are always allowed by the rates.
+A taut cable has the displacement of its path, u = delta; a slack one is longer than its path, u <= delta. Within a step of
+length h a winch reaches u_previous +- h rate. Paying out needs delta >= u_previous - h rate; otherwise the cable would be taut
+against the programme's solution. Pulling in needs no such bound: if the path shortens faster than the winch can follow, the
+cable merely becomes slack, so that bound is never tighter than the present path. Thus the rates always allow the present
+tensions.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from gravcomp.description import Limits
 
 
 class StepBounds(NamedTuple):
-    """The bounds of one step, all (m,): of the path's displacement (m) and of the tension (N)."""
+    """Bounds of one step, all (m,): of the path's displacement in m and of the tension in N."""
 
     displacement_lower: np.ndarray
     displacement_upper: np.ndarray
@@ -25,11 +25,15 @@ class StepBounds(NamedTuple):
 
 
 @njit(cache=True)
-def step_bounds(displacement, tension, path, reach, farthest_out, farthest_in, lowest, highest, change) -> StepBounds:
-    """What is left of the limits for the next step.
+def step_bounds(
+    displacement: np.ndarray, tension: np.ndarray, path: np.ndarray, reach: float, farthest_out: float, farthest_in: float,
+    lowest: float, highest: float, change: float,
+) -> StepBounds:  # fmt: skip
+    """Return the bounds of the next step.
 
-    displacement (m,): commanded last; tension (m,) and path (m,): tension and path displacement of the present state; reach (m)
-    and change (N): the longest ways of a step; farthest_out, farthest_in (m), lowest, highest (N): the limits themselves.
+    displacement (m,): last command in m; tension (m,) and path (m,): tension in N and path displacement in m of the present
+    state; reach in m and change in N: largest changes in a step; farthest_out and farthest_in in m, lowest and highest in N:
+    the limits.
     """
     held = np.minimum(np.maximum(tension, lowest), highest)
     return StepBounds(
@@ -41,24 +45,29 @@ def step_bounds(displacement, tension, path, reach, farthest_out, farthest_in, l
 
 
 def within_limits(displacement: np.ndarray, previous: np.ndarray, limits: Limits, interval: float) -> np.ndarray:
-    """The displacement (m,) held to its bounds and to what the winches reach from the previous one in the interval (s)."""
+    """Return the displacement (m,) clamped to its limits and to what the winches reach from `previous` in `interval` s."""
     return held_within(
         displacement, previous, limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max
     )
 
 
 @njit(cache=True)
-def held_within(displacement, previous, reach, farthest_out, farthest_in):
-    """As `within_limits`; reach (m): the longest way of a step."""
+def held_within(
+    displacement: np.ndarray, previous: np.ndarray, reach: float, farthest_out: float, farthest_in: float
+) -> np.ndarray:
+    """Compiled `within_limits`; reach: largest change in a step in m."""
     reachable = np.minimum(np.maximum(displacement, previous - reach), previous + reach)
     return np.minimum(np.maximum(reachable, farthest_out), farthest_in)
 
 
 @njit(cache=True)
-def limits_met(displacement, previous, reach, farthest_out, farthest_in, tension, highest):
-    """(3, m): which cables move as fast as they may, have the highest tension, are at an end of their travel; and whether any is.
+def limits_met(
+    displacement: np.ndarray, previous: np.ndarray, reach: float, farthest_out: float, farthest_in: float, tension: np.ndarray,
+    highest: float,
+) -> tuple[np.ndarray, np.bool_]:  # fmt: skip
+    """Return (3, m) which cables are at their limit of rate, of tension and of displacement; and whether any is.
 
-    A micrometre and a millinewton are below what any winch resolves.
+    The margins of a micrometre and a millinewton are below the resolution of any winch.
     """
     met = np.empty((3, len(tension)), dtype=np.bool_)
     met[0] = np.abs(displacement - previous) > reach - 1e-6

@@ -1,4 +1,4 @@
-"""How the inverse problem weighs exactness against effort and smoothness, and what it calls reached."""
+"""Weights of accuracy, effort and smoothness in the inverse problem, and the tolerances of a reached target."""
 
 from dataclasses import dataclass
 
@@ -7,37 +7,42 @@ from gravcomp.config import parameter
 
 @dataclass(frozen=True)
 class InverseOptions:
-    """Options of the inverse problem; those without unit are relative to the tip's answer to the cables, so they suit
-    any robot.
+    """Options of the inverse problem.
+
+    Options without unit are relative to the tip's response to the cables, so they suit any robot.
     """
 
     axial_weight: float = parameter(
         0.05, minimum=0.0, maximum=1.0,
-        description="weight of errors along the robot, relative to those across it: cables only pull, so they shorten it",
+        description="weight of errors along the robot relative to errors across it: cables pull, so they shorten it",
     )  # fmt: skip
     energy_weight: float = parameter(
-        3e-4, minimum=1e-6, maximum=1.0, description="weight of the cables' work; keeps them from pulling against each other"
+        3e-4, minimum=1e-6, maximum=1.0, description="weight of the cables' work; prevents cables that pull against each other"
     )
     proximal_weight: float = parameter(
-        0.02, minimum=0.0, maximum=10.0, description="weight of the change of tension in a step; keeps the steps from cycling"
+        0.02, minimum=0.0, maximum=10.0, description="weight of the change of tension in a step; prevents steps that oscillate"
     )
     slack: float = parameter(
-        0.1, edge="mm", minimum=0.0, maximum=5.0, description="how far an idle cable is paid out beyond its path, to stay slack"
+        0.1,
+        edge="mm",
+        minimum=0.0,
+        maximum=5.0,
+        description="length by which an idle cable is paid out beyond its path, to stay slack",
     )
     pretension: float = parameter(
-        0.0, unit="N", minimum=0.0, maximum=5.0, description="least tension of every cable; above 0 no cable ever goes slack"
+        0.0, unit="N", minimum=0.0, maximum=5.0, description="smallest tension of every cable; above 0 no cable becomes slack"
     )
     tolerance: float = parameter(
         4.0,
         edge="mm",
         minimum=0.01,
         maximum=100.0,
-        description="distance from the target up to which it counts as kept, the cables' shortening included",
+        description="largest distance from a reached target, including the shortening by the cables",
     )
     tilt_tolerance: float = parameter(
         5.0,
         edge="deg",
         minimum=0.1,
         maximum=90.0,
-        description="angle from the target's direction up to which it counts as kept, where it has a weight",
+        description="largest angle to the direction of a reached target, if the direction has a weight",
     )

@@ -1,19 +1,19 @@
-"""The inverse problem of one step as a quadratic programme in the cables' tensions (its solution is in `solver`).
+"""The inverse problem of one step as a quadratic programme (QP) in the cables' tensions; `solver` solves it.
 
-The model answers linearly around its present state, effector e = W_ea lambda + e_free and path displacement delta =
-W_aa lambda + delta_free. The tensions lambda that bring the effector nearest to its target solve (after Coevoet,
+The linear response of the model at its present state gives the effector e = W_ea lambda + e_free and the path displacement
+delta = W_aa lambda + delta_free. The tensions lambda that bring the effector nearest to its target solve (after Coevoet,
 Escande and Duriez, IEEE RA-L 2017)
 
     min   |M (W_ea lambda + e_free - e_target)|^2  +  c (eps lambda^T W_aa lambda  +  rho |lambda - lambda_now|_D^2)
     s.t.  tension_lower <= lambda <= tension_upper,
           displacement_lower <= W_aa lambda + delta_free <= displacement_upper,
 
-with M the roots of the weights, D the diagonal of W_aa, and c = trace(W_ea^T M^T M W_ea) / trace(W_aa), which makes eps
-and rho numbers that suit any robot. The energy eps picks, among tensions of equal effect, those without cables that
-work against each other; the proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see
-`damping`). Of the errors of tip and backbone the part along the robot counts less, because cables only pull: they
-cannot make up for the length that they take. At the tip that is the part along the target's direction, less the more the tip still points
-elsewhere.
+where M contains the roots of the weights, D is the diagonal of W_aa, and c = trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps
+and rho independent of the robot's size. The energy term eps selects, among tensions of equal effect, those without cables that
+work against each other. The proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see `damping`).
+The part of the errors of tip and backbone along the robot counts less, because cables can only pull: they cannot undo their
+shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
+from that direction.
 """
 
 import math
@@ -44,10 +44,10 @@ def build_programme(
     damping: float,
     options: InverseOptions,
 ) -> ScaledProgramme:
-    """The programme around the present state, for the next `interval` (s).
+    """Return the programme at the present state, for the next `interval` s.
 
-    tension (m,): the present tensions, reference of the proximal term; displacement (m,): commanded last; backbone_station (n,): of
-    the effector's backbone rows; damping: factor of the proximal term.
+    tension (m,): present tensions in N, reference of the proximal term; displacement (m,): last command in m; backbone_station
+    (n,): stations of the effector's backbone rows; damping: factor of the proximal term.
     """
     return _built(
         np.ascontiguousarray(response.compliance_ea),
@@ -80,18 +80,21 @@ def build_programme(
 
 @njit(cache=True)
 def tip_axis(effector: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Unit vector (3,) that splits the tip's error into axial and lateral: the target's direction (3,), where that is zeros the
-    effector's (e,).
+    """Return the unit vector (3,) that splits the tip's error into axial and lateral error.
+
+    It is the target's direction (3,), or, if that is zeros, the direction of the tip in the effector (e,).
     """
     return direction if (direction * direction).sum() > 0.0 else _unit(effector[3:6])
 
 
 @njit(cache=True)
 def _built(
-    change, free, compliance_aa, displacement_free, tension, displacement, limits, tip, tip_weight, direction, direction_weight,
-    stations, points, weights, backbone_station, less, energy, proximal,
-):  # fmt: skip
-    """As `build_programme`; limits: the last six arguments of `step_bounds`; `less` as for `_weighted_errors`."""
+    change: np.ndarray, free: np.ndarray, compliance_aa: np.ndarray, displacement_free: np.ndarray, tension: np.ndarray,
+    displacement: np.ndarray, limits: tuple, tip: np.ndarray, tip_weight: float, direction: np.ndarray, direction_weight: float,
+    stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray, less: float, energy: float,
+    proximal: float,
+) -> ScaledProgramme:  # fmt: skip
+    """Compiled `build_programme`; limits: the last six arguments of `step_bounds`; `less` as in `_weighted_errors`."""
     jacobian, offset = _weighted_errors(
         change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
     )
@@ -102,10 +105,14 @@ def _built(
 
 @njit(cache=True)
 def _weighted_errors(
-    change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
-):
-    """M W_ea (k, m) and M (e_free - e_target) (k,) for the rows of the parts of the target that have a weight; along the robot is
-    where it lies under the present tensions (m,). `less` is 1 - sqrt(a): the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T.
+    change: np.ndarray, free: np.ndarray, tension: np.ndarray, tip: np.ndarray, tip_weight: float, direction: np.ndarray,
+    direction_weight: float, stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray,
+    less: float,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return M W_ea (k, m) and M (e_free - e_target) (k,) for the weighted parts of the target.
+
+    The axis t of the robot is that of the shape under the present tensions (m,). less = 1 - sqrt(a) for the relative weight a
+    along t: the root of I - (1 - a) t t^T is I - (1 - sqrt(a)) t t^T.
     """
     m = len(tension)
     effector = change @ tension + free
@@ -115,7 +122,8 @@ def _weighted_errors(
     if tip_weight > 0.0:
         axis = tip_axis(effector, direction)
         jacobian[:3], offset[:3] = change[:3], free[:3] - tip
-        # Along the target's direction means along the robot only where it points there: far from it, that is the way to go.
+        # The target's direction is the axis of the robot only near the target; far from it, the tip has to move along this
+        # direction.
         aligned = max(0.0, (axis * _unit(effector[3:6])).sum())
         _weigh(jacobian[:3], offset[:3], axis, less * aligned * aligned, tip_weight)
         row = 3
@@ -138,8 +146,8 @@ def _weighted_errors(
 
 
 @njit(cache=True)
-def _weigh(block, error, axis, less, weight):
-    """Take `less` of the part along the axis (3,) from block (3, m) and error (3,), then multiply by the root of the weight."""
+def _weigh(block: np.ndarray, error: np.ndarray, axis: np.ndarray, less: float, weight: float) -> None:
+    """Subtract `less` times the part along the axis (3,) from block (3, m) and error (3,); multiply by the root of the weight."""
     root = np.sqrt(weight)
     along = less * (axis[0] * error[0] + axis[1] * error[1] + axis[2] * error[2])
     for i in range(3):
@@ -151,8 +159,10 @@ def _weigh(block, error, axis, less, weight):
 
 
 @njit(cache=True)
-def _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal):
-    """Hessian, gradient and symmetric compliance of the programme; `energy` and `proximal` are relative to the errors' part."""
+def _quadratic(
+    jacobian: np.ndarray, offset: np.ndarray, compliance_aa: np.ndarray, tension: np.ndarray, energy: float, proximal: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Hessian, gradient and symmetric compliance of the programme; energy and proximal: eps and rho."""
     compliance = 0.5 * (compliance_aa + compliance_aa.T)
     hessian = 2.0 * (jacobian.T @ jacobian)
     scale = np.trace(hessian) / np.trace(compliance)
@@ -166,5 +176,5 @@ def _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal):
 
 
 @njit(cache=True)
-def _unit(vector):
+def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.sqrt((vector * vector).sum())

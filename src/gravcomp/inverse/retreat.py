@@ -1,14 +1,16 @@
-"""Ways out where a step of the closed loop does not lead on.
+"""Recovery when the equilibrium is lost or the closed loop is stuck.
 
-Not every command has an equilibrium near the last one (see `simulation.statics`), and Gauss-Newton's steps toward a target far around
-the corner may end at a distance that is the least nearby without being small.
+Not every command has an equilibrium near the last one (see `full_model.statics`). And Gauss-Newton steps toward a target on the
+other side of a strongly bent robot may end in a local minimum of the distance.
 
-- A command that the model could not follow is taken back, to the shape that stands. The next strides are shorter, as in a trust-region
-  method, and grow with each command that is followed: the robot comes to rest where the equilibria end.
-- Where the model does not follow that either, its cables are paid out, which takes load from it.
-- Where the model was lost several times, or nothing moves any more, far from a target that the robot at rest is nearer to, the cables are
-  paid out until half of the tension is gone, and the target is tried from there: another way may lead to it. Then until a quarter is left,
-  then nothing; a target that is new is tried anew.
+- If the model cannot follow a command, the command is taken back to the present shape. The next strides are shorter, as in a
+  trust-region method, and grow with each command that the model follows. So the robot comes to rest where the branch of
+  equilibria ends.
+- If the model does not follow that either, its cables are paid out, which reduces its load.
+- If the equilibrium was lost several times or nothing moves any more, and the robot is far from a target to which the released
+  robot is nearer, the cables are paid out until half of the tension is left. From there the target is tried again: another path
+  may lead to it. The next attempts start from a quarter of the tension and from no tension. A new target starts this sequence
+  again.
 """
 
 import enum
@@ -20,17 +22,17 @@ from gravcomp.inverse.target import Target
 _SHORTER, _LONGER = 0.25, 1.05
 _LEAST_STRIDE = 1.0 / 256.0
 _LOST_TIMES = 3
-_BACK_STEPS = 2  # the model may be a sample behind the commands
-# Nothing moves: no cable is faster than this for so many steps.
+_BACK_STEPS = 2  # the model may be one sample behind the commands
+# Nothing moves if no cable is faster than this for this number of steps.
 _SLOW = 2e-3  # m/s
 _STILL_STEPS = 20
-_FAR = 0.3  # robot's lengths
-_SHARES = (0.5, 0.25, 0.0)  # of the tension, at which a target is tried again
+_FAR = 0.3  # of the robot's length
+_SHARES = (0.5, 0.25, 0.0)  # fractions of the tension at which a target is tried again
 _NO_TENSION, _LITTLE_TENSION = 0.02, 0.1  # N
 
 
 class Move(enum.Enum):
-    """What the next command shall be: a step to the target, the shape as it is, or longer cables."""
+    """Kind of the next command: a step to the target, back to the present shape, or paying the cables out."""
 
     ONWARD = 0
     BACK = 1
@@ -38,23 +40,25 @@ class Move(enum.Enum):
 
 
 class Retreat:
-    """Decides on the moves of a robot of `length` (m). Attribute `stride`: the share of the usual stride that a step may take."""
+    """Chooses the moves of a robot of `length` (m). Attribute `stride`: fraction of the usual stride that a step may take."""
 
     def __init__(self, length: float):
         self._length = length
-        self._tip_at_rest = np.array([0.0, 0.0, length])  # until it is seen: how far it sags, not where to, is what matters
+        self._tip_at_rest = np.array([0.0, 0.0, length])  # until it is observed
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Forget all earlier steps."""
         self.stride = 1.0
         self._lost = self._lost_times = self._still = self._tries = 0
-        self._until: float | None = None  # N, of the largest tension, while cables are paid out for another try
+        self._until: float | None = None  # N: largest tension at which the next attempt starts
         self._target: Target | None = None
 
     def move(self, followed: bool, target: Target, tip: np.ndarray, tension: np.ndarray) -> Move:
-        """The next move. followed: whether the model reached an equilibrium under the last command; tip (3,) m and tension (m,) N of
-        its present shape.
+        """Return the next move.
+
+        followed: whether the model reached an equilibrium under the last command; tip (3,) in m and tension (m,) in N of its
+        present shape.
         """
         if not _same(target, self._target):
             self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
@@ -80,11 +84,12 @@ class Retreat:
         return Move.ONWARD
 
     def observe(self, change: np.ndarray, interval: float) -> None:
-        """After a move onward: the change (m,) of the winches' displacement in m, in `interval` s."""
+        """Record a move onward: the change (m,) of the winches' displacement in m, within `interval` s."""
         self._still = self._still + 1 if np.abs(change).max() <= _SLOW * interval else 0
 
     def _try_again(self, tip: np.ndarray, tension: np.ndarray) -> None:
-        """Let the cables be paid out where that may lead nearer to the target."""
+        """Start paying the cables out if another attempt from there may get nearer to the target."""
+        assert self._target is not None  # `move` has set it
         wanted = self._target.tip_position
         missed = np.linalg.norm(tip - wanted)
         nearer_at_rest = np.linalg.norm(self._tip_at_rest - wanted) < missed

@@ -1,5 +1,7 @@
-"""The programme of a step in the solver's units: tensions scaled to a Hessian of unit diagonal, displacements to rows of unit length,
-the cost in square millimetres.
+"""Scaling of a step's programme for the solver, and of its solution back.
+
+Tensions are scaled so that the Hessian has a unit diagonal, displacements so that the rows have unit length; the cost is in
+square millimetres.
 """
 
 from typing import NamedTuple
@@ -10,16 +12,14 @@ from numba import njit
 from gravcomp.inverse.limits import StepBounds
 
 NO_BOUND = 1e20
-"""Stands for 'none'; ProxQP takes it as infinite."""
+"""Value that ProxQP takes as no bound."""
 
-# N. ProxQP's last bits depend on where its memory lies; to this they are rounded away, so that a run can be repeated.
+# N. Tensions are rounded to this: ProxQP's last bits depend on the address of its memory, and a run must be repeatable.
 _QUANTUM = 2.0**-30
 
 
 class Programme(NamedTuple):
-    """min 1/2 x^T hessian x + gradient^T x over the tensions x (m,), subject to the bounds, with displacement =
-    compliance x + offset.
-    """
+    """min 1/2 x^T hessian x + gradient^T x  s.t.  the bounds; x (m,): tensions in N; displacement = compliance x + offset."""
 
     hessian: np.ndarray
     gradient: np.ndarray
@@ -29,9 +29,10 @@ class Programme(NamedTuple):
 
 
 class ScaledProgramme(NamedTuple):
-    """min 1/2 y^T hessian y + gradient^T y subject to lower <= rows y <= upper and box_lower <= y <= box_upper, with tension = scale y.
+    """min 1/2 y^T hessian y + gradient^T y  s.t.  lower <= rows y <= upper, box_lower <= y <= box_upper; tension = scale y.
 
-    tension_lower and tension_upper (m,) N: what the box came from; trace: a sum in which a number that is not finite leaves its trace.
+    tension_lower and tension_upper (m,): bounds of the tension in N; trace: a sum that is finite only if all numbers of the
+    programme are.
     """
 
     hessian: np.ndarray
@@ -49,7 +50,7 @@ class ScaledProgramme(NamedTuple):
 
 @njit(cache=True)
 def scaled(programme: Programme) -> ScaledProgramme:
-    """The programme in the solver's units."""
+    """Return the programme in the solver's units."""
     hessian, gradient, compliance, offset, bounds = programme
     m = len(gradient)
     to_hessian, to_gradient, rows = np.empty((m, m)), np.empty(m), np.empty((m, m))
@@ -86,16 +87,18 @@ def scaled(programme: Programme) -> ScaledProgramme:
 
 
 @njit(cache=True)
-def unscaled(unknowns: np.ndarray, multipliers: np.ndarray, scale: np.ndarray, lower: np.ndarray, upper: np.ndarray):
-    """Tensions (m,) N within their bounds, and how far below the lower one the programme would like each (m,) N, 0 where that bound is
-    not active; free of the solver's last bits.
+def unscaled(
+    unknowns: np.ndarray, multipliers: np.ndarray, scale: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tensions (m,) in N within their bounds, and the unwanted tensions (m,) in N, both rounded to `_QUANTUM`.
 
-    unknowns: m scaled tensions first; multipliers: those of m rows, then of the box.
+    Unwanted is the distance by which the programme would go below the lower bound if cables could push, 0 where that bound is
+    not active. unknowns: m scaled tensions first; multipliers: of the m rows, then of the box.
     """
     m = len(scale)
     tension, unwanted = np.empty(m), np.empty(m)
     for i in range(m):
         tension[i] = min(max(np.rint(unknowns[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
-        # The Hessian's diagonal is one, so a multiplier is also the step that would undo it.
+        # The Hessian's diagonal is 1, so a multiplier is also the step beyond its bound.
         unwanted[i] = np.rint(max(0.0, -multipliers[m + i]) * scale[i] / _QUANTUM) * _QUANTUM
     return tension, unwanted

@@ -1,13 +1,14 @@
-"""Solving the programme of one step with ProxQP (Bambade et al., RSS 2022), in units in which no solve takes long (`scaling`).
+"""Solution of one step's programme with ProxQP (Bambade et al., RSS 2022), scaled for fast convergence (`scaling`).
 
-After gravity has jumped the bounds on displacement may be out of reach of tensions within theirs. Then the programme is solved with
-elastic bounds on displacement: a variable of its own for each cable takes up what cannot be kept, at a cost high enough that nothing
-is left of it otherwise. So there always is a solution, and the command is held to its limits afterwards.
+After a jump of gravity, no tensions within their bounds may satisfy the bounds on displacement. Then the programme is solved
+with elastic bounds on displacement: one more variable for each cable takes up the violation, at a cost high enough that it
+vanishes wherever the bounds can be satisfied. So there always is a solution, and the command is clamped to its limits
+afterwards.
 """
 
 import math
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,17 +16,18 @@ from gravcomp.inverse.scaling import NO_BOUND, ScaledProgramme
 
 _ELASTIC_COST = 1e4
 _ACCURACY = 1e-7
-# Bounds that can be kept together take about one iteration, ten where the set of active ones changes.
+# If the bounds are compatible, one iteration is typical, and ten when the active set changes.
 _MOST_ITERATIONS, _MOST_ELASTIC_ITERATIONS = 40, 300
 
 
 class SolverFailed(RuntimeError):
-    """The programme was not solved; the text says why."""
+    """The programme was not solved; the text gives the reason."""
 
 
 class Solution(NamedTuple):
-    """What the solver found, in its units: the programme's unknowns, the multipliers of its rows and then of its box; solve_time s;
-    iterations. `scaling.unscaled` makes tensions of it, before the next solve, which writes over it.
+    """A solution in the solver's units: unknowns, multipliers of the rows and then of the box; solve_time in s; iterations.
+
+    The next solve overwrites its arrays: call `scaling.unscaled` before.
     """
 
     unknowns: np.ndarray
@@ -35,23 +37,24 @@ class Solution(NamedTuple):
 
 
 class ProgrammeSolver:
-    """Solves one programme after another, each started from the last solution. The same sequence gives the same bits."""
+    """Solves a sequence of programmes, each started from the last solution. The same sequence gives the same bits."""
 
-    def __init__(self):
-        from proxsuite import proxqp  # not with the module: its start is slow, and a description of a programme needs none
+    def __init__(self) -> None:
+        from proxsuite import proxqp  # here, because its import is slow and not every user of the module solves
 
         self._proxqp = proxqp
         self.reset()
 
     def reset(self) -> None:
         """Forget the last solution: the next solve starts cold."""
-        self._exact = self._elastic = None
+        self._exact: Any = None
+        self._elastic: Any = None
 
     def solve(self, programme: ScaledProgramme) -> Solution:
-        """The programme's solution. Raises SolverFailed; after that the next solve starts cold."""
+        """Return the programme's solution. Raises SolverFailed; the next solve then starts cold."""
         started = time.perf_counter()
         if not math.isfinite(programme.trace):
-            raise SolverFailed("the model's linear answer holds numbers that are not finite")
+            raise SolverFailed("the model's linear response contains numbers that are not finite")
         parts = programme[:7]
         self._exact, found = self._solved(self._exact, _MOST_ITERATIONS, *parts)
         results = self._exact.results
@@ -66,8 +69,19 @@ class ProgrammeSolver:
                 raise SolverFailed(f"the solver ended with {results.info.status.name}")
         return Solution(results.x, results.z, time.perf_counter() - started, results.info.iter)
 
-    def _solved(self, qp, most_iterations: int, hessian, gradient, rows, lower, upper, box_lower, box_upper):
-        """The QP, made where it is None and else started from its last solution, and whether it has a solution."""
+    def _solved(
+        self,
+        qp: Any,
+        most_iterations: int,
+        hessian: np.ndarray,
+        gradient: np.ndarray,
+        rows: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        box_lower: np.ndarray,
+        box_upper: np.ndarray,
+    ) -> tuple[Any, bool]:
+        """Solve with `qp`, from its last solution, or with a new one if it is None; return the QP and whether it was solved."""
         if qp is None:
             qp = self._proxqp.dense.QP(len(gradient), 0, len(rows), True)
             qp.settings.eps_abs = _ACCURACY
@@ -78,12 +92,15 @@ class ProgrammeSolver:
             qp.update(H=hessian, g=gradient, C=rows, l=lower, u=upper, l_box=box_lower, u_box=box_upper)
         qp.solve()
         info = qp.results.info
-        # The status alone says 'solved' of numbers that are not finite.
+        # ProxQP reports 'solved' also for numbers that are not finite.
         return qp, info.status == self._proxqp.PROXQP_SOLVED and math.isfinite(info.objValue)
 
 
-def _with_elastic_bounds(hessian, gradient, rows, lower, upper, box_lower, box_upper):
-    """The programme's parts with a variable more for each row, which gives way to the row's bounds."""
+def _with_elastic_bounds(
+    hessian: np.ndarray, gradient: np.ndarray, rows: np.ndarray, lower: np.ndarray, upper: np.ndarray, box_lower: np.ndarray,
+    box_upper: np.ndarray,
+) -> tuple[np.ndarray, ...]:  # fmt: skip
+    """Return the programme's parts with one more variable for each row, which makes the row's bounds elastic."""
     m, free = len(rows), np.full(len(rows), NO_BOUND)
     larger = np.zeros((2 * m, 2 * m))
     larger[:m, :m], larger[m:, m:] = hessian, _ELASTIC_COST * np.eye(m)

@@ -1,4 +1,4 @@
-"""What the inverse controller says of itself; the codes are those of gravcomp_msgs/ControllerStatus."""
+"""State of the inverse controller; the codes are those of gravcomp_msgs/ControllerStatus."""
 
 from enum import IntEnum
 
@@ -9,6 +9,8 @@ from gravcomp.inverse.target import Target
 
 
 class ControllerCode(IntEnum):
+    """Codes of gravcomp_msgs/ControllerStatus."""
+
     INACTIVE = 0
     OK = 1
     AT_LIMIT = 2
@@ -19,7 +21,7 @@ class ControllerCode(IntEnum):
     RELAXING = 7
 
 
-def judge(
+def evaluate(
     *,
     target: Target,
     points_missed: float,
@@ -28,10 +30,10 @@ def judge(
     names: tuple[str, ...],
     options: InverseOptions,
 ) -> tuple[ControllerCode, str]:
-    """Code and sentence for a step.
+    """Return code and message for a step.
 
-    points_missed (m): largest predicted distance of a weighted point; met (3, m): of `limits.limits_met`, None: no limit is; names (m,) of
-    the cables.
+    points_missed: largest predicted distance of a weighted point in m; tilt in rad; met (3, m): of `limits.limits_met`, None if
+    no limit is reached; names (m,) of the cables.
     """
     moving, at_tension, at_travel = (_listed(names, which) for which in met) if met is not None else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]

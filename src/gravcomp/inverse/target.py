@@ -1,33 +1,35 @@
-"""What the robot shall look like: the position and direction of its tip and points of its backbone, each with a weight.
+"""The target shape: position and direction of the tip and points of the backbone, each with a weight.
 
-The inverse problem keeps  sum_i w_i |e_i - target_i|^2  small. Weights are relative to one another: 1 for the position
-of the tip is the usual choice; the weight of the tip's direction is in m^2 a squared unit of direction, so that 0.01
-makes 0.1 rad count like 10 mm. A weight of 0 leaves a part free. A bent shape of constant curvature stands for all of
-them: an arc of length L, bent by the angle theta into the plane at phi, has at the arc length s = station * L
+The inverse problem minimises  sum_i w_i |e_i - target_i|^2. Weights are relative to one another: 1 for the position of the tip
+is the usual choice; the weight of the tip's direction is in m^2, so that with 0.01 an angle of 0.1 rad counts like 10 mm. A
+part with weight 0 is free. A bend of constant curvature gives all of them: an arc of length L, bent by the angle theta in the
+plane at phi, has at the arc length s = station * L
 
     p(s) = (rho cos(phi), rho sin(phi), z),   rho = L/theta (1 - cos(theta s/L)),   z = L/theta sin(theta s/L).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 _NO_DIRECTION = np.zeros(3)
-_REACH = 1.5  # robot's lengths
+_REACH = 1.5  # of the robot's length
 
 
 class TargetError(ValueError):
-    """A target that cannot be used; the text is for people."""
+    """A target that cannot be used; the text says what was found and what is allowed."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A shape to keep, in the robot's base frame.
+    """A shape to keep, in `soft_base`.
 
-    tip_position (3,) m; tip_direction (3,) along the robot at its tip, normalised here, or None: then nothing is asked of it and
-    'axial' means along the tip as it stands; backbone_station (k,) from 0 at the base to 1 at the tip;
-    backbone_position (k, 3) m; backbone_weight (k,). Raises TargetError for anything that is not finite, of the wrong
-    shape or without any weight.
+    tip_position (3,) in m; tip_direction (3,) along the robot at its tip, normalised here; None: the direction is free, and
+    axial errors are along the present direction of the tip; backbone_station (k,) from 0 at the base to 1 at the tip;
+    backbone_position (k, 3) in m; backbone_weight (k,). Raises TargetError for values that are not finite, wrong shapes, and
+    targets without any weight.
     """
 
     tip_position: np.ndarray
@@ -38,14 +40,14 @@ class Target:
     backbone_position: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     backbone_weight: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "tip_position", _finite(self.tip_position, (3,), "tip_position"))
         if self.tip_direction is not None:
             direction = _finite(self.tip_direction, (3,), "tip_direction")
             length = float(np.linalg.norm(direction))
             if length < 1e-9:
-                raise TargetError("tip_direction has length 0; a direction is needed, or none at all")
+                raise TargetError("tip_direction has length 0; give a direction or leave it out")
             set_(self, "tip_direction", direction / length)
         stations = _finite(self.backbone_station, (-1,), "backbone_station")
         set_(self, "backbone_station", stations)
@@ -60,11 +62,12 @@ class Target:
         if self.tip_direction is None and self.tip_direction_weight > 0.0:
             raise TargetError("tip_direction_weight is given without a tip_direction")
         if weights.max() == 0.0:
-            raise TargetError("every weight is 0; at least one part of the shape has to be asked for")
+            raise TargetError("every weight is 0; at least one weight above 0 is needed")
 
     def check_reach(self, length: float) -> None:
-        """Raises TargetError where a point with a weight is out of any reach of a robot of `length` (m): a mistake in its unit or frame,
-        after which the cables would bend the robot as far as they can.
+        """Raise TargetError for a weighted point that is out of reach of a robot of `length` (m).
+
+        Such a point is probably in a wrong unit or frame; the cables would bend the robot as far as they can.
         """
         points = {"tip_position": self.tip_position} if self.tip_position_weight > 0.0 else {}
         points |= {f"backbone_position {k}": p for k, p in enumerate(self.backbone_position) if self.backbone_weight[k] > 0.0}
@@ -72,12 +75,12 @@ class Target:
             distance = float(np.linalg.norm(point))
             if distance > _REACH * length:
                 raise TargetError(
-                    f"{name} is {distance:.3g} m from the base; a robot of {length:g} m is asked for points up to {_REACH * length:g} m away"
+                    f"{name} is {distance:.3g} m from the base; allowed for a robot of {length:g} m: up to {_REACH * length:g} m"
                 )
 
     @property
     def direction_or_zeros(self) -> np.ndarray:
-        """tip_direction (3,); zeros where nothing is asked of it."""
+        """tip_direction (3,); zeros if the direction is free."""
         return _NO_DIRECTION if self.tip_direction is None else self.tip_direction
 
 
@@ -88,11 +91,12 @@ def bend_target(
     *,
     tip_position_weight: float = 1.0,
     tip_direction_weight: float = 0.0,
-    backbone_station: np.ndarray = (),
-    backbone_weight: np.ndarray = (),
+    backbone_station: np.ndarray | Sequence[float] = (),
+    backbone_weight: np.ndarray | Sequence[float] = (),
 ) -> Target:
-    """The target of constant curvature: `length` (m) of the robot bent by `angle` (rad) into the plane at `plane` (rad,
-    about z from x).
+    """Return the target of constant curvature: a robot of `length` m bent by `angle` rad in the plane at `plane` rad about z.
+
+    Raises TargetError for numbers that are not finite, a length of 0 or less, and more than a full turn.
     """
     if not np.all(np.isfinite([length, angle, plane])) or length <= 0.0 or abs(angle) > 2.0 * np.pi:
         bend = f"a bend of {angle!r} rad at {plane!r} rad over {length!r} m"
@@ -111,20 +115,21 @@ def bend_target(
     )
 
 
-def straight_target(length: float, **weights) -> Target:
-    """The straight robot of `length` (m); the keyword arguments are those of `bend_target`."""
+def straight_target(length: float, **weights: Any) -> Target:
+    """Return the target of the straight robot of `length` m; the keyword arguments are those of `bend_target`."""
     return bend_target(length, 0.0, 0.0, **weights)
 
 
 def arc_points(length: float, angle: float, plane: float, station: np.ndarray) -> np.ndarray:
-    """Points (k, 3) of the arc at the stations (k,)."""
+    """Return points (k, 3) in m of the arc at the stations (k,)."""
     s = np.asarray(station, float) * length
     half = 0.5 * angle * s / length
     chord = s * np.sinc(half / np.pi)  # np.sinc(x) is sin(pi x)/(pi x): no division by zero on the straight robot
     return np.stack([chord * np.sin(half) * np.cos(plane), chord * np.sin(half) * np.sin(plane), chord * np.cos(half)], axis=1)
 
 
-def _finite(value, shape: tuple, name: str) -> np.ndarray:
+def _finite(value: Any, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Return the value as an array of the shape, in which -1 stands for any length. Raises TargetError."""
     array = np.array(value, dtype=float)
     if array.size == 0 and 0 in shape:
         array = array.reshape(shape)

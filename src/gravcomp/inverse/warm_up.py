@@ -1,5 +1,6 @@
-"""Compiling the controller's kernels ahead of the first command: compiling takes half a minute on a new machine, in which the
-motors would be sent nothing but stale commands.
+"""Compilation of the controller's functions before the first command.
+
+It takes half a minute on a new machine. During this time the motors would get only stale commands.
 """
 
 import numpy as np
@@ -11,15 +12,15 @@ from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import straight_target
 
 
-def warm_up(robot: Robot, options: InverseOptions = InverseOptions()) -> None:
-    """Compile, or load from the cache, everything that a command for the robot needs."""
+def warm_up(robot: Robot, options: InverseOptions | None = None) -> None:
+    """Compile, or load from the cache, all functions that a command for the robot needs. options: default `InverseOptions()`."""
     m, stations = len(robot.cables), np.linspace(0.0, 1.0, 3)
     if not m:
         return
     controller = InverseController(robot, options)
     points = np.linspace(0.0, robot.length, len(stations))[:, None] * [0.0, 0.0, 1.0]
     effector = np.concatenate([points[-1], [0.0, 0.0, 1.0], points.ravel()])
-    # Numbers of no meaning, but with the types and the layout of a real answer.
+    # Arbitrary numbers with the types and the memory layout of a real response.
     compliance = np.sin(np.arange(effector.size * m, dtype=float)).reshape(effector.size, m)
     response = Response(1e-3 * np.eye(m), 1e-3 * compliance, np.zeros(m), effector)
     target = straight_target(robot.length, tip_direction_weight=1e-3, backbone_station=[0.5], backbone_weight=[0.1])

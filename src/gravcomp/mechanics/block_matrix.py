@@ -1,13 +1,13 @@
 """Symmetric matrices of slender bodies: block tridiagonal storage and its Cholesky factorisation.
 
-Unknowns are ordered in levels, each coupled only with itself and with the next level, as a breadth-first walk from the
-clamp gives them (Cuthill and McKee 1969). With A_ii = D_i and A_(i+1)i = B_i,
+A breadth-first walk from the clamp orders the unknowns in levels; each level is coupled only with itself and with its neighbours
+(Cuthill and McKee 1969). With A_ii = D_i and A_(i+1)i = B_i,
 
     L_i L_i^T = D_i - X_(i-1) X_(i-1)^T,      X_i = B_i L_i^-T.
 
-Inside a level those unknowns come first that the next level does not see (the nodes in the middle of an element): their
-columns of B_i are zero, are not stored and cost nothing. The blocks are large enough for LAPACK to run at full speed,
-which is why this beats band storage here, above all for several right-hand sides.
+Within a level, the unknowns without coupling to the next level (nodes in the middle of an element) come first: their columns of
+B_i are zero and are not stored. The blocks are large enough for LAPACK to run at full speed; that makes this faster than band
+storage here, above all for several right-hand sides.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ class NotPositiveDefinite(ArithmeticError):
 
 @dataclasses.dataclass(frozen=True)
 class BlockPattern:
-    """Where the blocks lie. Sizes of levels (l,) and of the part of each that the next level sees (l - 1,)."""
+    """Layout of the blocks. size (l,) of the levels; seen (l - 1,): size of each level's part that is coupled to the next one."""
 
     size: np.ndarray
     seen: np.ndarray
@@ -40,14 +40,14 @@ class BlockPattern:
 
     @property
     def offsets(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """First entry of every D_i (l,), of every B_i (l - 1,), and the number of entries."""
+        """Positions of the first entry of every D_i (l,) and of every B_i (l - 1,), and the number of entries."""
         coupling = np.append(self.size[1:] * self.seen, 0)
         ends = np.cumsum(self.size**2 + coupling)
         diagonal = ends - self.size**2 - coupling
         return diagonal, (diagonal + self.size**2)[:-1], int(ends[-1])
 
     def position(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Index of the entries (row, column) in the flat storage; both triangles name the stored lower one.
+        """Return the positions of the entries (row, column) in the flat storage; the upper triangle gives the mirror image.
 
         Raises ValueError for an entry outside the pattern.
         """
@@ -69,7 +69,7 @@ class BlockPattern:
 
 
 class BlockMatrix:
-    """Storage for one matrix of a pattern: `values` is flat, to be added into at `pattern.position(...)`."""
+    """Storage for one matrix of a pattern. Add to the flat array `values` at `pattern.position(...)`."""
 
     def __init__(self, pattern: BlockPattern):
         self.pattern = pattern
@@ -86,12 +86,12 @@ class BlockMatrix:
             block[np.diag_indices(len(block))] += value
 
     def mean_diagonal(self) -> float:
-        """Mean of the diagonal entries."""
+        """Return the mean of the diagonal entries."""
         return float(np.concatenate([block.diagonal() for block in self._diagonal]).mean())
 
     def factor(self) -> "BlockCholesky":
-        """Factorise in place: the values are overwritten. Raises NotPositiveDefinite."""
-        corners = []
+        """Factorise in place and return the factor; the values are overwritten. Raises NotPositiveDefinite."""
+        corners: list[np.ndarray] = []
         for i, block in enumerate(self._diagonal):
             if i:
                 below = self._coupling[i - 1]
@@ -106,7 +106,7 @@ class BlockMatrix:
         return BlockCholesky(self.pattern, self._diagonal, self._coupling)
 
     def multiply(self, x: np.ndarray) -> np.ndarray:
-        """A x for x (n,) or (n, k), before factorisation."""
+        """Return A x for x (n,) or (n, k). Only valid before `factor`."""
         x = np.asarray(x, dtype=float)
         result = np.zeros_like(x)
         start = self.pattern.start
@@ -123,7 +123,7 @@ class BlockMatrix:
 
 
 class BlockCholesky:
-    """A factorised BlockMatrix; it lives in the matrix's storage and is void once that is filled anew."""
+    """The factor of a BlockMatrix. It uses the matrix's storage, so it is void as soon as the matrix is filled again."""
 
     def __init__(self, pattern: BlockPattern, diagonal: list[np.ndarray], coupling: list[np.ndarray]):
         self._pattern = pattern
@@ -131,11 +131,11 @@ class BlockCholesky:
         self._coupling = coupling
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """A^-1 b for b (n,) or (n, k)."""
+        """Return A^-1 b for b (n,) or (n, k)."""
         b = np.asarray(b, dtype=float)
         columns = b.reshape(len(b), -1)
         start = self._pattern.start
-        parts = []
+        parts: list[np.ndarray] = []
         for i, block in enumerate(self._diagonal):
             part = np.array(columns[start[i] : start[i + 1]], order="F")
             if i:
@@ -151,11 +151,11 @@ class BlockCholesky:
 
 
 def order_in_levels(cliques: list[np.ndarray], n_nodes: int, clamped: np.ndarray) -> tuple[np.ndarray, BlockPattern]:
-    """Order nodes so that everything coupled lies in the same or in neighbouring levels.
+    """Order the nodes so that coupled nodes lie in the same level or in neighbouring levels.
 
-    cliques: groups of coupled nodes, each array (k, c) of k groups (the elements, the pieces of cables); clamped (b,)
-    nodes that are no unknowns. Returns the order (n_nodes,), the clamped nodes last, and the pattern of the unknowns,
-    three a node. Raises ValueError for nodes that nothing connects to the clamp.
+    cliques: arrays (k, c) of k groups of coupled nodes (elements, pieces of cables); clamped (b,): nodes without unknowns.
+    Returns the order (n_nodes,), the clamped nodes last, and the pattern of the unknowns, three per node. Raises ValueError for
+    nodes that are not connected to the clamp.
     """
     from scipy.sparse import csr_matrix
 
@@ -174,7 +174,7 @@ def order_in_levels(cliques: list[np.ndarray], n_nodes: int, clamped: np.ndarray
         level[new] = depth
         front = new.astype(float)
     if (level < 0).any():
-        raise ValueError(f"{(level < 0).sum()} nodes of the mesh are not connected with the base")
+        raise ValueError(f"{(level < 0).sum()} nodes of the mesh are not connected to the base")
     depth -= 1
     seen = np.zeros(n_nodes, dtype=bool)
     for i in range(1, depth):
@@ -186,6 +186,6 @@ def order_in_levels(cliques: list[np.ndarray], n_nodes: int, clamped: np.ndarray
 
 
 def _numbered(cliques: list[np.ndarray]) -> list[tuple[np.ndarray, int]]:
-    """Each array of groups with the number of its first group."""
+    """Return each array of groups with the number of its first group."""
     first = np.concatenate([[0], np.cumsum([len(c) for c in cliques])])
     return list(zip(cliques, first))

@@ -1,28 +1,29 @@
-"""Corotational linear tetrahedra: the article's kind of model, kept as the baseline to compare with.
+"""Corotational linear tetrahedra: the kind of model that the article uses, kept as a baseline for comparison.
 
 Per element, with the rotation R of the polar decomposition F = R U (Mueller and Gross 2004),
 
     f = R K_0 (R^T x - X),      K = R K_0 R^T,
 
-K_0 being the stiffness of linear elasticity; the derivative of R is left out, as real-time codes do. Such meshes lock:
-they are too stiff in bending.
+where K_0 is the stiffness of linear elasticity. The derivative of R is neglected, as real-time codes do. Such meshes lock: they
+are too stiff in bending.
 """
 
 import numpy as np
 from numba import njit
 
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
-from gravcomp.mechanics.total_lagrangian import SolidElements, ViscousStrain
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import Mesh
 
 
 class CorotationalElements(SolidElements):
-    """Linear tetrahedra with the interface of SolidElements; without damping of their own."""
+    """Linear tetrahedra with the interface of SolidElements, without the damping of the material."""
 
     def __init__(self, mesh: Mesh, pattern: BlockPattern):
         super().__init__(mesh, pattern)
         matrix = _strain_displacement(self.gradients[:, 0])
-        first, shear = self.lame.first[:, None, None], self.lame.shear[:, None, None]
+        first, shear = self.constants.first[:, None, None], self.constants.shear[:, None, None]
         block = np.zeros((6, 6))
         block[:3, :3] = 1.0
         elasticity = first * block + shear * np.diag([2.0, 2.0, 2.0, 1.0, 1.0, 1.0])
@@ -30,6 +31,7 @@ class CorotationalElements(SolidElements):
         self._gradient = np.ascontiguousarray(self.gradients[:, 0])
 
     def internal_force(self, u: np.ndarray, viscous: ViscousStrain | None = None) -> np.ndarray:
+        """Return internal forces (n, 3) in N at displacements `u` (n, 3); `viscous` is ignored."""
         force = np.zeros_like(u)
         _corotational(
             u, self.mesh.nodes, self._connectivity, self._gradient, self._stiffness, force, False, self._position, np.zeros(0)
@@ -43,6 +45,7 @@ class CorotationalElements(SolidElements):
         viscous: ViscousStrain | None = None,
         origin: np.ndarray | None = None,
     ) -> np.ndarray:
+        """Add the stiffness at `u` (n, 3) to `matrix` and return internal forces (n, 3) in N; the other arguments are ignored."""
         force = np.zeros_like(u)
         _corotational(
             u, self.mesh.nodes, self._connectivity, self._gradient, self._stiffness, force, True, self._position,
@@ -52,7 +55,7 @@ class CorotationalElements(SolidElements):
 
 
 def _strain_displacement(gradient: np.ndarray) -> np.ndarray:
-    """(k, 6, 12) small strain by the unknowns, component by component, for gradients (k, 3, 4)."""
+    """Return (k, 6, 12) the derivative of small strain by the unknowns, component by component, for gradients (k, 3, 4)."""
     b = np.zeros((len(gradient), 6, 3, 4))
     for i in range(3):
         b[:, i, i] = gradient[:, i]
@@ -63,8 +66,8 @@ def _strain_displacement(gradient: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _rotation(f, r):
-    """Rotation of the polar decomposition of f (3, 3) into r, by Higham's scaled Newton iteration."""
+def _rotation(f: np.ndarray, r: np.ndarray) -> None:
+    """Write the rotation of the polar decomposition of f (3, 3) into r, by Higham's Newton iteration."""
     r[:, :] = f
     inverse = np.empty((3, 3))
     for _ in range(20):
@@ -85,7 +88,11 @@ def _rotation(f, r):
 
 
 @njit(cache=True)
-def _corotational(u, rest, connectivity, gradient, stiffness, force, tangent, position, values):
+def _corotational(
+    u: np.ndarray, rest: np.ndarray, connectivity: np.ndarray, gradient: np.ndarray, stiffness: np.ndarray, force: np.ndarray,
+    tangent: bool, position: np.ndarray, values: np.ndarray,
+) -> None:  # fmt: skip
+    """Add internal forces to force (n, 3), and, if `tangent`, stiffness to `values` at `position`."""
     f, r = np.empty((3, 3)), np.empty((3, 3))
     local, moved = np.empty(12), np.empty(12)
     rotated = np.empty((12, 12))

@@ -1,8 +1,8 @@
 """Shape functions and quadrature of the elements.
 
-hex20: serendipity hexahedron on [-1, 1]^3; tet10, tet4: tetrahedra on the unit simplex. Node order as in VTK.
-Reduced integration of hex20 has 2 x 2 x 2 points (Zienkiewicz, Taylor, Too 1971): no locking in thin walls, and the
-spurious modes that it leaves cannot pass from one element to the next.
+hex20: serendipity hexahedron on [-1, 1]^3; tet10, tet4: tetrahedra on the unit simplex. Node order as in VTK. Reduced
+integration of hex20 has 2 x 2 x 2 points (Zienkiewicz, Taylor, Too 1971): thin walls do not lock, and its spurious modes cannot
+spread from one element to the next.
 """
 
 import dataclasses
@@ -12,9 +12,11 @@ import numpy as np
 from gravcomp.mesh.quadratic import TET_EDGES
 
 _HEX_NODES = np.array(
-    [(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)]
-    + [(0, -1, -1), (1, 0, -1), (0, 1, -1), (-1, 0, -1), (0, -1, 1), (1, 0, 1), (0, 1, 1), (-1, 0, 1)]
-    + [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
+    [
+        *((-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)),
+        *((0, -1, -1), (1, 0, -1), (0, 1, -1), (-1, 0, -1), (0, -1, 1), (1, 0, 1), (0, 1, 1), (-1, 0, 1)),
+        *((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)),
+    ],
     dtype=float,
 )
 # Barycentric coordinates of a tetrahedron as functions of (x, y, z): l = _BARY_0 + _BARY_D @ (x, y, z).
@@ -24,14 +26,14 @@ _BARY_D = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 
 
 @dataclasses.dataclass(frozen=True)
 class Quadrature:
-    """Integration over the reference element: points (p, 3), weights (p,)."""
+    """Quadrature rule on the reference element: points (p, 3), weights (p,)."""
 
     points: np.ndarray
     weights: np.ndarray
 
 
 def shape_values(kind: str, points: np.ndarray) -> np.ndarray:
-    """Shape functions at local points (..., 3): (..., c)."""
+    """Return the shape functions (..., c) at local points (..., 3)."""
     points = np.asarray(points, dtype=float)
     if kind == "hex20":
         x = points[..., None, :]
@@ -47,7 +49,7 @@ def shape_values(kind: str, points: np.ndarray) -> np.ndarray:
 
 
 def shape_gradients(kind: str, points: np.ndarray) -> np.ndarray:
-    """Derivatives of the shape functions by the local coordinates at (..., 3): (..., c, 3)."""
+    """Return the derivatives (..., c, 3) of the shape functions by the local coordinates at points (..., 3)."""
     points = np.asarray(points, dtype=float)
     if kind == "hex20":
         x = points[..., None, :]
@@ -71,7 +73,7 @@ def shape_gradients(kind: str, points: np.ndarray) -> np.ndarray:
 
 
 def stiffness_quadrature(kind: str) -> Quadrature:
-    """The rule for internal forces: reduced (8 points) for hex20, 4 points for tet10, one for tet4."""
+    """Return the rule for internal forces: reduced (8 points) for hex20, 4 points for tet10, one for tet4."""
     if kind == "hex20":
         return _gauss_cube(2)
     if kind == "tet10":
@@ -83,24 +85,24 @@ def stiffness_quadrature(kind: str) -> Quadrature:
 
 
 def mass_quadrature(kind: str) -> Quadrature:
-    """A rule that integrates products of two shape functions exactly on an undistorted element."""
+    """Return a rule that integrates products of two shape functions exactly on an undistorted element."""
     return _gauss_cube(3) if kind == "hex20" else _conical_simplex(3)
 
 
-def inside(kind: str, points: np.ndarray) -> np.ndarray:
-    """How far local points (..., 3) lie outside the reference element: (...,), zero or less inside."""
+def distance_outside(kind: str, points: np.ndarray) -> np.ndarray:
+    """Return the distance (...,) of local points (..., 3) outside the reference element, zero or less inside."""
     if kind == "hex20":
         return np.abs(points).max(-1) - 1.0
     return -np.minimum(points.min(-1), 1.0 - points.sum(-1))
 
 
 def centre(kind: str) -> np.ndarray:
-    """(3,) the middle of the reference element."""
+    """Return the centre (3,) of the reference element."""
     return np.zeros(3) if kind == "hex20" else np.full(3, 0.25)
 
 
 def reference_nodes(kind: str) -> np.ndarray:
-    """(c, 3) the nodes of the reference element."""
+    """Return the nodes (c, 3) of the reference element."""
     if kind == "hex20":
         return _HEX_NODES.copy()
     corners = np.vstack([np.zeros(3), np.eye(3)])
@@ -110,13 +112,14 @@ def reference_nodes(kind: str) -> np.ndarray:
 
 
 def _gauss_cube(n: int) -> Quadrature:
+    """Return Gauss's rule with n x n x n points on the cube."""
     x, w = np.polynomial.legendre.leggauss(n)
     points = np.stack(np.meshgrid(x, x, x, indexing="ij"), axis=-1).reshape(-1, 3)
     return Quadrature(points, np.einsum("i,j,k->ijk", w, w, w).ravel())
 
 
 def _conical_simplex(n: int) -> Quadrature:
-    """Stroud's conical product: the cube folded onto the simplex, exact to degree 2 n - 1."""
+    """Return Stroud's conical product rule, the cube mapped to the simplex, exact to degree 2 n - 1."""
     from scipy.special import roots_jacobi
 
     rules = []

@@ -1,8 +1,9 @@
 """Cross-sections of the body as linear functionals of its nodes.
 
-For a height Z of the straight body, points of the section there are fitted by x(X, Y) = p + f_1 X + f_2 Y (least squares,
-every point weighted by its share of the area). p is where the axis has gone, f_1 and f_2 are where the section's x and y
-have gone; the axis' direction is d = f_1 x f_2 / |f_1 x f_2|. p, f_1 and f_2 are weighted sums of node positions.
+For a height Z of the straight body, points of the section there are fitted by x(X, Y) = p + f_1 X + f_2 Y (least squares, every
+point weighted by its share of the area). p is the present position of the axis, f_1 and f_2 are the present directions of the
+section's x and y, and d = f_1 x f_2 / |f_1 x f_2| is the direction of the axis. p, f_1 and f_2 are weighted sums of node
+positions.
 """
 
 import numpy as np
@@ -14,9 +15,9 @@ _RINGS, _SPOKES = 9, 18
 
 
 def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
-    """(3 s, n): rows p, f_1, f_2 of every height (s,), to be multiplied with node positions (n, 3).
+    """Return (3 s, n) the rows p, f_1, f_2 of every height (s,) in m, to be multiplied with node positions (n, 3).
 
-    Raises MeshError where the body has no section.
+    Raises MeshError for a height at which the body has no section.
     """
     largest = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1]).max()
     radius, angle = np.meshgrid(
@@ -29,7 +30,7 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
         found = embed(mesh, points)
         within = found.outside < 1e-6
         if within.sum() < 6:
-            raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm to fix the backbone to")
+            raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm for the backbone")
         area = radius.ravel()[within]
         design = np.column_stack([np.ones(within.sum()), disc[within]])
         fit = np.linalg.solve(design.T @ (area[:, None] * design), design.T * area)

@@ -1,8 +1,10 @@
-"""Closed surfaces from files: checked by trimesh, filled with quadratic tetrahedra by Gmsh.
+"""Closed surfaces from files: trimesh checks them, Gmsh fills them with quadratic tetrahedra.
 
 Gmsh is an optional dependency (`pip install gmsh`); its wheel needs the system libraries libglu1-mesa, libgl1, libxcursor1,
 libxft2 and libxinerama1.
 """
+
+from typing import Any
 
 import numpy as np
 
@@ -10,14 +12,14 @@ from gravcomp.mesh.mesh import MeshError
 
 SURFACE_SUFFIXES = (".stl", ".ply", ".obj")
 _GMSH_TET10 = 11
-# Gmsh numbers the last two edges of a tetrahedron the other way round than VTK.
+# Gmsh and VTK number the last two edges of a tetrahedron in opposite order.
 _VTK_ORDER = [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]
 
 
 def mesh_surface(path: str, element_size: float) -> tuple[str, np.ndarray, np.ndarray]:
-    """Kind, nodes (n, 3) and elements (k, 10) of the body inside the surface; element_size in the file's unit.
+    """Return kind, nodes (n, 3) and elements (k, 10) of the body inside the surface, in the file's unit; so is element_size.
 
-    Raises MeshError for a surface that is open, and where Gmsh is missing.
+    Raises MeshError for a surface that is open, and if Gmsh is missing or fails.
     """
     check_surface(path)
     gmsh = _gmsh()
@@ -51,12 +53,12 @@ def mesh_surface(path: str, element_size: float) -> tuple[str, np.ndarray, np.nd
 
 
 def check_surface(path: str) -> None:
-    """Raises MeshError for a file that holds no closed surface."""
+    """Raise MeshError for a file without a closed surface."""
     import trimesh
 
     try:
-        surface = trimesh.load(path, force="mesh")
-    except Exception as error:  # trimesh's readers raise whatever their format's library raises
+        surface: Any = trimesh.load(path, force="mesh")
+    except Exception as error:  # the readers of trimesh pass on the exceptions of many libraries
         raise MeshError(f"{path}: cannot be read as a surface: {error}") from error
     if len(surface.faces) == 0:
         raise MeshError(f"{path}: has no triangles")
@@ -64,16 +66,17 @@ def check_surface(path: str) -> None:
         open_edges = len(surface.edges_unique) - len(surface.face_adjacency)
         raise MeshError(f"{path}: the surface is not closed ({open_edges} edges belong to one triangle); close its holes")
     if not surface.is_winding_consistent or surface.volume <= 0.0:
-        raise MeshError(f"{path}: the triangles do not all look outward; repair their orientation")
+        raise MeshError(f"{path}: not all triangles face outward; repair their orientation")
 
 
-def _gmsh():
+def _gmsh() -> Any:
+    """Return the module gmsh. Raises MeshError if it cannot be imported."""
     try:
         import gmsh
     except ImportError as error:
         raise MeshError(
             "meshing a surface needs Gmsh: pip install gmsh; its wheel needs the system libraries libglu1-mesa libgl1"
-            f" libxcursor1 libxft2 libxinerama1 (apt-get install ...). What is missing here: {error}"
+            f" libxcursor1 libxft2 libxinerama1 (apt-get install ...). Error: {error}"
         ) from error
     except OSError as error:
         raise MeshError(

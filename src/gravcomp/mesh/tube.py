@@ -1,6 +1,6 @@
-"""Meshes of a row of tubes, built from their dimensions: graded toward the clamp, whose corner is singular.
+"""Meshes of a row of tubes from their dimensions, graded toward the clamp, where the stress is singular.
 
-A grid in (radius, angle, z) is cut at every radius and height where a tube begins or ends, so that tubes of different
+A grid in (radius, angle, z) has a plane at every radius and height where a tube begins or ends, so that tubes of different
 diameters share their nodes. Its cells become 20-node hexahedra, or six tetrahedra each (Kuhn's division).
 """
 
@@ -14,18 +14,20 @@ from gravcomp.mesh.quadratic import TET_EDGES
 
 # Corners of a cell in (radial, around, along) half steps, in VTK's order, then the mid-edge nodes of hexahedron20.
 _HEX20 = np.array(
-    [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
-    + [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
-    + [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
+    [
+        *((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)),
+        *((1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)),
+        *((0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)),
+    ]
 )
 
 
 def tube_mesh(
     robot: Robot, kind: str = "hex20", around: int | None = None, along: int | None = None, radial: int | None = None
 ) -> Mesh:
-    """The mesh of the robot's segments; the numbers of elements are the robot's unless given.
+    """Return the mesh of the robot's segments; numbers of elements that are not given are the robot's.
 
-    kind: 'hex20', 'tet10' or 'tet4'. Raises MeshError when the numbers cannot be met.
+    kind: 'hex20', 'tet10' or 'tet4'. Raises MeshError for fewer elements along the robot than tubes and caps.
     """
     around = around or robot.elements.around
     along = along or robot.elements.along
@@ -34,17 +36,17 @@ def tube_mesh(
     heights, piece_of_layer = _layers([p[0] for p in pieces], along, robot.elements.grading)
     radii = _radii(pieces, radial)
 
-    cells = []
+    corners = []
     for layer, piece in enumerate(piece_of_layer):
         _, inner, outer, _ = pieces[piece]
         for ring in range(len(radii) - 1):
             if inner - 1e-9 <= radii[ring] and radii[ring + 1] <= outer + 1e-9:
-                cells += [(2 * ring, 2 * sector, 2 * layer, piece) for sector in range(around)]
-    cells = np.array(cells)
-    origin, piece = cells[:, :3], cells[:, 3]
+                corners += [(2 * ring, 2 * sector, 2 * layer, piece) for sector in range(around)]
+    cells = np.array(corners)
+    origin, pieces_of_cells = cells[:, :3], cells[:, 3]
     patterns = [_HEX20] if kind == "hex20" else _kuhn(quadratic=kind == "tet10")
     grid = np.concatenate([origin[:, None, :] + pattern for pattern in patterns])
-    region = np.concatenate([piece] * len(patterns))
+    region = np.concatenate([pieces_of_cells] * len(patterns))
     grid[:, :, 1] %= 2 * around
 
     shape = (2 * len(radii), 2 * around, 2 * len(heights))
@@ -58,7 +60,7 @@ def tube_mesh(
 
 
 def _pieces(robot: Robot) -> list[tuple]:
-    """(length, inner radius, outer radius, material) of every tube and cap from base to tip."""
+    """Return (length, inner radius, outer radius, material) of every tube and cap from base to tip."""
     pieces = []
     for segment in robot.segments:
         section = (segment.lumen_diameter / 2, segment.outer_diameter / 2)
@@ -69,7 +71,7 @@ def _pieces(robot: Robot) -> list[tuple]:
 
 
 def _layers(lengths: list[float], along: int, grading: float) -> tuple[np.ndarray, list[int]]:
-    """Heights of the layers' ends, in geometric progression and moved so that the pieces' ends are among them."""
+    """Return the heights of the layers' ends, graded and fitted to the ends of the pieces, and each layer's piece."""
     if along < len(lengths):
         raise MeshError(f"elements.along is {along}; the robot has {len(lengths)} tubes and caps: at least that many are needed")
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -85,18 +87,18 @@ def _layers(lengths: list[float], along: int, grading: float) -> tuple[np.ndarra
 
 
 def _radii(pieces: list[tuple], radial: int) -> np.ndarray:
-    """Radii of the rings: every tube's inner and outer radius, each gap divided."""
+    """Return the radii of the rings: every tube's inner and outer radius, each gap divided into `radial` parts."""
     ends = np.unique(np.round([r for p in pieces for r in p[1:3]], 9))
     return np.concatenate([[ends[0]], *(np.linspace(a, b, radial + 1)[1:] for a, b in itertools.pairwise(ends))])
 
 
 def _halved(values: np.ndarray) -> np.ndarray:
-    """The values and the means between them."""
+    """Return the values and the means between them."""
     return np.interp(np.arange(2 * len(values) - 1) / 2.0, np.arange(len(values)), values)
 
 
 def _kuhn(quadratic: bool) -> list[np.ndarray]:
-    """The six tetrahedra of a cell: one for each order of walking its edges from the first corner to the opposite one."""
+    """Return the six tetrahedra of a cell, one for each order of the edges on the way from a corner to the opposite one."""
     tets = []
     for order in itertools.permutations(range(3)):
         corners = [np.zeros(3, dtype=int)]

@@ -1,9 +1,9 @@
-"""The reduced basis: proper orthogonal decomposition of trained shapes in the energy of the straight robot.
+"""The reduced basis: proper orthogonal decomposition (POD) of trained shapes in the energy of the straight robot.
 
-Of all bases with r columns the POD basis leaves the least of the snapshots u_s (Sirovich 1987), here in the norm |u|^2
-= u^T K_0 u with the stiffness K_0 of the straight robot: a Galerkin solution is the best of its subspace in the energy,
-so this norm keeps the stiff, small motions (stretch, warping) without which a bending body locks. With the Gram matrix
-G = U K_0 U^T = V S V^T,
+Of all bases with r columns, the POD basis has the smallest projection error of the snapshots u_s (Sirovich 1987), here in the
+norm |u|^2 = u^T K_0 u with the stiffness K_0 of the straight robot. A Galerkin solution is optimal in the energy, so this norm
+keeps the stiff, small motions (stretch, warping) without which a bending body locks. With the Gram matrix G = U K_0 U^T = V S
+V^T,
 
     Phi = U^T V_r S_r^(-1/2),      Phi^T K_0 Phi = I,      q = Phi^T K_0 u.
 """
@@ -12,26 +12,24 @@ from collections.abc import Callable
 
 import numpy as np
 
-# Below this share of the largest, an eigenvalue is rounding.
+# An eigenvalue below this fraction of the largest is rounding error.
 _ROUNDING = 1e-12
 
 
 def energy_basis(snapshots: np.ndarray, stiffness: Callable[[np.ndarray], np.ndarray], modes: int) -> np.ndarray:
-    """Basis Phi (n, r) of the snapshots (s, n), orthonormal in the stiffness.
+    """Return the basis Phi (n, r) of the snapshots (s, n), orthonormal in the stiffness.
 
-    stiffness: maps (n, k) to K_0 times it. r is `modes`, or fewer where the snapshots hold no more.
+    stiffness: multiplies (n, k) by K_0. r is `modes`, or fewer if the snapshots have a lower rank.
     """
     combination = principal_combinations(snapshots @ stiffness(snapshots.T), modes)
     basis = snapshots.T @ combination
-    # Rounding of the small modes is taken out by a second orthonormalisation.
+    # A second orthonormalisation removes the rounding error of the small modes.
     correction = np.linalg.cholesky(basis.T @ stiffness(basis))
     return np.linalg.solve(correction, basis.T).T
 
 
 def principal_combinations(gram: np.ndarray, count: int) -> np.ndarray:
-    """Weights (s, k) of the combinations of s vectors with the Gram matrix (s, s) that hold most of them, orthonormal;
-    k <= count.
-    """
+    """Return weights (s, k), k <= count, of the orthonormal principal combinations of s vectors with the Gram matrix (s, s)."""
     values, vectors = np.linalg.eigh(0.5 * (gram + gram.T))
     best = np.argsort(values)[::-1][:count]
     best = best[values[best] > _ROUNDING * values[best[0]]]

@@ -1,26 +1,26 @@
-"""Cholesky's factor of a small dense matrix and its solves, for use inside compiled functions."""
+"""Cholesky factorisation and solution for a small dense matrix, for use inside compiled functions."""
 
 import numpy as np
 from numba import njit
 
-from gravcomp.reduction.rounding import REORDERED
+from gravcomp.rounding import REORDERED
 
 
 @njit(cache=True)
 def factorise(matrix: np.ndarray) -> tuple[bool, np.ndarray]:
-    """Whether a symmetric matrix (r, r), given by its lower triangle, is positive definite, and its factor L then."""
+    """Return whether a symmetric matrix (r, r), given by its lower triangle, is positive definite, and if so its factor L."""
     try:
         factor = np.linalg.cholesky(matrix)
-    except Exception:  # LinAlgError; compiled code knows no other class
+    except Exception:  # LinAlgError; compiled code can name no other class
         return False, matrix
-    return np.isfinite(factor[-1, -1]), factor  # LAPACK lets NaN pass, and it ends there
+    return np.isfinite(factor[-1, -1]), factor  # LAPACK does not stop at NaN, which then reaches the last entry
 
 
 @njit(cache=True, fastmath=REORDERED)
 def solve(factor: np.ndarray, columns: np.ndarray) -> None:
     """Replace `columns` B (r, k) by A^-1 B, where A = L L^T with L = `factor` (r, r).
 
-    All columns of a row at a time: with few of them LAPACK spends most of its time on other things.
+    Handles all columns of a row together: for so few columns LAPACK spends most of its time on overhead.
     """
     r, k = columns.shape
     for i in range(r):

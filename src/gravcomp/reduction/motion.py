@@ -3,9 +3,9 @@
     M_r = Phi^T M Phi,     g(q) = J^T (eps + beta d eps / dt + rho eta) - Phi^T f_weight - H^T lambda,
 
 integrated by generalized-alpha. The strains eps(q) of the reduced elasticity are objective, and so is Kelvin-Voigt's damping
-with their second backward difference and the creep of `simulation.viscosity` (rho, held strain eta); beta, rho and T are the same
-in the whole robot. Each Newton step has its own factor, which is cheap here, and the correction that this factor still gives after
-the step decides whether another one is needed. A step is one compiled function, as in `tracking`.
+with their second backward difference and the creep of `simulation.viscosity` (rho, held strain eta); beta, rho and T are the
+same in the whole robot. Each Newton step has its own factor, which is cheap here, and the correction that this factor still
+gives after the step decides whether another one is needed. A step is one compiled function, as in `tracking`.
 """
 
 import dataclasses
@@ -14,15 +14,15 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.full_model.statics import CableInput
 from gravcomp.full_model.viscosity import branch
 from gravcomp.reduction.body import Point, body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
+from gravcomp.rounding import REORDERED
 
 _MOST_ITERATIONS = 16
 
@@ -30,8 +30,8 @@ _MOST_ITERATIONS = 16
 @dataclasses.dataclass(frozen=True)
 class ReducedMotion:
     """A state of motion: q, velocity, acceleration (r,), tension (m,), the model at that point, the forces g (r,), the strains (k,)
-    one step before and those held by the branch that creeps, that step in s, the norm of the forces out of balance in N, and whether
-    the step converged.
+    one step before and those held by the branch that creeps, that step in s, the norm of the forces out of balance in N, and
+    whether the step converged.
     """
 
     q: np.ndarray
@@ -85,7 +85,7 @@ class ReducedDynamicSolver:
             q, np.zeros_like(q), acceleration, tension, point, force, point.strain, np.zeros_like(point.strain)
         )
 
-    def go_on(self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
+    def take_over(self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
         """Take over a motion that another model found: q, velocity and acceleration (r,), tension (m,).
 
         The forces are taken to be those that the acceleration needs; this model's own would jar its highest frequencies.
@@ -148,8 +148,8 @@ class ReducedDynamicSolver:
 def _stepped(body, point, q, tension, rest, inertia, weight, wound, given, now, scale, offset, tolerance):
     """Whether the step converged, and at its end q, tension, point, force g and the norm of the forces out of balance in N.
 
-    The balance is rest (r,) + inertia (r, r) (q - q_n) + now g(q); wound, given: of `cable_arrays`; scale and offset (k,): the stress
-    is scale eps + offset; tolerance: m of the tip.
+    The balance is rest (r,) + inertia (r, r) (q - q_n) + now g(q); wound, given: of `cable_arrays`; scale and offset (k,): the
+    stress is scale eps + offset; tolerance: m of the tip.
     """
     m, r, start, cables = len(tension), len(q), q, body.cables
     compliance, answer, of_tip = np.zeros((m, m)), np.zeros((m, r)), np.zeros((3, r))

@@ -1,16 +1,18 @@
-"""The cables in reduced coordinates: their straight pieces e_k(q) = e_k(0) + D_k q, and what follows from them, compiled."""
+"""The cables in reduced coordinates: straight pieces e_k(q) = e_k(0) + D_k q, lengths, Jacobian and stiffness, compiled."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from gravcomp.reduction.rounding import REORDERED
+from gravcomp.rounding import REORDERED
 
 
 class ReducedCables(NamedTuple):
-    """rest (s, 3), change (3 s, r) and cable (s,) of the straight pieces; rest_length (m,) of the paths and the cables' own
-    axial_compliance (m,).
+    """The cables of a reduced model.
+
+    rest (s, 3): e_k(0) in m; change (3 s, r): D_k; cable (s,): cable of each straight piece; rest_length (m,) of the paths in m;
+    axial_compliance (m,) of the cables in m/N.
     """
 
     rest: np.ndarray
@@ -21,8 +23,9 @@ class ReducedCables(NamedTuple):
 
 
 class ReducedTendons(NamedTuple):
-    """The cables at coordinates q: tangent (s, 3) and length (s,) of the pieces, displacement (m,) of the paths and its
-    derivative jacobian (m, r).
+    """The cables at coordinates q.
+
+    tangent (s, 3) and length (s,) of the pieces; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q.
     """
 
     tangent: np.ndarray
@@ -33,7 +36,7 @@ class ReducedTendons(NamedTuple):
 
 @njit(cache=True, fastmath=REORDERED)
 def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
-    """The cables at q (r,)."""
+    """Return the cables at q (r,)."""
     count, r = len(cables.cable), len(q)
     tangent, length = np.empty((count, 3)), np.empty(count)
     displacement, jacobian = cables.rest_length.copy(), np.zeros((len(cables.rest_length), r))
@@ -56,10 +59,10 @@ def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
 
 @njit(cache=True, fastmath=REORDERED)
 def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, matrix: np.ndarray) -> None:
-    """Add to the lower triangle of matrix (r, r) the stiffness that the tensions (m,) give the body.
+    """Add the geometric stiffness of cables under the tensions (m,) to the lower triangle of matrix (r, r).
 
-    That of a piece is tension / length D^T (I - t t^T) D, and I - t t^T = a a^T + b b^T with two vectors across t: the
-    sum is the product of the rows sqrt(tension / length) a^T D and b^T D with themselves.
+    The stiffness of a piece is tension / length D^T (I - t t^T) D, where I - t t^T = a a^T + b b^T with two unit vectors across
+    t. So the sum over all pieces is R^T R with the rows sqrt(tension / length) a^T D and sqrt(tension / length) b^T D.
     """
     r = len(matrix)
     rows, used = np.empty((2 * len(cables.cable) + 3, r)), 0
@@ -93,12 +96,13 @@ def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.nd
 def lacking(
     cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray, compliance: np.ndarray, wound: np.ndarray
 ) -> np.ndarray:
-    """Change of tension (m,) that would about bring the cables to the displacements they are wound to (m,), NaN for released
-    ones; none where they are slack. compliance (m, m).
+    """Return the change of tension (m,) that approximately brings the cables to the displacements `wound` (m,), NaN: released.
+
+    It is 0 for slack cables. compliance (m, m) in m/N.
     """
     change = np.zeros_like(tension)
     for i in range(len(tension)):
         gap = wound[i] - tendons.displacement[i] - cables.axial_compliance[i] * tension[i]
-        if gap > 0.0 or (tension[i] > 0.0 and gap <= 0.0):  # NaN is neither
+        if gap > 0.0 or (tension[i] > 0.0 and gap <= 0.0):  # false for NaN
             change[i] = gap / compliance[i, i]
     return change

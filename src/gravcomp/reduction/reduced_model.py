@@ -1,6 +1,6 @@
-"""A robot's model projected on a reduced basis: everything that a step needs, in r coordinates.
+"""A robot's model projected on a reduced basis, u = Phi q with r coordinates q.
 
-u = Phi q. The elastic forces are polynomials in q (`strain_polynomials`); the weight, the straight pieces of the cables and the
+The elastic forces are polynomials in q (`strain_polynomials`). The weight, the straight pieces of the cables and the
 cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(0) + D_k q, sections(q) = sections(0) + S q.
 """
 
@@ -15,16 +15,18 @@ from gravcomp.cables.tendons import pieces_of
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.reduction.reduced_cables import ReducedCables
-from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
+from gravcomp.rounding import REORDERED
 
 
 @dataclass(frozen=True)
 class ReducedModel:
-    """basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g of the nodal
-    forces f that the basis sees as g; elasticity; weight (r, 3): force of unit gravity; cables; section_rest (n + 1, 3, 3),
-    section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| that it may serve;
-    error (m): the worst tip error found when it was built.
+    """A model in r reduced coordinates.
+
+    basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g for nodal forces
+    f with the reduced force g; elasticity; weight (r, 3): force of unit gravity; cables; section_rest (n + 1, 3, 3) and
+    section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| for which the model may be
+    used; error: largest tip error in m that was found when it was built.
     """
 
     basis: np.ndarray
@@ -40,32 +42,38 @@ class ReducedModel:
 
     @property
     def size(self) -> int:
+        """Number r of coordinates."""
         return self.basis.shape[1]
 
     def observe(self, q: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`; of them what `observation.observe` makes, with the changes
-        for changes (k, r) of q.
+        """Return the sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`, and the results of `observation.observe` for them.
+
+        answer (k, r): changes of q for which the changes of the effector are computed.
         """
         return _observed(self.section_rest, self.section_change, q, answer)
 
     def tip(self, q: np.ndarray) -> np.ndarray:
-        """(3,) position of the tip at q (r,)."""
+        """Return the position (3,) of the tip at q (r,) in m."""
         return self.section_rest[-1, 0] + self.section_change[-1, 0] @ q
 
     def outside(self, q: np.ndarray) -> float:
-        """How far q (r,) lies outside of what was trained: above 1 it does. |q| is the root of twice the linear elastic
-        energy.
+        """Return |q| / reach for q (r,): above 1, the shape is outside the trained range.
+
+        |q| is the root of twice the linear elastic energy.
         """
         return math.sqrt(q @ q) / self.reach
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _observed(section_rest, section_change, q, answer):
+def _observed(
+    section_rest: np.ndarray, section_change: np.ndarray, q: np.ndarray, answer: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Compiled `ReducedModel.observe`."""
     count, columns = len(section_rest) - 1, len(answer)
     sections, moved = section_rest.copy(), np.zeros((count + 1, 3, 3, columns))
     for s in range(count + 1):
         for v in range(3):
-            seen = v == 0 or s == count  # of the backbone only how the positions change is observed
+            seen = v == 0 or s == count  # the effector contains no direction of the backbone
             for i in range(3):
                 line = section_change[s, v, i]
                 value = 0.0
@@ -84,7 +92,7 @@ def _observed(section_rest, section_change, q, answer):
 
 
 def project(model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, reach: float, error: float) -> ReducedModel:
-    """The model on a basis (3 n_free, r). reach: largest |q| to serve; error (m): known of the basis."""
+    """Return the model on a basis (3 n_free, r). reach: largest |q| to use it for; error: known tip error in m."""
     r = basis.shape[1]
     fields = np.zeros((r, len(model.mesh.nodes), 3))
     fields[:, : model.n_free] = basis.T.reshape(r, model.n_free, 3)

@@ -1,10 +1,9 @@
-"""Serving steps from the reduced model while it can be trusted.
+"""Steps of the reduced model, as long as its error is small.
 
-It is trusted as long as it converges, stays within what was trained, and its error, measured every few seconds and
-after every large motion, is small. The full model measures it: one Newton step with its own factorised stiffness from
-the reduced shape, u* = u - A^-1 R(u), comes second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the
-error. While the reduced model is not trusted the full one serves, and now and then both are compared, until they agree
-again.
+The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured
+every few seconds and after every large motion, with the full model: one Newton step with its own factorised stiffness from the
+reduced shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. Otherwise
+the full model computes the steps, and from time to time both are compared, until they agree again.
 """
 
 import dataclasses
@@ -12,24 +11,28 @@ import time
 
 import numpy as np
 
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
-from gravcomp.full_model.statics import CableInput, Equilibrium, StaticSolver
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 
-# Largest tip error, as a fraction of the length, at which the reduced model serves; half of it lets it serve again.
+# Largest tip error of the reduced model as a fraction of the length; below half of it, the reduced model is used again.
 _TOLERANCE = 1e-3
-# Steps until the error is measured again, and at the least where the shape has moved by this share of the reach since.
+# Steps between two measurements of the error; smallest number of steps after a motion by this fraction of the reach.
 _CHECK_EVERY, _CHECK_AT_LEAST, _CHECK_MOVED = 300, 20, 0.1
-# Steps of the full model until the reduced one is tried again.
+# Steps of the full model before the reduced model is tried again.
 _RETURN_AFTER = 25
+_UNTRAINED = "the shape is outside the range that the reduced model was trained for"
 
 
 class ReducedServing:
-    """Takes steps with the reduced model in place of the full one, and says when it cannot.
+    """Computes steps with the reduced model in place of the full one, and reports when it cannot.
 
-    Attributes: reduced, the model that serves. full: the solver of the full model, used for the checks; where the reduced model gives up, it is left at the last shape.
+    Attributes: reduced: the reduced model; reason: why it is not used now, empty while it is. The solver `full` of the full
+    model measures the error; when the reduced model is left, the solver is at its last shape.
     """
 
     def __init__(self, model: RobotModel, reduced: ReducedModel, full: StaticSolver):
@@ -39,7 +42,7 @@ class ReducedServing:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the straight robot, trusted."""
+        """Return to the straight robot; the reduced model is used."""
         self._tracker.place(np.zeros(self.reduced.size), np.zeros(self._model.tendons.count))
         self._error = self.reduced.error
         self._since_check = _CHECK_EVERY - _CHECK_AT_LEAST
@@ -47,28 +50,41 @@ class ReducedServing:
         self._until_return = 0
         self.reason = ""
 
+    def warm_up(self) -> None:
+        """Compile the functions of a step, or load them from the cache; afterwards the robot is straight."""
+        for wound in (None, np.zeros(self._model.tendons.count)):
+            state = self._tracker.track(np.zeros(3), CableInput(wound=wound))
+            self.reduced.observe(state.q, state.answer)
+        self.reset()
+
+    def stand_by(self) -> None:
+        """Wait for a shape of the full model; it serves until both models agree."""
+        self.reason, self._until_return = "the reduced model has just been built", 0
+
     @property
     def trusted(self) -> bool:
-        """Whether the last step was the reduced model's, or the next one will be."""
+        """Whether the reduced model is used for the next step."""
         return not self.reason
 
     @property
     def displacements(self) -> np.ndarray:
-        """(n, 3) displacements of the nodes at the reduced model's shape, in m."""
+        """Displacements (n, 3) of the nodes at the reduced model's shape, in m."""
         u = np.zeros_like(self._model.mesh.nodes)
         self._model.free(u)[:] = self.reduced.basis @ self._tracker.state.q
         return u
 
     def step(self, gravity: np.ndarray, cables: CableInput) -> Shape | None:
-        """The shape under gravity (3,) and the cables' input, following the last one; None when the full model has to give it."""
+        """Return the shape under gravity (3,) and the cables' input, tracked from the last one; None: use the full model."""
         if not self.trusted:
             return None
         started = time.perf_counter()
         state = self._tracker.track(gravity, cables, iterations=10)
         if not state.converged:
-            return self._leave("the reduced model did not converge", wait=0)
+            self._leave("the reduced model did not converge", wait=0)
+            return None
         if self.reduced.outside(state.q) > 1.0:
-            return self._leave("the shape is beyond what the reduced model was trained for", wait=_RETURN_AFTER)
+            self._leave(_UNTRAINED, wait=_RETURN_AFTER)
+            return None
         self._since_check += 1
         moved = state.q - self._checked_at
         far = moved @ moved > (_CHECK_MOVED * self.reduced.reach) ** 2 and self._since_check >= _CHECK_AT_LEAST
@@ -76,18 +92,19 @@ class ReducedServing:
             self._since_check, self._checked_at = 0, state.q
             self._error = self._measured_error(gravity, cables)
             if not self._error < self._tolerance:
-                return self._leave(f"the reduced model's tip is off by {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
+                self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
+                return None
         return self._shape(state, gravity, started)
 
     def take_over(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput) -> None:
-        """After a step of the full model: let the reduced one serve again when both agree."""
+        """After a step of the full model: use the reduced model again if both agree. Compared every few steps only."""
         self._until_return -= 1
         if self._until_return <= 0:
             self.follow(state, gravity, cables)
 
     def follow(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput) -> None:
-        """Go to a shape of the full model, and serve from there if both models agree on it."""
-        self.reason = self.reason or "the shape is beyond what the reduced model was trained for"
+        """Go to a shape of the full model; use the reduced model from there if both agree on it."""
+        self.reason = self.reason or _UNTRAINED
         self._until_return = _RETURN_AFTER
         if not state.converged:
             return
@@ -99,11 +116,12 @@ class ReducedServing:
             self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
 
     def _leave(self, reason: str, wait: int) -> None:
+        """Stop using the reduced model, for at least `wait` steps."""
         self.reason, self._until_return = reason, wait
         self._hand_over()
 
     def _hand_over(self) -> None:
-        """Put the full model where the reduced one is."""
+        """Set the full model to the reduced model's shape."""
         u = self.displacements
         self._full.state = dataclasses.replace(
             self._full.state,
@@ -113,6 +131,7 @@ class ReducedServing:
         )
 
     def _measured_error(self, gravity: np.ndarray, cables: CableInput) -> float:
+        """Return the tip error of the reduced model in m."""
         self._hand_over()
         before = self._tip(self._full.state.u)
         return float(np.linalg.norm(self._tip(self._full.track(gravity, cables, iterations=1).u) - before))

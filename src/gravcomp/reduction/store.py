@@ -1,6 +1,7 @@
-"""Built reductions in the cache, by content: a robot whose mesh, material, cables or load changed has another entry.
+"""Reductions in the cache, by content: a robot with another mesh, material, cables or payload has another entry.
 
-Young's moduli enter by their ratios alone: the reduction of one modulus serves others in the range that it was trained for.
+Only the ratios of the Young's moduli are part of the key: a reduction is valid for all moduli in the range that it was trained
+for.
 """
 
 import dataclasses
@@ -11,19 +12,22 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.full_model.model import RobotModel
+from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
-# Part of the key; to be raised when what is stored, or how it is trained, changes.
+# Part of the key; increase it when the stored content or the training changes.
 _FORMAT = 7
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What is built once: basis (3 n_free, r) and elasticity at the Young's modulus `modulus` (Pa) of the first
-    material; reach: the largest |q| to serve; modulus_low and modulus_high (Pa) of what was trained; samples, and the
-    median and worst tip error (m) over shapes not trained.
+    """Stored result of the training.
+
+    basis (3 n_free, r) and elasticity at the Young's modulus `modulus` of the first material in Pa; reach: largest |q| to use
+    it for; modulus_low and modulus_high: trained range in Pa; samples: number of trained shapes; error_median and error_worst:
+    tip error in m over shapes that were not trained.
     """
 
     basis: np.ndarray
@@ -37,31 +41,31 @@ class Reduction:
     error_worst: float
 
     def reduced_model(self, model: RobotModel) -> ReducedModel:
-        """The reduction applied to the model, whose modulus may differ from the trained one."""
-        # With moduli s times as large a basis of energy 1 is sqrt(s) times smaller, and so are the products of its gradients.
+        """Return the reduced model; the model's modulus may differ from `modulus`."""
+        # With moduli s times as large, a basis of energy 1 is sqrt(s) times smaller, and so are the products of its gradients.
         root = float(np.sqrt(first_modulus(model) / self.modulus))
         elasticity = StrainPolynomials(self.elasticity.linear, self.elasticity.quadratic / root)
         return project(model, self.basis / root, elasticity, self.reach * root, self.error_worst)
 
 
 def why_not(model: RobotModel) -> str:
-    """Why a robot cannot be reduced, as a sentence; empty when it can."""
+    """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
     if not isinstance(model.elements, SolidElements):
         return "corotational tetrahedra have no polynomial strain: the full model serves"
-    if any(material.law != "svk" for material in model.mesh.materials):
-        return "the reduction holds for the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model serves"
+    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
+        return "the reduction needs the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model serves"
     if model.tendons.friction.any():
-        return "cables with friction depend on how they moved before: the full model serves"
+        return "cables with friction depend on their past motion: the full model serves"
     return ""
 
 
 def first_modulus(model: RobotModel) -> float:
-    """Young's modulus in Pa of the first material, to which the others are relative."""
+    """Return the Young's modulus of the first material in Pa, to which the others are relative."""
     return model.mesh.materials[0].youngs_modulus
 
 
 def path_of(model: RobotModel) -> Path:
-    """Where the model's reduction is kept; it may not exist yet."""
+    """Return the path of the model's reduction in the cache; the file may not exist yet."""
     materials = [dataclasses.asdict(material) for material in model.mesh.materials]
     for material in materials:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
@@ -69,14 +73,14 @@ def path_of(model: RobotModel) -> Path:
             del material[viscous]
     mesh, robot = model.mesh, model.robot
     cables = [dataclasses.asdict(cable) for cable in robot.cables]
-    for cable in cables:  # its elongation is outside the body: calibration must not cost a new reduction
+    for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
         del cable["axial_stiffness"]
     key = content_key(_FORMAT, mesh.kind, mesh.nodes, mesh.elements, mesh.region, materials, cables, robot.payload)
     return cache_path("reduction", key, ".npz")
 
 
 def save(reduction: Reduction, path: Path) -> None:
-    """Write the reduction; a reader never sees half of it."""
+    """Write the reduction atomically."""
     values = {f.name: getattr(reduction, f.name) for f in dataclasses.fields(Reduction) if f.name != "elasticity"}
     part = path.with_name(path.stem + ".part.npz")
     np.savez(part, strain_linear=reduction.elasticity.linear, strain_quadratic=reduction.elasticity.quadratic, **values)
@@ -84,7 +88,7 @@ def save(reduction: Reduction, path: Path) -> None:
 
 
 def load(model: RobotModel) -> Reduction | None:
-    """The model's reduction; None where none is built that covers its modulus."""
+    """Return the model's reduction; None if none is built for its modulus."""
     path = path_of(model)
     if why_not(model) or not path.exists():
         return None

@@ -22,7 +22,7 @@ from numba import njit
 
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.basis import principal_combinations
-from gravcomp.reduction.rounding import REORDERED
+from gravcomp.rounding import REORDERED
 
 # Voigt's order 11 22 33 12 23 13 with doubled shear, as in the elements.
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
@@ -33,8 +33,8 @@ _POINTS_AT_ONCE = 400
 class StrainPolynomials:
     """linear a^T (r, m) and quadratic B^T (r (r + 1) / 2, m), in sqrt(J): of each symmetric B_m the lower half, row by row.
 
-    The strains run along the last axis, because so a step reads memory in order; B is in single precision, because reading it is what
-    a step waits for. Force and stiffness remain exact derivatives of one energy.
+    The strains run along the last axis, because so a step reads memory in order; B is in single precision, because reading it
+    is what a step waits for. Force and stiffness remain exact derivatives of one energy.
     """
 
     linear: np.ndarray
@@ -58,7 +58,8 @@ def strain_at(linear, quadratic, q):
     r, modes = linear.shape
     jacobian, strain = linear.copy(), np.zeros(modes)
     for i in range(r):
-        # Entry (i, j) of the packed symmetric matrices; four at a time, so that the row that is added to is read and written less.
+        # Entry (i, j) of the packed symmetric matrices; four at a time, so that the row that is added to is read and written
+        # less.
         to, j = jacobian[i], 0
         while j + 4 <= r:
             p_0, p_1, p_2, p_3 = _packed(i, j), _packed(i, j + 1), _packed(i, j + 2), _packed(i, j + 3)
@@ -171,8 +172,8 @@ def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) ->
             gradient=gradient,
             linear=_voigt(gradient),
             strains=_voigt(moved + 0.5 * np.einsum("pkia,pkja->pija", moved, moved, optimize=True)),
-            first_lame=np.repeat(elements.lame.first[part], count),
-            shear=np.repeat(elements.lame.shear[part], count),
+            first_lame=np.repeat(elements.constants.first[part], count),
+            shear=np.repeat(elements.constants.shear[part], count),
             weight=elements.weights[part].ravel(),
         )
 

@@ -14,19 +14,20 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
-from gravcomp.full_model.statics import CableInput
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.reduction.body import body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.rounding import REORDERED
 from gravcomp.reduction.strain_polynomials import tangent
+from gravcomp.rounding import REORDERED
 
 
 @dataclass
 class ReducedState:
     """q (r,), tension (m,), displacement (m,) of the cables' paths; compliance (m, m) and answer X^T (m, r) of the last step;
-    residual (N): of the nodal forces out of balance, as far as the basis sees them, the norm, no less than the largest; converged.
+    residual (N): of the nodal forces out of balance, as far as the basis sees them, the norm, no less than the largest;
+    converged.
     """
 
     q: np.ndarray

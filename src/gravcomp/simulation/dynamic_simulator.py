@@ -8,16 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.full_model.dynamics import DynamicSolver, Motion
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
 from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.motion import Motion
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Shape, ShapeStatus
-from gravcomp.full_model.statics import CableInput
 from gravcomp.simulation.simulator import Simulator
 
 if TYPE_CHECKING:
     from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion
+    from gravcomp.reduction.reduced_model import ReducedModel
+    from gravcomp.reduction.serving import ReducedServing
 
 # Distance of the two models' tips, as a fraction of the length, up to which the reduced one takes over.
 _AGREEMENT = 5e-4
@@ -25,6 +28,19 @@ _AGREEMENT = 5e-4
 _RETURN_AFTER = 25
 # How often a time step that does not converge is halved.
 _HALVINGS = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class _LoadedMotion:
+    """A reduced model that was loaded for a running simulator; solver and momentum as in `DynamicSimulator._reduced_solver`."""
+
+    serving: "ReducedServing"
+    solver: "ReducedDynamicSolver | None"
+    momentum: "np.ndarray | None"
+
+    def warm_up(self) -> None:
+        """As `ReducedServing.warm_up`."""
+        self.serving.warm_up()
 
 
 class DynamicSimulator:
@@ -41,8 +57,18 @@ class DynamicSimulator:
         self.model, self.robot = self.statics.model, self.statics.robot
         self.options = options
         self.solver = DynamicSolver(self.model, options)
-        self._reduced, self._momentum = self._reduced_solver()
+        self._reduced, self._momentum = self._reduced_solver(self.statics.reduced_model)
         self._in_reduced, self._wait = False, 0
+
+    def load_reduced(self) -> "_LoadedMotion | None":
+        """As `Simulator.load_reduced`, with the motion."""
+        serving = self.statics.load_reduced()
+        return serving and _LoadedMotion(serving, *self._reduced_solver(serving.reduced))
+
+    def adopt(self, loaded: "_LoadedMotion") -> None:
+        """As `Simulator.adopt`."""
+        self.statics.adopt(loaded.serving)
+        self._reduced, self._momentum = loaded.solver, loaded.momentum
 
     @property
     def displacements(self) -> np.ndarray:
@@ -115,7 +141,7 @@ class DynamicSimulator:
             self._reduced.state, self._wait = before, _RETURN_AFTER
         if self._in_reduced:
             last = self._reduced.state
-            self.solver.go_on(*(self._lifted(x) for x in (last.q, last.velocity, last.acceleration)), last.tension)
+            self.solver.take_over(*(self._lifted(x) for x in (last.q, last.velocity, last.acceleration)), last.tension)
             self._in_reduced = False
         return _advanced(self.solver, gravity, cables, h, count)
 
@@ -129,7 +155,7 @@ class DynamicSimulator:
             q = reduced.coordinates_of @ free(last.u)
             tip = self.model.effectors.sections(self.model.mesh.nodes + last.u)[-1, 0]
             if np.linalg.norm(reduced.tip(q) - tip) < _AGREEMENT * self.model.length:
-                self._reduced.go_on(
+                self._reduced.take_over(
                     q, self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration), last.tension
                 )
                 self._in_reduced = True
@@ -146,11 +172,10 @@ class DynamicSimulator:
         self.model.free(field)[:] = self._reduced.model.basis @ q
         return field
 
-    def _reduced_solver(self) -> "tuple[ReducedDynamicSolver | None, np.ndarray | None]":
+    def _reduced_solver(self, reduced: "ReducedModel | None") -> "tuple[ReducedDynamicSolver | None, np.ndarray | None]":
         """The reduced model's motion, and the matrix (r, 3 n_free) to the coordinates' velocity of the same momentum; None
         without a reduced model, and where the materials do not damp and creep alike.
         """
-        reduced = self.statics.reduced_model
         laws = {(m.damping_time, m.creep_ratio, m.creep_time) for m in self.model.mesh.materials}
         if reduced is None or (len(laws) > 1 and self.options.damping == "kelvin_voigt"):
             return None, None

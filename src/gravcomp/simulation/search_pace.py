@@ -7,7 +7,7 @@ whoever took that step can take it back.
 
 import numpy as np
 
-from gravcomp.full_model.statics import CableInput
+from gravcomp.full_model.cable_input import CableInput
 
 # Steps before a search, the first and the longest pause.
 _FIRST_PAUSE, _LONGEST_PAUSE = 50, 3200

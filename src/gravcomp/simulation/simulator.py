@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
-from gravcomp.full_model.statics import CableInput, Equilibrium, StaticSolver
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
+    from gravcomp.reduction.serving import ReducedServing
 
 # Green's strain in compression from which on St. Venant-Kirchhoff's stress falls.
 _SOFTENING = -1.0 / 3.0
@@ -28,15 +31,24 @@ class Simulator:
 
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
         """`reduced`: use the reduced model where one is built. Raises MeshError for a body that cannot be computed with."""
-        from gravcomp.reduction.serving import ReducedServing
-        from gravcomp.reduction.store import load
-
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
         self._pace = SearchPace(self.model.length)
-        reduction = load(self.model) if reduced else None
-        self._serving = reduction and ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
+        self._serving = self.load_reduced() if reduced else None
+
+    def load_reduced(self) -> "ReducedServing | None":
+        """Return the reduced model of this robot, ready to serve; None when none is stored. May run in a thread of its own."""
+        from gravcomp.reduction.serving import ReducedServing
+        from gravcomp.reduction.store import load
+
+        reduction = load(self.model)
+        return reduction and ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
+
+    def adopt(self, serving: "ReducedServing") -> None:
+        """Serve by `serving`, from `load_reduced`, as soon as it agrees with the full model's shape: the shape does not jump."""
+        serving.stand_by()
+        self._serving = serving
 
     @property
     def reduced_model(self) -> "ReducedModel | None":
@@ -79,7 +91,7 @@ class Simulator:
             if self._pace.may_search(gravity, cables):
                 state = self.solver.solve(gravity, cables)
             else:
-                state = dataclasses.replace(before, residual=state.residual, converged=False, carried=1.0)
+                state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
         if state.converged:
             self._pace.found(gravity, cables)
         else:
@@ -152,9 +164,9 @@ class Simulator:
 
     def _why_not(self, state: Equilibrium) -> str:
         """What a person should know about a load that found no equilibrium."""
-        if state.carried == 1.0:  # not searched for
+        if state.load_fraction == 1.0:  # not searched for
             return "no equilibrium was found near the last shape, which is kept"
-        message = f"no equilibrium was found beyond {100 * state.carried:.0f} % of the load"
+        message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
         softened = np.array([material.law == "svk" for material in self.model.mesh.materials])[self.model.mesh.region]
         if isinstance(self.model.elements, SolidElements) and softened.any():
             least = self.model.elements.strains(state.u)[softened, :, :3].min()

@@ -1,15 +1,21 @@
 """Building a robot's reduction: train, decompose, integrate, and test on motions that it was not trained for."""
 
+import contextlib
+import fcntl
+import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gravcomp.cache import content_key
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.model import RobotModel
-from gravcomp.full_model.statics import CableInput
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.mesh import MeshError
 from gravcomp.reduction.basis import energy_basis
+from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
@@ -44,7 +50,8 @@ def build(
     reason = why_not(model)
     if reason:
         raise MeshError(reason)
-    trained = samples(model, options.training, lambda share: progress("training", share))
+    kept = path_of(model).with_suffix(".training") / content_key(options.training)
+    trained = samples(model, options.training, lambda share: progress("training", share), kept)
     if len(trained) < options.modes:
         raise MeshError(f"only {len(trained)} equilibria were found to train with; the robot may not carry its own weight")
     progress("decomposing", 0.0)
@@ -74,8 +81,23 @@ def build(
     if not errors.size:
         raise MeshError("the reduced model finds none of the equilibria that it was tested with: the full model serves")
     reduction = replace(reduction, error_median=float(np.median(errors)), error_worst=float(errors.max()))
+    # A running simulator must find everything compiled when it finds the file.
+    ReducedServing(model, reduction.reduced_model(model), StaticSolver(model)).warm_up()
     save(reduction, path_of(model))
+    shutil.rmtree(kept.parent, ignore_errors=True)
     return reduction, time.perf_counter() - started
+
+
+@contextlib.contextmanager
+def alone(model: RobotModel, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Context in which no other process builds the same reduction. waiting: called when another process has to end first."""
+    with open(path_of(model).with_suffix(".lock"), "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            waiting()
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) -> np.ndarray:

@@ -7,8 +7,11 @@ direction, so that the tensions are those the loop will ask for, its transients 
 released and the robot hangs.
 """
 
+import json
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -39,6 +42,9 @@ class TrainingOptions:
     seed: int = 1
 
 
+_ARRAYS = ("unknowns", "gravity", "tension")
+
+
 @dataclass(frozen=True)
 class Sample:
     """An equilibrium of the full model: unknowns (3 n_free,), gravity (3,), tension (m,)."""
@@ -48,14 +54,48 @@ class Sample:
     tension: np.ndarray
 
 
-def samples(model: RobotModel, options: TrainingOptions, progress: Callable[[float], None] = lambda share: None) -> list[Sample]:
-    """Equilibria along random paths; progress is called with the share done."""
+def samples(
+    model: RobotModel,
+    options: TrainingOptions,
+    progress: Callable[[float], None] = lambda share: None,
+    kept: Path | None = None,
+) -> list[Sample]:
+    """Return equilibria along random paths. progress: called with the completed share.
+
+    kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples.
+    """
     rng = np.random.default_rng(options.seed)
-    found = []
-    for path in range(options.paths):
-        found += _path(model, options, rng)
-        progress((path + 1) / options.paths)
+    found: list[Sample] = []
+    for number in range(options.paths):
+        file = None if kept is None else kept / f"{number:04}.npz"
+        path = _stored(file, rng) if file else None
+        if path is None:
+            path = list(_path(model, options, rng))
+            if file:
+                _store(path, file, rng)
+        found += path
+        progress((number + 1) / options.paths)
     return found
+
+
+def _store(path: list[Sample], file: Path, rng: np.random.Generator) -> None:
+    """Write a path, and the state of the random numbers after it; a reader never sees half of it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    arrays = {name: np.array([getattr(sample, name) for sample in path]) for name in _ARRAYS}
+    part = file.with_suffix(".part.npz")
+    np.savez(part, state=np.array(json.dumps(rng.bit_generator.state)), **arrays)
+    part.replace(file)
+
+
+def _stored(file: Path, rng: np.random.Generator) -> list[Sample] | None:
+    """Return a stored path and set the random numbers to the state after it; None when there is none."""
+    try:
+        with np.load(file) as stored:
+            arrays = [stored[name] for name in _ARRAYS]
+            rng.bit_generator.state = json.loads(str(stored["state"]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    return [Sample(*values) for values in zip(*arrays)]
 
 
 def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator) -> Iterator[Sample]:

@@ -22,6 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0. Raises ConfigError, MeshError."""
+    import numpy as np
+
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.mesh.quality import mesh_quality
@@ -31,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     simulator = Simulator(file.robot, reduced=False)
     robot, model = file.robot, simulator.model
     quality = mesh_quality(model.mesh)
-    sag = simulator.solve([-_GRAVITY, 0.0, 0.0])
+    sag = simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
     figures = {
         "robot": robot.name,
         "file": file.source,
@@ -57,7 +59,7 @@ def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
     robot, reach = simulator.robot, []
     for index, name in enumerate(robot.cable_names):
         simulator.reset()
-        best = {"cable": name, "tension_n": 0.0, "displacement_mm": 0.0, "lateral_mm": 0.0, "tilt_deg": 0.0}
+        best: dict[str, Any] = {"cable": name, "tension_n": 0.0, "displacement_mm": 0.0, "lateral_mm": 0.0, "tilt_deg": 0.0}
         for tension in np.linspace(0.0, robot.limits.tension_max, 41)[1:]:
             tensions = np.zeros(len(robot.cables))
             tensions[index] = tension
@@ -90,7 +92,7 @@ def _mesh_error(robot: "Robot", sag: "Shape") -> dict[str, Any]:
         return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
     elements = robot.elements
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
-    change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve([-_GRAVITY, 0.0, 0.0])
+    change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve(np.array([-_GRAVITY, 0.0, 0.0]))
     error = float(np.linalg.norm(change.tip_position - sag.tip_position))
     good = error < 2e-3 * robot.length
     return {

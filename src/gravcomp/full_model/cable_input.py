@@ -1,0 +1,34 @@
+"""What drives the cables: displacements or tensions."""
+
+import dataclasses
+
+import numpy as np
+
+from gravcomp.cables.slack import taut_tensions
+
+
+@dataclasses.dataclass(frozen=True)
+class CableInput:
+    """Displacement or tension of m cables; with neither, all cables are released.
+
+    wound (m,): displacement in m to which each cable is pulled in, NaN for a released cable; tension (m,) in N, takes precedence.
+    """
+
+    wound: np.ndarray | None = None
+    tension: np.ndarray | None = None
+
+    def tensions(self, compliance: np.ndarray, free: np.ndarray, taut: np.ndarray) -> np.ndarray:
+        """Return the tensions (m,) in N for the response displacement = compliance tension + free; taut (m,): first guess."""
+        if self.tension is not None:
+            return self.tension
+        if self.wound is None:
+            return np.zeros(len(free))
+        return taut_tensions(compliance, free, self.wound, taut)
+
+    def part(self, origin: np.ndarray, fraction: float) -> "CableInput":
+        """Return the input at a fraction of the load: interpolated from the displacements `origin` (m,), or from tension 0."""
+        if self.tension is not None:
+            return CableInput(tension=fraction * self.tension)
+        if self.wound is None:
+            return self
+        return CableInput(wound=origin + fraction * (self.wound - origin))

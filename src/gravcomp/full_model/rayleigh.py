@@ -1,0 +1,30 @@
+"""Rayleigh damping, the force (alpha M + beta K) v, as in the article."""
+
+import numpy as np
+
+from gravcomp.full_model.generalized_alpha import DynamicsOptions
+from gravcomp.full_model.model import RobotModel
+from gravcomp.mechanics.block_matrix import BlockMatrix
+
+
+class RayleighDamping:
+    """The damping matrix alpha M + beta K, with the tangent stiffness K at the start of a step."""
+
+    def __init__(self, model: RobotModel, mass: BlockMatrix, options: DynamicsOptions):
+        self._model, self._mass, self._options = model, mass, options
+        self._matrix = model.new_matrix()
+
+    def update(self, u: np.ndarray) -> None:
+        """Set K to the tangent stiffness at the displacements u (n, 3)."""
+        self._matrix.values[:] = 0.0
+        self._model.elements.assemble(u, self._matrix)
+        self._matrix.values *= self._options.rayleigh_stiffness
+        self._matrix.values += self._options.rayleigh_mass * self._mass.values
+
+    def force(self, velocity: np.ndarray) -> np.ndarray:
+        """Return the force (3 n_free,) in N for a velocity (3 n_free,)."""
+        return self._matrix.multiply(velocity)
+
+    def add_to(self, matrix: BlockMatrix, factor: float) -> None:
+        """Add factor x damping matrix to `matrix`."""
+        matrix.values += factor * self._matrix.values

@@ -1,0 +1,269 @@
+"""Newton's method for the static equilibrium with cables, started from the last state.
+
+Unknown are the displacements u and the tensions lambda with
+
+    f_int(u) = f_weight + H(u)^T lambda,
+    driven by tension:       lambda given;
+    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: the cable's own elongation).
+
+Newton's step solves A y = r and A X = H^T with A = K(u, lambda), so that the step is y + X dlambda and the compliance of the
+cables is W = H X; the tensions follow from the small complementarity problem (Coevoet et al. 2017, section IV). From the second
+step on, A contains the stress that the previous step predicted (see `SolidElements.assemble`): a beam then bends as far as
+needed in a few steps. While a robot is tracked, the factor of an earlier step is used again as long as its corrections shrink
+fast. A step is cut if it is longer than a fraction of the robot or would crush an element.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.model import RobotModel
+from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
+
+# Smallest det F that a step may leave in an element.
+_CRUSHED = 0.1
+# A step below this fraction of the tolerance is rounding error and shrinks no further.
+_ROUNDING = 1e-3
+# A step below this fraction of the tolerance is the last one: the steps that would follow may add up to ten times its length.
+_SHORT = 0.1
+# A factor is used again up to this displacement from where it was made, as a fraction of the length, and as long as each
+# correction is at most this fraction of the previous one.
+_FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
+
+
+class StaticTracker:
+    """Tracks the equilibrium of a model. Owns the stiffness matrix and the current `state`."""
+
+    def __init__(self, model: RobotModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
+        """Start from the straight robot.
+
+        tolerance, longest_step and near (the step below which a factor is used again) are displacements of a node as fractions
+        of the robot's length.
+        """
+        self.model = model
+        self.tolerance = tolerance * model.length
+        self.longest_step = longest_step * model.length
+        self.near = near * model.length
+        self._matrix = model.new_matrix()
+        model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
+        self._stiffness = self._matrix.mean_diagonal()
+        self._pulling = np.zeros(model.tendons.count)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the straight robot without tension."""
+        self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
+        count = self.model.tendons.count
+        u = np.zeros_like(self.model.mesh.nodes)
+        tendons = self.model.tendons.state(self.model.mesh.nodes)
+        self._pulling[:] = 0.0
+        self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
+
+    def track(
+        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, exact: bool = False, stable: bool = False
+    ) -> Equilibrium:
+        """Track the equilibrium from the current state; the result's `converged` says whether it was reached.
+
+        exact: use a thousandth of the tolerance and new factors of the present shape, for reference results. stable: stop where
+        the tangent is not positive definite.
+        """
+        previous = self.state
+        if exact:
+            self._kept = None
+        state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
+        self._update_pulling(state, cables)
+        weight = self.model.weight(gravity)
+        origin: np.ndarray | None = None
+        finer = 1e-3 if exact else 1.0
+        while not state.converged and state.iterations < iterations:
+            origin = self._newton_step(state, weight, cables, origin, finer * self.tolerance, stable)
+            self._measure(state, weight)
+            if origin is None:
+                break
+            state.converged &= state.residual <= self._allowed_residual(state, weight)
+        self.state = state
+        return state
+
+    def _update_pulling(self, state: Equilibrium, cables: CableInput) -> None:
+        """Update the direction in which each cable slides, for its friction."""
+        if not self.model.tendons.friction.any():
+            return
+        if cables.tension is not None:
+            change = cables.tension - state.tension
+        elif cables.wound is not None:
+            change = np.nan_to_num(cables.wound - state.tendons.displacement)
+        else:
+            change = -state.tension
+        self._pulling = np.where(np.abs(change) > 1e-9, np.sign(change), self._pulling)
+
+    def _newton_step(
+        self,
+        state: Equilibrium,
+        weight: np.ndarray,
+        cables: CableInput,
+        origin: np.ndarray | None,
+        tolerance: float,
+        stable: bool,
+    ) -> np.ndarray | None:
+        """Take one damped Newton step and the corrections that its factor allows; changes `state`.
+
+        origin (n, 3): displacements from which the last move began. Returns those of this step's last move; None when no step
+        helps.
+        """
+        model = self.model
+        state.iterations += 1
+        factor, exact = self._reusable_factor(state), True
+        reused = factor is not None
+        if factor is not None:
+            force = model.elements.internal_force(state.u)
+        else:
+            try:
+                factor, force, exact = self._new_factor(state, origin, stable)
+            except NotPositiveDefinite:
+                return None
+            if exact and origin is None:
+                self._kept = factor, state.u.copy()
+        jacobian = state.tendons.jacobian
+        out = weight - model.free(force)
+        solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
+        y, state.answer = solved[:, 0], solved[:, 1:]
+        state.compliance = jacobian @ state.answer + np.diag(model.tendons.axial_compliance)
+        free = state.tendons.displacement + jacobian @ y
+        if not math.isfinite(state.compliance.sum() + free.sum()):
+            return None
+        tension = cables.tensions(state.compliance, free, state.tension > 0.0)
+        step = y + state.answer @ tension
+        size = float(np.abs(step).max())
+        moved = self._damped_move(state, step, tension, size) if math.isfinite(size) else None
+        if moved is None:
+            return None
+        start, undamped = moved
+        if exact and undamped:
+            start, size = self._correct(state, factor, weight, cables, jacobian, start, size, tolerance, reused)
+            # The tangent of corotational elements is not exact: steps shrink slowly. This one is short enough.
+            state.converged |= size < _SHORT * tolerance
+        return start
+
+    def _damped_move(
+        self, state: Equilibrium, step: np.ndarray, tension: np.ndarray, size: float
+    ) -> tuple[np.ndarray, bool] | None:
+        """Move `state` along the step (3 n_free,) toward the tensions (m,), cut where it is too long or crushes an element.
+
+        size: length of the step in m. Returns the displacements (n, 3) before, and whether the whole step was taken; None, with
+        the displacements unchanged, if even a short part of it crushes an element.
+        """
+        model = self.model
+        damping = min(1.0, self.longest_step / size) if size > 0 else 1.0
+        start = state.u.copy()
+        while True:
+            model.free(state.u)[:] = model.free(start) + damping * step
+            if model.elements.smallest_volume_ratio(state.u) > _CRUSHED:
+                break
+            damping /= 2.0
+            if damping < 1e-4:
+                state.u[:] = start
+                return None
+        state.tension = state.tension + damping * (tension - state.tension)
+        state.tendons = model.tendons.state(model.mesh.nodes + state.u, self._pulling)
+        return start, damping == 1.0
+
+    def _correct(
+        self,
+        state: Equilibrium,
+        factor: BlockCholesky,
+        weight: np.ndarray,
+        cables: CableInput,
+        jacobian: np.ndarray,
+        start: np.ndarray,
+        size: float,
+        tolerance: float,
+        reused: bool,
+    ) -> tuple[np.ndarray, float]:
+        """Correct `state` with the factor of the step just taken, as long as the corrections shrink.
+
+        Near the equilibrium the factor is good enough for corrections, which cost a tenth of a new factor. The error that
+        remains is the rest of a geometric series. Its ratio is measured between two corrections: the first correction is short
+        compared with the step even if the factor no longer contracts. Returns the displacements (n, 3) before the last move,
+        and the length of that move in m.
+        """
+        model = self.model
+        corrected = False
+        while size < self.near:
+            correction, tension = self._correction(state, factor, weight, cables, jacobian)
+            length = float(np.abs(correction).max())
+            if max(length, size) < _ROUNDING * tolerance:  # already at rest
+                state.converged = True
+                break
+            if reused and length > _FACTOR_CONTRACTION * size:
+                self._kept = None
+            if not length < 0.3 * size:
+                break
+            start = state.u.copy()
+            model.free(state.u)[:] += correction
+            state.tension = tension
+            state.tendons = model.tendons.state(model.mesh.nodes + state.u, self._pulling)
+            ratio = length / size if corrected else 0.5
+            if length * ratio / (1.0 - ratio) < tolerance:
+                state.converged = True
+                break
+            size, corrected = length, True
+        return start, size
+
+    def _correction(
+        self, state: Equilibrium, factor: BlockCholesky, weight: np.ndarray, cables: CableInput, jacobian: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the change (3 n_free,) of the unknowns and the tensions (m,) from the factor of a nearby shape."""
+        model = self.model
+        force = model.elements.internal_force(state.u)
+        out = weight - model.free(force) + state.tension @ state.tendons.force_jacobian
+        y = factor.solve(out)
+        free = state.tendons.displacement + jacobian @ y
+        shift = (state.compliance - np.diag(model.tendons.axial_compliance)) @ state.tension
+        tension = cables.tensions(state.compliance, free - shift, state.tension > 0.0)
+        return y + state.answer @ (tension - state.tension), tension
+
+    def _reusable_factor(self, state: Equilibrium) -> BlockCholesky | None:
+        """Return the factor of an earlier step if it may be used in the first iteration at `state`."""
+        if self._kept is None or state.iterations > 1:
+            return None
+        factor, u = self._kept
+        return factor if np.abs(state.u - u).max() < _FACTOR_REACH * self.model.length else None
+
+    def _new_factor(self, state: Equilibrium, origin: np.ndarray | None, stable: bool) -> tuple[BlockCholesky, np.ndarray, bool]:
+        """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
+
+        If the tangent is not positive definite, a multiple of the identity is added: the step still goes downhill, but its
+        length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does not help, or at once
+        if `stable`.
+        """
+        self._kept = None  # the storage of that factor is written over
+        shifts = () if stable else (self._stiffness * 10.0**power for power in range(-6, 1))
+        for shift in (0.0, *shifts):
+            self._matrix.values[:] = 0.0
+            force = self.model.elements.assemble(state.u, self._matrix, origin=origin)
+            if state.tension.any():
+                self.model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
+            if shift:
+                self._matrix.add_diagonal(shift)
+            try:
+                return self._matrix.factor(), force, shift == 0.0
+            except NotPositiveDefinite:
+                continue
+        raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
+
+    def _allowed_residual(self, state: Equilibrium, weight: np.ndarray) -> float:
+        """Return the force out of balance in N below which a state counts as balanced.
+
+        Short steps alone prove nothing: the corrections of a factor that is too stiff are short as well.
+        """
+        pull = state.tension @ state.tendons.force_jacobian
+        return 1e-2 * max(np.abs(weight).max(), np.abs(pull).max(initial=0.0)) + 1e-12 * self._stiffness * self.model.length
+
+    def _measure(self, state: Equilibrium, weight: np.ndarray) -> None:
+        """Set the residual of `state`."""
+        force = self.model.free(self.model.elements.internal_force(state.u))
+        out = weight - force + state.tension @ state.tendons.force_jacobian
+        state.residual = float(np.abs(out).max())
