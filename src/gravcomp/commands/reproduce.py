@@ -112,18 +112,18 @@ def _evaluate_bag(args: argparse.Namespace, setup: "Setup", folder: Path) -> int
     Raises ConfigError when the bag does not contain what the experiment needs; `all` leaves such experiments out with a note.
     """
     from gravcomp.config import ConfigError
-    from gravcomp.evaluation.recorded import JUDGES, judge
+    from gravcomp.evaluation.recorded import EVALUATIONS, evaluation
     from gravcomp.evaluation.recorded.run import RecordedRun
     from gravcomp.report.page import write_report
 
     recorded = RecordedRun(Path(args.bag).expanduser(), setup, args.tip_topic)
     # Several experiments share one evaluation; `all` runs each evaluation once.
-    names = list({module: name for name, module in reversed(JUDGES.items())}.values()) if args.name == "all" else [args.name]
+    names = list({module: name for name, module in reversed(EVALUATIONS.items())}.values()) if args.name == "all" else [args.name]
     results, pages = [], []
     for name in names:
         started = time.perf_counter()
         try:
-            result = judge(name).run(recorded)
+            result = evaluation(name).run(recorded)
         except ConfigError as error:
             if args.name != "all":
                 raise

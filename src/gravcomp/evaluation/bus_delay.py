@@ -1,8 +1,8 @@
-"""How long an IMU sample takes to become motor current, read from the bus itself.
+"""Latency from an IMU sample to the motor current, measured on the bus.
 
-The bridge sends a CommandTrace frame with the board time of the sample behind a new command, directly after the current
-frame that the command caused. The delay is the time between the sample's last frame and that current frame, both as the
-listener's kernel stamped them.
+Directly after the current frame that a new command caused, the bridge sends a CommandTrace frame with the board time of the
+command's IMU sample. The latency is the time between the last frame of the sample and that current frame, both as stamped by the
+kernel of the listener.
 """
 
 import threading
@@ -13,12 +13,12 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.bus import BusError, open_bus
 from gravcomp.description.hardware import CanInterface
 
-# Listening takes a share of a core at full bus load, so it happens in short looks.
-_LOOK, _PAUSE = 1.0, 3.0  # s
+# Listening takes part of a core at full bus load, so it is done in short intervals.
+_LOOK, _PAUSE = 1.0, 3.0  # s, of an interval and between two
 
 
 class DelayListener:
-    """A thread that looks at the bus now and then; `delays` (s) grows."""
+    """A thread that listens at intervals and adds to `delays` (s); `failure` names a bus that cannot be opened."""
 
     def __init__(self, settings: CanInterface):
         self.delays: list[float] = []
@@ -29,9 +29,11 @@ class DelayListener:
         self._thread = threading.Thread(target=self._run, name="bus delay", daemon=True)
 
     def start(self) -> None:
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
+        """Stop the thread."""
         self._end.set()
         self._thread.join(_LOOK + 1.0)
 
@@ -43,7 +45,7 @@ class DelayListener:
                 self.failure = str(error)
                 return
             with bus:
-                frames = []
+                frames: list[can.Message] = []
                 while not self._end.is_set() and (not frames or frames[-1].timestamp - frames[0].timestamp < _LOOK):
                     frame = bus.recv(0.2)
                     if frame is None:
@@ -53,7 +55,7 @@ class DelayListener:
 
 
 def delays_of(frames: list[can.Message]) -> list[float]:
-    """Seconds from each IMU sample to the first current frame that it caused, for the samples whose command was traced."""
+    """Return the latency (s) from each IMU sample with a CommandTrace to the first current frame that it caused."""
     imu_time, trace = codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id
     sampled: dict[float, float] = {}
     last_current: float | None = None

@@ -1,16 +1,19 @@
-"""What the tip's error would be with released cables, from the virtual robot's statics."""
+"""Tip error with released cables, from the statics of the virtual robot."""
 
 import numpy as np
 
 from gravcomp.config import from_mapping
 from gravcomp.description import RobotFile
 
-# So many directions of gravity of a run are solved; its motion is slow against their distance.
+# Number of directions of gravity of a run that are solved; its motion is slow compared with their distance.
 _DIRECTIONS = 40
 
 
 def released_tip_error(robot_file: RobotFile, gravity: np.ndarray, target: np.ndarray) -> float | None:
-    """RMS distance in m of the released virtual robot's tip from `target` (3,) over the gravity (n, 3) m/s^2 of a run; None without any."""
+    """Return the RMS distance (m) of the released virtual robot's tip from `target` (3,) over the gravity (n, 3) m/s^2 of a run.
+
+    None without an equilibrium at any of them.
+    """
     from gravcomp.virtual.body import build_rod
     from gravcomp.virtual.equilibrium import NoEquilibrium, equilibrium
     from gravcomp.virtual.parameters import VirtualRobotParameters

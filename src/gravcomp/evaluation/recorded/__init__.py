@@ -1,7 +1,7 @@
-"""Experiments on a robot of one's own: a bag that was recorded while it ran is judged as the virtual robot is.
+"""Evaluation of your own robot: a bag of its run is evaluated by the measures of the experiments on the virtual robot.
 
-A module each with `run(recorded: RecordedRun) -> Result`. JUDGES names the one for an experiment; those that are not in it need no robot, or
-judge what a bag does not hold.
+Each module has `run(recorded: RecordedRun) -> Result`. EVALUATIONS names the module for an experiment. Experiments that are not
+in it need no robot, or values that a bag does not contain.
 """
 
 from importlib import import_module
@@ -10,7 +10,7 @@ from types import ModuleType
 from gravcomp.config import ConfigError
 
 _HOLDING, _FALL, _DELAY, _IMU = "holding", "fall", "delay", "imu"
-JUDGES = {
+EVALUATIONS = {
     "imu-ablation": _IMU,
     "real2sim": _FALL,
     "static": _HOLDING,
@@ -22,13 +22,13 @@ JUDGES = {
 }
 
 
-def judge(name: str) -> ModuleType:
-    """The module that judges a bag for the experiment `name`. Raises ConfigError when a bag cannot tell it."""
-    if name not in JUDGES:
+def evaluation(name: str) -> ModuleType:
+    """Return the module that evaluates a bag for the experiment `name`. Raises ConfigError where there is none."""
+    if name not in EVALUATIONS:
         instead = (
             "`gravcomp calibrate BAG` fits the model to a bag"
             if name == "tuning"
-            else f"a bag can be judged for {', '.join(JUDGES)}"
+            else f"a bag can be evaluated for {', '.join(EVALUATIONS)}"
         )
-        raise ConfigError(f"'{name}' cannot be judged from a bag: {instead}")
-    return import_module(f"gravcomp.evaluation.recorded.{JUDGES[name]}")
+        raise ConfigError(f"'{name}' cannot be evaluated from a bag: {instead}")
+    return import_module(f"gravcomp.evaluation.recorded.{EVALUATIONS[name]}")

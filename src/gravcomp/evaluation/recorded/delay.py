@@ -1,9 +1,9 @@
-"""How late a recorded graph was: from the stamp of the IMU sample to when each message that it caused was received."""
+"""Latency of a recorded graph: from the stamp of an IMU sample to the reception of each message that it caused."""
 
 import numpy as np
 
 from gravcomp.config import ConfigError
-from gravcomp.evaluation.recorded.run import RecordedRun, read
+from gravcomp.evaluation.recorded.run import RecordedRun, read, required
 from gravcomp.recordings.bags.streams import CABLE_COMMAND, CABLE_STATE, VECTOR, Stream, Wanted
 from gravcomp.report.drawing import Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
@@ -13,17 +13,18 @@ _WANTED = {
     "command": Wanted(CABLE_COMMAND, ("cable/command",)),
     "motors": Wanted(CABLE_STATE, ("cable/state",), optional=True),
 }
-_NAMES = {"gravity": "gravity estimated", "command": "cables commanded", "motors": "command followed, as the motors' bridge says"}
-_CLOCKS = 10.0  # s: a longer delay is another clock
+_NAMES = {"gravity": "gravity estimated", "command": "cables commanded", "motors": "command followed, by the state of the bridge"}
+_CLOCKS = 10.0  # s; a longer delay means another clock
 
 
 def run(recorded: RecordedRun) -> Result:
-    """The judgement. Raises ConfigError when stamps and times of reception come from different clocks."""
+    """Return the evaluation. Raises ConfigError when stamps and times of reception are from different clocks."""
     streams = read(recorded.bag, _WANTED)
     delays = {name: _delays(stream) for name, stream in streams.items() if stream is not None}
     if not len(delays["command"]):
         raise ConfigError(
-            f"{recorded.bag}: the stamps of '{streams['command'].topic}' are of another clock than the recorder's, as in a replay"
+            f"{recorded.bag}: the stamps of '{required(streams, 'command').topic}' are of another clock than the recorder's,"
+            " as in a replay"
         )
     figures = []
     for name, values in delays.items():
@@ -38,21 +39,21 @@ def run(recorded: RecordedRun) -> Result:
     return Result(
         name="delay",
         title="Delay, recorded",
-        question="How late after the IMU sample did each stage speak?",
-        ground=f"A recording of the running graph, {recorded.bag.name}: from the stamp of the IMU sample, which every message carries, to its reception"
-        " by the recorder.",
+        question="How long after the IMU sample was the message of each stage received?",
+        ground=f"A recording of the running graph, {recorded.bag.name}: from the stamp of the IMU sample, which every message"
+        " carries, to the reception of the message by the recorder.",
         figures=figures,
         parts=[
             Plot("Delays", _drawing(delays), "From the IMU sample's stamp."),
             Table("All stages", ("stage", "messages", "least, ms", "median, ms", "99 %, ms", "largest, ms"), rows),
         ],
         parameters={"bag": str(recorded.bag)},
-        notes=["The bridge tells its state 100 times a second, so what it says of a command may be up to 10 ms old."],
+        notes=["The bridge sends its state 100 times a second, so a command in it can be up to 10 ms old."],
     )
 
 
 def _delays(stream: Stream) -> np.ndarray:
-    """(k,) ms; those of another clock, and of states that follow no command, are left out."""
+    """Return the delays (k,) in ms without those of another clock and of states that follow no command."""
     delays = 1e3 * (stream.received - stream.stamp)
     return delays[(delays >= 0.0) & (delays < 1e3 * _CLOCKS)]
 
