@@ -1,4 +1,4 @@
-"""The page without a browser: geometry on the backbone, the world from gravity, the plots' memory, its port."""
+"""The page without a browser: geometry, orientation of the base, history of the plots, controls, port."""
 
 import math
 import socket
@@ -16,7 +16,7 @@ from gravcomp.view.history import History
 from gravcomp.view.page import free_port
 from gravcomp.view.plots import top_of
 from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
-from gravcomp.view.scene import SCALE
+from gravcomp.view.scale import SCALE
 from gravcomp.view.skin import cable_skin, joined, lumen_skin, wall_skins
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.status import cables_html, status_html
@@ -31,7 +31,7 @@ def robot():
 def test_eleven_points_of_an_arc_are_enough_to_draw_it():
     coarse, fine = arc_backbone(0.1, 1.2, 0.4, points=11), arc_backbone(0.1, 1.2, 0.4, points=201)
     position, rotation = coarse.at(fine.station)
-    # A hundredth of a millimetre is below what a screen shows.
+    # 0.01 mm is less than a pixel.
     assert np.abs(position - fine.position).max() < 1e-5
     np.testing.assert_allclose(np.linalg.det(rotation), 1.0, atol=1e-9)
     _, exact = fine.at(fine.station)
@@ -52,7 +52,7 @@ def test_quaternions_of_opposite_sign_are_the_same_frame():
         np.testing.assert_allclose(a, b, atol=1e-12)
 
 
-def test_walls_at_rest_have_the_robots_measures(robot):
+def test_walls_at_rest_have_the_robots_dimensions(robot):
     straight = straight_backbone(robot.length)
     vertices = np.concatenate([skin.on(straight) for skin in wall_skins(robot)])
     assert np.hypot(vertices[:, 0], vertices[:, 1]).max() == pytest.approx(0.0045, rel=1e-5)
@@ -101,7 +101,7 @@ def test_joined_skins_are_deformed_as_each_alone(robot):
         np.testing.assert_allclose(vertices[part], skin.on(backbone), atol=1e-8)
 
 
-def test_gravity_points_down_whatever_it_does():
+def test_gravity_always_points_down():
     world, random = BaseInWorld(), np.random.default_rng(1)
     gravity = np.array([-9.81, 0.0, 0.0])
     for _ in range(500):
@@ -111,8 +111,8 @@ def test_gravity_points_down_whatever_it_does():
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
 
 
-def test_the_robot_passes_the_vertical_without_turning_round():
-    """Tilted from 30 to 150 degrees, the horizontal axis across the robot stays where it is."""
+def test_the_heading_is_kept_while_the_robot_passes_the_vertical():
+    """While the robot tilts from 30 to 150 degrees, its horizontal transverse axis does not move."""
     world = BaseInWorld()
     for inclination in np.radians(np.arange(30.0, 150.0, 1.0)):
         rotation = world.follow(9.81 * np.array([-math.cos(inclination), 0.0, -math.sin(inclination)]))
@@ -125,7 +125,7 @@ def test_no_gravity_changes_nothing():
     np.testing.assert_array_equal(world.follow(np.zeros(3)), before)
 
 
-def test_quaternions_give_the_rotation_back():
+def test_a_quaternion_of_a_rotation_gives_the_rotation():
     random = np.random.default_rng(2)
     for _ in range(20):
         q = random.normal(size=4)
@@ -137,7 +137,7 @@ def test_quaternions_give_the_rotation_back():
         np.testing.assert_allclose(quaternion_wxyz(rotation), q, atol=1e-7)
 
 
-def test_the_plots_remember_their_window_and_no_more():
+def test_the_history_keeps_its_span_and_no_more():
     history = History(1, span=4.0, rate=20.0)
     for i in range(1000):
         history.add(i * 0.05, np.array([float(i)]))
@@ -147,10 +147,10 @@ def test_the_plots_remember_their_window_and_no_more():
     earlier, value = history.columns(2.0, until=998 * 0.05 - 1.001)
     np.testing.assert_allclose(earlier, time)
     assert value[-1] == 977.0
-    assert not len(history.columns(2.0, until=0.0)[0])  # longer ago than is kept
+    assert not len(history.columns(2.0, until=0.0)[0])  # older than the history
 
 
-def test_an_axis_ends_above_what_is_known_and_stays_while_it_fits():
+def test_an_axis_ends_above_its_values_and_is_kept_while_it_fits():
     assert top_of(np.array([np.nan, 1.7, 0.2]), 1.0, 1.0) == 2.0
     assert top_of(np.array([29.9, np.nan]), 2.0, 1.0) == 50.0
     assert top_of(np.array([16.0]), 50.0, 1.0) == 50.0 and top_of(np.array([14.0]), 50.0, 1.0) == 20.0
@@ -158,7 +158,7 @@ def test_an_axis_ends_above_what_is_known_and_stays_while_it_fits():
     assert top_of(np.array([0.03]), 0.2, 0.2) == 0.2 and top_of(np.array([0.19]), 0.5, 0.2) == 0.5
 
 
-def test_a_time_that_goes_back_begins_the_plots_anew():
+def test_a_time_that_goes_back_clears_the_history():
     history = History(1, span=2.0, rate=20.0)
     for t in (10.0, 11.0, 5.0):
         history.add(t, np.array([t]))
@@ -173,13 +173,13 @@ def test_errors_are_distances_to_the_target(robot):
     assert math.isnan(Snapshot(time=0.0).tip_error)
 
 
-def test_words_from_the_graph_cannot_become_markup(robot):
+def test_texts_from_the_graph_are_escaped(robot):
     snapshot = Snapshot(time=0.0, status="<script>alert(1)</script>", tension=np.zeros(6), displacement=np.zeros(6))
     assert "<script>" not in status_html(snapshot)
     assert "<b>" not in cables_html(snapshot, ("<b>",) * 6)
 
 
-def test_what_the_motors_do_stands_beside_what_the_model_says():
+def test_the_motors_state_is_shown_next_to_the_controllers():
     stopped = status_html(
         Snapshot(
             time=0.0, status="the target is kept", status_level="ok", motors_state="stopped", motors_message="no current <b>"
@@ -207,12 +207,12 @@ def test_the_next_free_port_is_taken():
 
 
 def test_an_address_that_is_not_this_machines_is_refused():
-    with pytest.raises(ConfigError, match="host is '203.0.113.7'; an address of this machine is needed"):
+    with pytest.raises(ConfigError, match=r"host is '203\.0\.113\.7'; an address of this machine is needed"):
         free_port("203.0.113.7", 8080)
 
 
 class Clicks:
-    """A page's controls, worked as a browser works them."""
+    """Operates the controls of a page, as a browser does."""
 
     def __init__(self, robot):
         from gravcomp.view.options import PageOptions
@@ -222,7 +222,7 @@ class Clicks:
         self.controls, self.scene = self.page._controls, self.page._scene
 
     def set(self, handle, value=None) -> list:
-        """Give a control a value (a button none), and what was asked for by it."""
+        """Set the value of a control (a button has none), and return the requests."""
         if value is not None:
             handle._impl.value = value
         for callback in handle._impl.update_cb:
@@ -230,7 +230,7 @@ class Clicks:
         return self.page.requests()
 
     def handle(self, label: str):
-        """The control of that label."""
+        """Return the control with this label."""
         (found,) = [h for h in self.page._server.gui._gui_input_handle_from_uuid.values() if getattr(h, "label", None) == label]
         return found
 
@@ -250,27 +250,27 @@ def test_sliders_set_target_and_tilt(clicks):
     assert clicks.set(clicks.handle("Straight")) == [SetTarget(0.0, math.radians(90.0))]
 
 
-def test_a_dragged_handle_asks_for_the_arc_through_it(clicks, robot):
-    asked = arc_backbone(robot.length, math.radians(50.0), math.radians(-30.0))
-    gizmo = clicks.scene.gizmo
-    gizmo.position = SCALE * asked.tip
+def test_a_dragged_handle_requests_the_arc_through_it(clicks, robot):
+    wanted = arc_backbone(robot.length, math.radians(50.0), math.radians(-30.0))
+    gizmo = clicks.scene.target.gizmo
+    gizmo.position = SCALE * wanted.tip
     for callback in gizmo._impl_aux.update_cb:
         callback(types.SimpleNamespace(client=object(), target=gizmo))
     (request,) = clicks.page.requests()
     assert math.degrees(request.angle) == pytest.approx(50.0, abs=0.01) and math.degrees(request.plane) == pytest.approx(
         -30.0, abs=0.01
     )
-    # The sliders follow the hand.
+    # The sliders follow the handle.
     assert clicks.handle("bend °").value == pytest.approx(50.0, abs=0.1)
 
 
-def test_the_handle_appears_when_it_is_asked_for(clicks):
-    assert not clicks.scene.gizmo.visible
+def test_a_checkbox_shows_the_handle(clicks):
+    assert not clicks.scene.target.gizmo.visible
     clicks.set(clicks.handle("drag the target"), True)
-    assert clicks.scene.gizmo.visible
+    assert clicks.scene.target.gizmo.visible
 
 
-def test_buttons_say_what_they_do(clicks):
+def test_buttons_raise_their_requests(clicks):
     for label, mode in (("Compensate", "compensate"), ("Hold", "hold"), ("Release", "relax")):
         assert clicks.set(clicks.handle("cables"), label) == [Compensate(mode)]
     assert clicks.set(clicks.handle("motors"), "Stop") == [BridgeService("stop")]
@@ -279,7 +279,7 @@ def test_buttons_say_what_they_do(clicks):
     assert clicks.set(clicks.handle("Stop recording")) == [Record(False)]
 
 
-def test_every_fault_that_is_offered_is_one_of_the_virtual_robot(clicks, robot):
+def test_every_offered_fault_is_one_of_the_virtual_robot(clicks, robot):
     import yaml
 
     from gravcomp.virtual.faults import Fault
@@ -295,7 +295,7 @@ def test_every_fault_that_is_offered_is_one_of_the_virtual_robot(clicks, robot):
     assert clicks.set(clicks.handle("Clear all")) == [InjectFault("clear")]
 
 
-def test_looking_back_holds_what_was_while_the_robot_goes_on(clicks, robot):
+def test_looking_back_shows_an_earlier_state_while_the_robot_runs(clicks, robot):
     shown = lambda: clicks.page._status.content  # noqa: E731
     angle = lambda i: math.radians(0.1 * i)  # noqa: E731
 
@@ -310,27 +310,27 @@ def test_looking_back_holds_what_was_while_the_robot_goes_on(clicks, robot):
     clicks.set(clicks.handle("look back s"), 4.0)
     for i in range(200, 260):
         frame(i)
-        # 4 s before the frame at which the page was held, however long ago that is.
+        # 4 s before the frame at which the page was held, not before the current one.
         assert "frame 120" in shown() and "4.0 s ago" in shown()
     tip = SCALE * arc_backbone(robot.length, angle(120), 0.0).tip
-    wall = np.concatenate([handle.vertices for handle in clicks.scene._body])
+    wall = np.concatenate([handle.vertices for handle in clicks.scene.body])
     assert np.linalg.norm(wall - tip, axis=1).min() < SCALE * 0.0045
     clicks.set(clicks.handle("look back s"), 1.0)
     frame(260)
     assert "frame 180" in shown()
-    clicks.page._left(None)  # the last browser
+    clicks.page._on_disconnect(None)  # the last browser leaves
     for i in range(261, 290):
         frame(i)
     assert "frame 2" in shown() and "ago" not in shown()
 
 
-def test_light_graphics_leave_out_what_a_processor_draws_slowly(clicks):
-    scene = clicks.scene
-    assert scene._key.cast_shadow and scene._rim.visible and not scene._sky.visible
+def test_light_graphics_have_no_shadows_and_reflections(clicks):
+    lights = clicks.scene.surroundings
+    assert lights.key.cast_shadow and lights.rim.visible and not lights.sky.visible
     clicks.set(clicks.handle("graphics"), "light")
-    assert not scene._key.cast_shadow and not scene._rim.visible and scene._sky.visible
+    assert not lights.key.cast_shadow and not lights.rim.visible and lights.sky.visible
     clicks.set(clicks.handle("graphics"), "full")
-    assert scene._key.cast_shadow and not scene._sky.visible
+    assert lights.key.cast_shadow and not lights.sky.visible
 
 
 def test_without_a_graphics_chip_graphics_are_light(tmp_path):

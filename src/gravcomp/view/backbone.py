@@ -1,7 +1,7 @@
-"""A robot's backbone as a smooth curve of frames: between the few points that a message carries.
+"""A robot's backbone as a smooth curve of frames, interpolated between the few points of a message.
 
-Positions follow a cubic Hermite curve whose tangents are the z axes of the frames, scaled by the distance of the neighbours; orientations
-are interpolated linearly and normalised, which is exact enough for neighbours a few degrees apart.
+Positions follow a cubic Hermite curve whose tangents are the z axes of the frames, scaled by the distance of the neighbours.
+Quaternions are interpolated linearly and normalised, which is exact enough for neighbours that differ by a few degrees.
 """
 
 import dataclasses
@@ -19,11 +19,11 @@ class Backbone:
 
     @property
     def tip(self) -> np.ndarray:
-        """(3,) m"""
+        """Position of the tip (3,), m."""
         return self.position[-1]
 
     def at(self, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (k, 3) and rotations (k, 3, 3) at the stations (k,); beyond the ends the end frames."""
+        """Return positions (k, 3) in m and rotations (k, 3, 3) at the stations (k,); beyond the ends those of the end frames."""
         s = np.clip(station, self.station[0], self.station[-1])
         i = np.clip(np.searchsorted(self.station, s, side="right") - 1, 0, len(self.station) - 2)
         t = ((s - self.station[i]) / (self.station[i + 1] - self.station[i]))[:, None]
@@ -40,24 +40,24 @@ class Backbone:
 
 
 def arc_backbone(length: float, angle: float, plane: float, points: int = 33) -> Backbone:
-    """A robot of `length` (m) bent to a constant curvature by `angle` (rad) into the plane at `plane` (rad about z from x)."""
+    """Return a robot of `length` (m) with constant curvature, bent by `angle` (rad) toward `plane` (rad, about z from x)."""
     from gravcomp.inverse.target import arc_points
 
     station = np.linspace(0.0, 1.0, points)
     half = 0.5 * angle * station
-    # Turned about the axis across the plane of the bend, so that no frame twists.
+    # Rotated about the normal of the bending plane, so that the frames do not twist.
     sine = np.sin(half)
     orientation = np.stack([-np.sin(plane) * sine, np.cos(plane) * sine, np.zeros(points), np.cos(half)], axis=1)
     return Backbone(station, arc_points(length, angle, plane, station), orientation)
 
 
 def straight_backbone(length: float) -> Backbone:
-    """The straight robot of `length` (m)."""
+    """Return the straight robot of `length` (m)."""
     return arc_backbone(length, 0.0, 0.0)
 
 
 def rotations(q: np.ndarray) -> np.ndarray:
-    """Rotations (k, 3, 3) of unit quaternions (k, 4) x y z w."""
+    """Return the rotations (k, 3, 3) of unit quaternions (k, 4), x y z w."""
     x, y, z, w = np.moveaxis(q, -1, 0)
     return np.stack(
         [

@@ -1,13 +1,17 @@
-"""A headless Chromium that looks at the live page: what it sees, as a picture.
+"""A headless Chromium that opens the live page and takes pictures of it.
 
-The processor draws the scene, so on a small machine the graph beside it is slowed down.
+The CPU draws the scene, so on a small machine the browser slows down a graph that runs at the same time.
 """
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Request
 
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome")
-# WebGL by the processor, and nothing else of the page by way of OpenGL.
+# WebGL on the CPU; the rest of the page without OpenGL.
 _ARGUMENTS = ("--no-sandbox", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization")
 _IS_DRAWN = """
 document.querySelector('[data-gravcomp=status]')?.innerText
@@ -16,22 +20,22 @@ document.querySelector('[data-gravcomp=status]')?.innerText
 
 
 class BrowserError(RuntimeError):
-    """There is no browser, or the page does not come; the text is for people."""
+    """No browser is installed, or the page cannot be shown; the text is for the user."""
 
 
 def find_chromium() -> str | None:
-    """The path of an installed Chromium or Chrome."""
+    """Return the path of an installed Chromium or Chrome, or None."""
     return next(filter(None, map(shutil.which, CHROMIUM_NAMES)), None)
 
 
 class Browser:
-    """A window of `width` x `height` px; a context manager. `open` shows a page.
+    """A window of `width` x `height` px; a context manager.
 
-    `page` is Playwright's page; `received`: messages of the page's server until now; `foreign`: addresses outside the page's own that were
-    asked for. Raises BrowserError when no Chromium is installed; what is waited for has to come within `patience` (s).
+    Attributes: page (Playwright's page), received (number of messages from the page's server), foreign (requested addresses
+    that do not belong to the page). patience: s, longest wait of each call. Raises BrowserError when no Chromium is installed.
     """
 
-    def __init__(self, width: int = 1600, height: int = 900, patience: float = 120.0):
+    def __init__(self, width: int = 1600, height: int = 900, patience: float = 120.0) -> None:
         from gravcomp.environment.packages import provide_extra
 
         provide_extra("browser")
@@ -41,7 +45,8 @@ class Browser:
         if executable is None:
             raise BrowserError("no Chromium on this machine: apt-get install chromium")
         self._timeout = 1e3 * patience
-        self.received, self.foreign = 0, []
+        self.received = 0
+        self.foreign: list[str] = []
         self._playwright = sync_playwright().start()
         try:
             self._chromium = self._playwright.chromium.launch(executable_path=executable, args=list(_ARGUMENTS))
@@ -52,17 +57,17 @@ class Browser:
         self.page.set_default_timeout(self._timeout)
         self.page.on("websocket", lambda socket: socket.on("framereceived", self._count))
         self._own: tuple[str, ...] = ()
-        self.page.on("request", lambda request: None if request.url.startswith(self._own) else self.foreign.append(request.url))
+        self.page.on("request", self._note_foreign)
 
     def open(self, address: str) -> None:
-        """Show the page at `address` and wait until it is drawn. Raises BrowserError when it does not come."""
+        """Open the page at `address` and wait until it is drawn. Raises BrowserError when it cannot be shown."""
         from playwright.sync_api import Error
 
         self._own = (address.partition("?")[0], "data:", "blob:")
         try:
             self.page.goto(address, wait_until="commit")
             self.page.wait_for_function(_IS_DRAWN, polling=200)
-            # Words about the browser itself, such as that a processor draws.
+            # Hide notifications about the browser itself, such as missing graphics hardware.
             self.page.add_style_tag(content=".mantine-Notifications-root { display: none }")
         except Error as error:
             raise BrowserError(f"the page at {address} could not be shown: {error.message.splitlines()[0]}") from error
@@ -70,35 +75,39 @@ class Browser:
     def __enter__(self) -> "Browser":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._chromium.close()
         self._playwright.stop()
 
     def _count(self, _: object) -> None:
         self.received += 1
 
+    def _note_foreign(self, request: "Request") -> None:
+        if not request.url.startswith(self._own):
+            self.foreign.append(request.url)
+
     def set_slider(self, label: str, value: float) -> None:
-        """Give the page's slider of that label a value, as by hand."""
+        """Set the page's slider with this label, like a user."""
         slider = self.page.locator(f"text={label}").locator("xpath=ancestor::*[.//input][1]").locator("input").last
         slider.fill(f"{value:g}")
 
     def look_back(self, time: float) -> None:
-        """Turn the page to what it showed at `time` (s, monotonic). Raises BrowserError when it does not turn so far."""
+        """Show the state at `time` (s, monotonic) on the page. Raises BrowserError when the page no longer has it."""
         from playwright.sync_api import Error
 
         try:
             self.set_slider("look back s", 0.1)
             self.page.wait_for_function("document.querySelector('[data-held-at]')?.dataset.heldAt", polling=200)
-            held_at = float(self.page.locator("[data-held-at]").get_attribute("data-held-at"))
+            held_at = float(self.page.locator("[data-held-at]").get_attribute("data-held-at") or "nan")
             self.set_slider("look back s", round(held_at - time, 1))
             self.page.wait_for_function(
                 f"Math.abs(document.querySelector('[data-time]').dataset.time - {time}) < 0.2", polling=200
             )
         except Error as error:
-            raise BrowserError(f"the page cannot be turned back: {error.message.splitlines()[0]}") from error
+            raise BrowserError(f"the page cannot show an earlier state: {error.message.splitlines()[0]}") from error
 
     def picture(self) -> bytes:
-        """What is to be seen now, as PNG. Raises BrowserError."""
+        """Return a picture of the page as PNG. Raises BrowserError when none can be taken."""
         from playwright.sync_api import Error
 
         try:
@@ -107,5 +116,5 @@ class Browser:
             raise BrowserError(f"no picture of the page: {error.message.splitlines()[0]}") from error
 
     def save(self, path: Path) -> None:
-        """Write what is to be seen now."""
+        """Write a picture of the page as PNG. Raises BrowserError when none can be taken."""
         path.write_bytes(self.picture())

@@ -1,4 +1,4 @@
-"""The page's colours; tension from slack to tight as in the colour map 'plasma', which stays readable in grey and to most eyes."""
+"""Colours of the page. Tension uses the colour map 'plasma', which is readable in grey and with colour vision deficiency."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ METAL: Rgb = (86, 94, 106)
 BOARD: Rgb = (28, 120, 82)
 BRAND: Rgb = (47, 111, 237)
 
-# Full scale of the colours: what holding up the robot's own weight takes lies below it.
+# Full scale of the colours; compensation of the robot's own weight needs less.
 TENSION_SCALE = 1.0  # N
 
 _STOPS = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
@@ -23,16 +23,17 @@ _PLASMA = np.array([[13, 8, 135], [106, 0, 168], [177, 42, 144], [225, 100, 98],
 
 
 def tension_colour(tension: float, scale: float = TENSION_SCALE) -> Rgb:
-    """Colour of a tension in N."""
+    """Return the colour of a tension (N); scale: N, full scale."""
     x = min(max(tension / scale, 0.0), 1.0)
-    return tuple(int(np.interp(x, _STOPS, _PLASMA[:, i])) for i in range(3))
+    red, green, blue = (int(np.interp(x, _STOPS, _PLASMA[:, i])) for i in range(3))
+    return red, green, blue
 
 
 def css(colour: Rgb) -> str:
-    """As CSS writes it."""
+    """Return the colour in CSS notation."""
     return "#" + "".join(f"{c:02x}" for c in colour)
 
 
 def tension_gradient() -> str:
-    """The colour map as a CSS gradient."""
-    return "linear-gradient(90deg," + ",".join(css(tuple(map(int, c))) for c in _PLASMA) + ")"
+    """Return the colour map of tensions as a CSS gradient."""
+    return "linear-gradient(90deg," + ",".join(css((int(r), int(g), int(b))) for r, g, b in _PLASMA) + ")"

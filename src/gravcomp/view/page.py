@@ -1,4 +1,4 @@
-"""The page: scene, plots, controls and figures of one robot, served to browsers."""
+"""The page of one robot, served to browsers: scene, plots, controls and figures."""
 
 import socket
 
@@ -22,16 +22,16 @@ _PANEL_WIDTH = 320  # px
 
 
 class Page:
-    """A live page. Raises ConfigError when no port is free or the address is not this machine's."""
+    """A live page. Raises ConfigError when no port is free or the host is not an address of this machine."""
 
-    def __init__(self, robot: Robot, options: PageOptions):
+    def __init__(self, robot: Robot, options: PageOptions) -> None:
         port = free_port(options.host, options.port)
         self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
         shown = "localhost" if options.host in ("127.0.0.1", "0.0.0.0", "::") else options.host
         self.address = f"http://{shown}:{self._server.get_port()}"
         self._names = robot.cable_names
         self._frame, self._idle_frames = 0, max(1, round(options.rate))
-        self._shown: Snapshot | None = None  # while the page is held
+        self._shown: Snapshot | None = None  # while the page shows an earlier state
         gui = self._server.gui
         gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
         self._scene = Scene(self._server, robot, options)
@@ -50,17 +50,18 @@ class Page:
             self._plots = Plots(self._server, self._names, options)
         panel.dock_left()
         panel.set_width(_PANEL_WIDTH)
-        self._server.on_client_disconnect(self._left)
+        self._server.on_client_disconnect(self._on_disconnect)
 
     @property
     def clients(self) -> int:
-        """Browsers that look at the page."""
+        """Number of browsers that show the page."""
         return len(self._server.get_clients())
 
     def show(self, snapshot: Snapshot) -> None:
-        """Draw a snapshot: the scene at each call, curves at every second, words and figures at every fourth.
+        """Draw a snapshot: the scene at each call, plots at every second, texts and figures at every fourth.
 
-        While nobody looks, once a second: a browser that comes finds the page as it is. While somebody looks back, the page stands.
+        Without a browser the page is updated once per second, so that a new browser shows the current state. While the user looks
+        back, the page does not change.
         """
         self._plots.add(snapshot)
         self._timeline.add(snapshot)
@@ -75,13 +76,13 @@ class Page:
             self._controls.show_virtual(snapshot.virtual)
             self._controls.show_recording(bool(snapshot.recording))
 
-    def _left(self, _: viser.ClientHandle) -> None:
-        """Whoever comes after the last one has left finds the robot as it is."""
+    def _on_disconnect(self, _: viser.ClientHandle) -> None:
+        """Return to the live state when the last browser has left."""
         if not self.clients:
             self._timeline.return_to_live()
 
     def _draw(self, snapshot: Snapshot) -> None:
-        """Show what is."""
+        """Draw the live state."""
         alone = not self.clients
         if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
             return
@@ -90,40 +91,43 @@ class Page:
         if alone or self._frame % 2 == 0:
             self._plots.draw()
         if alone or self._frame % 4 == 0:
-            self._tell(snapshot, None)
+            self._write(snapshot, None)
 
     def _hold(self, snapshot: Snapshot, held_at: float) -> None:
-        """Show what was, once."""
+        """Draw an earlier state, once."""
         if snapshot is self._shown:
             return
         self._shown = snapshot
         with self._server.atomic():
             self._scene.show(snapshot)
         self._plots.draw(snapshot.time)
-        self._tell(snapshot, held_at)
+        self._write(snapshot, held_at)
 
-    def _tell(self, snapshot: Snapshot, held_at: float | None) -> None:
-        """Words and figures."""
+    def _write(self, snapshot: Snapshot, held_at: float | None) -> None:
+        """Update texts and figures."""
         self._status.content = status_html(snapshot, held_at)
         self._cables.content = cables_html(snapshot, self._names)
         self._legend.content = legend_html(snapshot.truth is not None)
 
     def requests(self) -> list[Request]:
-        """What people asked for since the last call."""
+        """Return the user's requests since the last call."""
         return self._controls.requests()
 
-    def notify(self, title: str, sentence: str, good: bool = False) -> None:
-        """Tell everyone who looks."""
+    def notify(self, title: str, sentence: str, *, good: bool = False) -> None:
+        """Show a notification in every browser."""
         for client in self._server.get_clients().values():
             client.add_notification(title, sentence, auto_close_seconds=6.0, color="green" if good else "red")
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self._server.stop()
 
 
 def free_port(host: str, first: int) -> int:
-    """The first port from `first` on that nobody listens at. Raises ConfigError."""
+    """Return the first free port from `first` on.
+
+    Raises ConfigError when none is free or `host` is not an address of this machine.
+    """
     last = min(first + PORTS_TRIED, 65536)
     for port in range(first, last):
         with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
@@ -131,7 +135,7 @@ def free_port(host: str, first: int) -> int:
             try:
                 probe.bind((host, port))
             except OSError as error:
-                if error.errno in (98, 13, 48):  # taken, or kept for the system
+                if error.errno in (98, 13, 48):  # in use, or reserved for the system
                     continue
                 raise ConfigError(f"viewer: host is '{host}'; an address of this machine is needed ({error.strerror})") from error
             return port

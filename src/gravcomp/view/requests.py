@@ -1,11 +1,11 @@
-"""What a person asks for on the page, as data; who serves the page carries it out."""
+"""The user's requests on the page, as data; the program that serves the page executes them."""
 
 import dataclasses
 
 
 @dataclasses.dataclass(frozen=True)
 class SetTarget:
-    """A bend to keep: angle (rad) into the plane (rad, about z from x)."""
+    """Set a bend as target: angle (rad) between base and tip direction, plane (rad) about z from x."""
 
     angle: float
     plane: float
@@ -13,7 +13,7 @@ class SetTarget:
 
 @dataclasses.dataclass(frozen=True)
 class TiltBase:
-    """Where the virtual robot's base shall turn to: inclination above the horizontal and roll about the robot's axis, rad."""
+    """Tilt the virtual robot's base: inclination above the horizontal and roll about the robot's axis, rad."""
 
     inclination: float
     roll: float
@@ -28,21 +28,21 @@ class Compensate:
 
 @dataclasses.dataclass(frozen=True)
 class InjectFault:
-    """A fault for the virtual robot, in the words of `gravcomp.virtual.faults`; 'clear' ends all."""
+    """Inject a fault, given as YAML of `gravcomp.virtual.faults`, into the virtual robot; 'clear' ends all faults."""
 
     text: str
 
 
 @dataclasses.dataclass(frozen=True)
 class BridgeService:
-    """A service of can_bridge: 'home', 'stop' or 'release'."""
+    """Call a service of can_bridge: 'home', 'stop' or 'release'."""
 
     name: str
 
 
 @dataclasses.dataclass(frozen=True)
 class Record:
-    """Begin or end recording a bag."""
+    """Start or stop recording a bag."""
 
     on: bool
 

@@ -1,8 +1,8 @@
-"""Surfaces that follow the backbone: each vertex keeps its place in the cross-section at its station.
+"""Surfaces that follow the backbone: each vertex keeps its position in the cross-section at its station.
 
     vertex = p(station) + R(station) (x, y, 0)
 
-so that walls, lumen and cables of a robot, and any surface read from a file, are deformed alike.
+Walls, lumen and cables of a robot, and surfaces from a file, are deformed in the same way.
 """
 
 import dataclasses
@@ -10,24 +10,27 @@ import functools
 import math
 
 import numpy as np
+import viser
 
 from gravcomp.description import Cable, Robot
 from gravcomp.view.backbone import Backbone
+from gravcomp.view.colours import Rgb
+from gravcomp.view.scale import scaled
 
 AROUND = 36  # vertices around the body
-FILLET = 0.0006  # m, at the rim of the end face
+FILLET = 0.0006  # m, radius of the rim of the end face
 
 
 @dataclasses.dataclass(frozen=True)
 class Skin:
-    """station (v,), offset (v, 2) m in the cross-section, faces (f, 3)."""
+    """A surface: station (v,), offset (v, 2) in the cross-section in m, faces (f, 3)."""
 
     station: np.ndarray
     offset: np.ndarray
     faces: np.ndarray
 
     def on(self, backbone: Backbone) -> np.ndarray:
-        """The vertices (v, 3) on a backbone, float32."""
+        """Return the vertices (v, 3) on a backbone in m, float32."""
         unique, inverse = self._rings
         position, rotation = backbone.at(unique)
         x, y = self.offset[:, :1], self.offset[:, 1:]
@@ -40,7 +43,7 @@ class Skin:
 
 
 def joined(skins: list[Skin]) -> tuple[Skin, list[slice]]:
-    """One skin of many, deformed at once, and where each one's vertices are in it. Its faces are those of none."""
+    """Return one skin without faces from many, to deform them together, and the slice of each one's vertices."""
     ends = np.cumsum([0] + [len(skin.station) for skin in skins])
     parts = [slice(a, b) for a, b in zip(ends, ends[1:])]
     station, offset = (np.concatenate([getattr(skin, name) for skin in skins]) for name in ("station", "offset"))
@@ -48,7 +51,7 @@ def joined(skins: list[Skin]) -> tuple[Skin, list[slice]]:
 
 
 def wall_skins(robot: Robot) -> list[Skin]:
-    """The outer surface, one skin a segment; of a body from a file its whole surface."""
+    """Return the outer surface: one skin per segment, or the whole surface of a body from a file."""
     if robot.body is not None:
         return [_body_skin(robot)]
     skins, z = [], 0.0
@@ -67,10 +70,12 @@ def wall_skins(robot: Robot) -> list[Skin]:
 
 
 def lumen_skin(robot: Robot) -> Skin | None:
-    """The wall of the working channel, seen from inside; none for a body from a file."""
+    """Return the wall of the working channel, facing inward; None for a body from a file."""
     if robot.body is not None:
         return None
-    radii, heights, z = [], [], 0.0
+    radii: list[float] = []
+    heights: list[float] = []
+    z = 0.0
     for segment in robot.segments:
         along = np.linspace(z, z + segment.full_length, 16)
         heights += along.tolist()
@@ -80,7 +85,7 @@ def lumen_skin(robot: Robot) -> Skin | None:
 
 
 def cable_skin(robot: Robot, cable: Cable, radius: float = 0.0006, around: int = 8) -> Skin:
-    """A cable as a tube of `radius` (m) from where it enters the body to where it is fixed."""
+    """Return a cable as a tube of `radius` (m), from its entry into the body to its fixed end."""
     z = np.linspace(cable.start, robot.cable_end(cable), 32)
     centre = cable_offset(cable, z)
     angle = np.linspace(0.0, 2 * math.pi, around, endpoint=False)
@@ -90,23 +95,40 @@ def cable_skin(robot: Robot, cable: Cable, radius: float = 0.0006, around: int =
 
 
 def cable_offset(cable: Cable, z: np.ndarray) -> np.ndarray:
-    """Where a cable passes the cross-sections at the heights z (k,): (k, 2) m in the sections' own axes."""
+    """Return the positions (k, 2) of a cable in m, in the axes of the cross-sections at the heights z (k,)."""
     if cable.via_points is not None:
         via = np.array(cable.via_points)
         return np.stack([np.interp(z, via[:, 2], via[:, 0]), np.interp(z, via[:, 2], via[:, 1])], axis=1)
+    assert cable.radius is not None and cable.angle is not None  # both are given for a cable without via points
     return np.tile(cable.radius * np.array([math.cos(cable.angle), math.sin(cable.angle)]), (len(z), 1))
 
 
 def line_skin(radius: float, around: int = 10, rings: int = 48) -> Skin:
-    """A thin tube along the backbone itself."""
+    """Return a thin tube of `radius` (m) along the backbone."""
     return revolved(np.full(rings, radius), np.linspace(0.0, 1.0, rings), 1.0, around)
 
 
 def revolved(radii: np.ndarray, heights: np.ndarray, length: float, around: int = AROUND) -> Skin:
-    """A profile (k,) of radii and heights (m) turned about the axis; outward when it goes upward."""
+    """Return a surface of revolution from radii and heights (k,) in m; it faces outward when the heights increase."""
     angle = np.linspace(0.0, 2 * math.pi, around, endpoint=False)
     offset = radii[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[None]
     return Skin(np.repeat(heights / length, around), offset.reshape(-1, 2), _quads(len(radii), around))
+
+
+def add_skin(
+    scene: viser.SceneApi,
+    name: str,
+    skin: Skin,
+    backbone: Backbone,
+    colour: Rgb,
+    *,
+    opacity: float | None = None,
+    cast_shadow: bool = True,
+) -> viser.MeshHandle:
+    """Add a skin on a backbone to a scene."""
+    return scene.add_mesh_simple(
+        name, scaled(skin.on(backbone)), skin.faces, color=colour, side="front", opacity=opacity, cast_shadow=cast_shadow
+    )
 
 
 def _quads(rings: int, around: int) -> np.ndarray:

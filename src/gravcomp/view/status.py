@@ -1,4 +1,4 @@
-"""The page's words and figures, as HTML."""
+"""Texts and figures of the page as HTML."""
 
 import html
 import math
@@ -7,26 +7,29 @@ from gravcomp.view import colours
 from gravcomp.view.snapshot import Snapshot
 
 _DOTS = {"ok": "#22c55e", "warn": "#f59e0b", "error": "#ef4444", "off": "#94a3b8"}
-_MOTORS = {"active": "ok", "inactive": "off", "unconfigured": "off", "stopped": "error", "fault": "error"}  # all else: warn
+_MOTORS = {"active": "ok", "inactive": "off", "unconfigured": "off", "stopped": "error", "fault": "error"}  # other states: warn
 _FIGURE = '<div style="flex:1"><div style="font-size:1.35em;font-weight:650;font-variant-numeric:tabular-nums">{}</div>' \
     '<div style="font-size:.74em;opacity:.68">{}</div></div>'  # fmt: skip
 
 
 def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
-    """What the controller says, the errors, and how the graph runs; `held_at`: the time (s) from which one looks back, None when live."""
+    """Return controller status, motor state, errors and rates.
+
+    held_at: time (s) at which the user began to look back; None for the live state.
+    """
     sentence = _sentence(_DOTS.get(snapshot.status_level, _DOTS["off"]), snapshot.status or "waiting for the graph", "status")
-    # The model keeps a target also while the motors stand: both have to be seen.
+    # The model may keep a target while the motors hold, so both states are shown.
     motors = ""
     if snapshot.motors_state:
         state = f"motors {snapshot.motors_state}: "
-        said = state + snapshot.motors_message.removeprefix(f"{snapshot.motors_state}: ")
-        motors = _sentence(_DOTS[_MOTORS.get(snapshot.motors_state, "warn")], said, "motors")
+        text = state + snapshot.motors_message.removeprefix(f"{snapshot.motors_state}: ")
+        motors = _sentence(_DOTS[_MOTORS.get(snapshot.motors_state, "warn")], text, "motors")
     figures = [
         (_mm(snapshot.tip_error), "tip to target, model"),
         (_mm(snapshot.true_tip_error), "tip to target, virtual robot"),
     ]
     more = [
-        (f"{snapshot.rate:.0f} Hz" if snapshot.rate else "–", "model's rate"),
+        (f"{snapshot.rate:.0f} Hz" if snapshot.rate else "–", "rate of the model"),
         (_ms(snapshot.delays.get("command")), "IMU to command"),
         (_inclination(snapshot), "inclination"),
     ]
@@ -37,7 +40,7 @@ def status_html(snapshot: Snapshot, held_at: float | None = None) -> str:
         )
     if held_at is not None:
         recording = (
-            f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">looking back: {held_at - snapshot.time:.1f} s ago</div>'
+            f'<div style="margin-top:.4em;font-size:.8em;color:#f59e0b">earlier state: {held_at - snapshot.time:.1f} s ago</div>'
         )
     return (
         f'<div data-time="{snapshot.time:.3f}" data-held-at="{"" if held_at is None else f"{held_at:.3f}"}" '
@@ -56,34 +59,35 @@ def _sentence(dot: str, sentence: str, name: str) -> str:
 
 
 def cables_html(snapshot: Snapshot, names: tuple[str, ...]) -> str:
-    """One bar a cable in its colour of the scene, with the legend of the colours."""
-    if snapshot.tension is None:
+    """Return one bar per cable in its colour of the scene, and the colour scale."""
+    if snapshot.tension is None or snapshot.displacement is None:
         return '<div style="padding:.4em .9em;font-size:.85em;opacity:.7">no model yet</div>'
     rows = []
     for i, name in enumerate(names):
         tension = float(snapshot.tension[i])
         width = min(100.0, 100.0 * tension / colours.TENSION_SCALE)
         measured = "" if snapshot.motors_tension is None else f"{snapshot.motors_tension[i]:.2f}"
+        bar = f"height:100%;border-radius:.3em;width:{width:.0f}%;background:{colours.css(colours.tension_colour(tension))}"
         rows.append(
-            f'<tr style="white-space:nowrap"><td style="padding-right:.5em">{html.escape(name)}</td><td style="width:34%"><div style="height:.62em;border-radius:.3em;'
-            f'background:rgba(128,140,160,.22)"><div style="height:100%;border-radius:.3em;width:{width:.0f}%;'
-            f'background:{colours.css(colours.tension_colour(tension))}"></div></div></td>'
+            f'<tr style="white-space:nowrap"><td style="padding-right:.5em">{html.escape(name)}</td><td style="width:34%">'
+            f'<div style="height:.62em;border-radius:.3em;background:rgba(128,140,160,.22)"><div style="{bar}"></div></div></td>'
             f'<td style="text-align:right">{tension:.2f} N</td><td style="text-align:right;opacity:.65">{measured}</td>'
             f'<td style="text-align:right">{1e3 * snapshot.displacement[i]:+.2f} mm</td></tr>'
         )
+    scale = f"flex:1;height:.55em;border-radius:.3em;background:{colours.tension_gradient()}"
     return (
-        '<div style="padding:.3em .9em .5em;font-size:.8em;font-variant-numeric:tabular-nums"><table style="width:100%;border-spacing:0 .14em">'
-        f'{"".join(rows)}</table><div style="display:flex;align-items:center;gap:.5em;margin-top:.4em;font-size:.92em"><span>slack</span>'
-        f'<div style="flex:1;height:.55em;border-radius:.3em;background:{colours.tension_gradient()}"></div>'
-        f"<span>{colours.TENSION_SCALE:g} N</span></div></div>"
+        '<div style="padding:.3em .9em .5em;font-size:.8em;font-variant-numeric:tabular-nums">'
+        f'<table style="width:100%;border-spacing:0 .14em">{"".join(rows)}</table>'
+        '<div style="display:flex;align-items:center;gap:.5em;margin-top:.4em;font-size:.92em"><span>slack</span>'
+        f'<div style="{scale}"></div><span>{colours.TENSION_SCALE:g} N</span></div></div>'
     )
 
 
 def legend_html(virtual: bool) -> str:
-    """What the colours of the scene mean."""
+    """Return the legend of the scene; virtual: there is a virtual robot."""
     entries = [(colours.GHOST, "rest shape"), (colours.TARGET, "target"), (colours.GRAVITY, "gravity")]
     if virtual:
-        entries.insert(1, (colours.TRUTH, "virtual robot's truth"))
+        entries.insert(1, (colours.TRUTH, "ground truth"))
     chips = "".join(
         f'<span style="display:inline-flex;align-items:center;gap:.35em;margin-right:.9em"><span style="width:.7em;height:.7em;'
         f'border-radius:.2em;background:{colours.css(colour)}"></span>{text}</span>'

@@ -1,39 +1,40 @@
-"""Looking back: what the page showed in the last minutes is kept, and a slider turns it back while the robot goes on."""
+"""Earlier states: the page keeps the snapshots of the last minutes, and a slider selects one of them while the robot runs."""
 
 import bisect
 import collections
 
 import viser
 
+from gravcomp.view.handles import set_value
 from gravcomp.view.snapshot import Snapshot
 
 
 class Timeline:
-    """The slider, in the current GUI container, and the snapshots of the last `span` s at up to `rate` a second.
+    """The slider, in the current GUI container, and the snapshots of the last `span` s at up to `rate` per second.
 
-    The first move of the slider away from 0 holds the page; from then on it counts from that moment.
+    The page is held when the slider leaves 0; from then on the slider counts from that moment.
     """
 
-    def __init__(self, gui: viser.GuiApi, span: float, rate: float):
+    def __init__(self, gui: viser.GuiApi, span: float, rate: float) -> None:
         self._snapshots: collections.deque[Snapshot] = collections.deque(maxlen=int(span * rate) + 1)
         self._ago = gui.add_slider(
-            "look back s", min=0.0, max=span, step=0.1, initial_value=0.0, hint="0: live; the robot goes on meanwhile"
+            "look back s", min=0.0, max=span, step=0.1, initial_value=0.0, hint="0: live; the robot continues to run"
         )
-        self._since: list[Snapshot] = []  # what could be looked back at when the page was held
+        self._since: list[Snapshot] = []  # the snapshots at the moment when the page was held
 
     def add(self, snapshot: Snapshot) -> None:
-        """Keep it. One whose time went back begins anew."""
+        """Keep a snapshot. A time before the last one clears the timeline first."""
         if self._snapshots and snapshot.time < self._snapshots[-1].time:
             self._snapshots.clear()
         self._snapshots.append(snapshot)
 
     def return_to_live(self) -> None:
-        """Stop looking back."""
-        self._ago.value = 0.0
+        """Show the live state."""
+        set_value(self._ago, 0.0)
 
     @property
     def held(self) -> tuple[Snapshot, float] | None:
-        """What the page shall show in place of the newest, and at which time (s) it was held; None while it is live."""
+        """The snapshot to show, and the time (s) at which the page was held; None in the live state."""
         ago = self._ago.value
         if ago <= 0.0 or not self._snapshots:
             self._since = []

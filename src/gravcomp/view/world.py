@@ -1,7 +1,7 @@
-"""How the robot's base hangs in the world, from gravity alone.
+"""Orientation of the robot's base in the world, from gravity only.
 
-Gravity fixes two of the three angles. The heading is carried along with the least turn from frame to frame (parallel transport), and
-drawn back slowly so that the robot's axis stays in the world's x-z plane, where the camera looks at it from the side:
+Gravity determines two of the three angles. The heading follows the smallest rotation from frame to frame (parallel transport),
+and slowly returns the robot's axis to the world's x-z plane, which the camera shows from the side:
 
     R' = R_min(R g / |g| -> -e_z) R,    R'' = R_z(heading) R'.
 """
@@ -10,25 +10,25 @@ import math
 
 import numpy as np
 
-PULL = 0.03  # part of the heading's error taken back at each frame
+PULL = 0.03  # part of the heading error that is removed at each frame
 
 
 class BaseInWorld:
-    """Follows gravity (3,) in soft_base and gives the rotation (3, 3), world from soft_base."""
+    """Computes the rotation (3, 3) from soft_base to world from gravity (3,) in soft_base."""
 
-    def __init__(self):
-        # Horizontal, the axis toward x.
+    def __init__(self) -> None:
+        # Horizontal, axis along x.
         self.rotation = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
         self._started = False
 
     def follow(self, gravity: np.ndarray) -> np.ndarray:
-        """The rotation after this gravity; a vanishing one changes nothing."""
+        """Return the rotation for this gravity; a vanishing one changes nothing."""
         norm = float(np.linalg.norm(gravity))
         if norm < 1e-3:
             return self.rotation
         self.rotation = _least_turn(self.rotation @ gravity / norm, np.array([0.0, 0.0, -1.0])) @ self.rotation
         axis = self.rotation[:, 2]
-        # Toward the nearer of x and -x, and the weaker the nearer the axis is to the vertical, where it has no heading.
+        # Toward the nearer of x and -x; weaker near the vertical, where the axis has no heading.
         heading = math.atan2(axis[1], axis[0]) if axis[0] > 0 else math.atan2(-axis[1], -axis[0])
         level = float(axis[0] ** 2 + axis[1] ** 2)
         self.rotation = _about_z(-heading * level * (PULL if self._started else 1.0)) @ self.rotation
@@ -37,7 +37,7 @@ class BaseInWorld:
 
 
 def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
-    """(4,) w x y z of a rotation (3, 3)."""
+    """Return the quaternion (4,), w x y z, of a rotation (3, 3)."""
     m = rotation
     k = np.array([
         [m[0, 0] - m[1, 1] - m[2, 2], 0, 0, 0],
@@ -51,7 +51,7 @@ def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
 
 
 def _least_turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The smallest rotation from the unit vector a to b."""
+    """Return the smallest rotation (3, 3) from the unit vector a to b."""
     v, c = np.cross(a, b), float(a @ b)
     if c < -1.0 + 1e-9:
         return np.diag([1.0, -1.0, -1.0])

@@ -1,0 +1,77 @@
+"""Controls of the virtual robot: tilt of its base, and faults."""
+
+import math
+from collections.abc import Callable
+
+import viser
+
+from gravcomp.view.handles import set_value
+from gravcomp.view.requests import InjectFault, Request, TiltBase
+
+_TILTS = ("0°", "45°", "90°", "135°", "-45°")
+_FAULTS = {
+    "IMU frames lost": "{{kind: drop, frames: imu, duration: {0:g}}}",
+    "IMU stuck": "{{kind: imu_stuck, duration: {0:g}}}",
+    "bus off": "{{kind: bus_off, duration: {0:g}}}",
+    "30 % of the frames corrupt": "{{kind: corrupt, probability: 0.3, duration: {0:g}}}",
+    "feedback delayed by 20 ms": "{{kind: delay, frames: feedback, duration: {0:g}}}",
+    "heater dead": "{{kind: heater_dead, duration: {0:g}}}",
+    "motor of {1} stalled": "{{kind: stall, cable: {1}, duration: {0:g}}}",
+    "cable {1} broken": "{{kind: cable_break, cable: {1}, duration: {0:g}}}",
+}
+
+
+class VirtualControls:
+    """Tilts the base and injects faults; `put` receives the requests."""
+
+    def __init__(self, gui: viser.GuiApi, cables: tuple[str, ...], put: Callable[[Request], None]) -> None:
+        self._put = put
+        self._base = self._add_base(gui)
+        self._faults = self._add_faults(gui, cables)
+
+    @property
+    def visible(self) -> bool:
+        """Whether the controls are shown."""
+        return self._base.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        if self._base.visible != visible:
+            self._base.visible = self._faults.visible = visible
+
+    def _add_base(self, gui: viser.GuiApi) -> viser.GuiFolderHandle:
+        folder = gui.add_folder("Base of the virtual robot")
+        with folder:
+            presets = gui.add_button_group("presets", _TILTS)
+            self._inclination = gui.add_slider(
+                "inclination °", min=-90.0, max=180.0, step=1.0, initial_value=0.0, hint="0: horizontal, 90: up"
+            )
+            self._roll = gui.add_slider("roll °", min=-180.0, max=180.0, step=1.0, initial_value=0.0)
+        self._inclination.on_update(self._on_tilt)
+        self._roll.on_update(self._on_tilt)
+        presets.on_click(self._on_preset)
+        return folder
+
+    def _on_preset(self, event: viser.GuiEvent) -> None:
+        set_value(self._inclination, float(event.target.value.rstrip("°")))
+        self._put_tilt()
+
+    def _on_tilt(self, event: viser.GuiEvent) -> None:
+        if event.client is not None:  # set by the user, not by the program
+            self._put_tilt()
+
+    def _put_tilt(self) -> None:
+        self._put(TiltBase(math.radians(self._inclination.value), math.radians(self._roll.value)))
+
+    def _add_faults(self, gui: viser.GuiApi, cables: tuple[str, ...]) -> viser.GuiFolderHandle:
+        texts = {text.replace("{1}", "the cable"): fault for text, fault in _FAULTS.items()}
+        folder = gui.add_folder("Faults", expand_by_default=False)
+        with folder:
+            cable = gui.add_dropdown("cable", cables) if cables else None
+            kind = gui.add_dropdown("fault", tuple(texts))
+            duration = gui.add_slider("duration s", min=0.5, max=20.0, step=0.5, initial_value=2.0)
+            inject = gui.add_button("Inject", color="red")
+            clear = gui.add_button("Clear all")
+        inject.on_click(lambda _: self._put(InjectFault(texts[kind.value].format(duration.value, cable.value if cable else ""))))
+        clear.on_click(lambda _: self._put(InjectFault("clear")))
+        return folder
