@@ -126,7 +126,7 @@ def test_a_load_beyond_the_limit_is_reported_with_its_reason(simulator):
     before = simulator.solve([-G, 0.0, 0.0])
     shape = simulator.step([-G, 0.0, 0.0], tension=np.array([3.0, 0, 0, 0, 0, 0]))
     assert shape.status == ShapeStatus.NOT_CONVERGED
-    assert "'svk' gives way" in shape.message
+    assert "law 'svk' softens" in shape.message
     assert 2.8 < shape.cable_tension[0] < 2.93
     after = simulator.step([-G, 0.0, 0.0])
     assert after.status == ShapeStatus.OK and after.tip_position == pytest.approx(before.tip_position, abs=1e-6)

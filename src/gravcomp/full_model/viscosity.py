@@ -11,10 +11,14 @@ E_(n-1)) / (2 h), and H follows from a constant rate,
 so both are linear in the strain at the end of the step, as `ViscousStrain` needs.
 """
 
+from typing import TypeVar
+
 import numpy as np
 
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import Mesh
+
+_Time = TypeVar("_Time", float, np.ndarray)
 
 
 class Viscosity:
@@ -51,7 +55,7 @@ class Viscosity:
         return decay * held + gain * (strain - strain_before)
 
 
-def branch(h: float, creep_time: float | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
+def branch(h: float, creep_time: _Time) -> tuple[_Time, _Time]:
     """Return e^-x and g for a step of h s."""
     x = h / creep_time
     return np.exp(-x), -np.expm1(-x) / x

@@ -71,10 +71,20 @@ class InverseController:
 
         Never raises for a hard problem; the command's code says what happened.
 
-        Parameters ---------- response : linear response of the model at its present shape target : shape to keep
-        backbone_station : (n,) stations of the response's backbone rows tension : (m,) present tensions of the model in N;
-        None: those of the last command interval : time since the last step in s followed : whether the model's shape is its
-        equilibrium under the last command; False: it found none and kept its last shape
+        Parameters
+        ----------
+        response
+            Linear response of the model at its present shape.
+        target
+            Shape to keep.
+        backbone_station
+            (n,) stations of the response's backbone rows.
+        tension
+            (m,) present tensions of the model in N; None: those of the last command.
+        interval
+            Time since the last step in s.
+        followed
+            Whether the model's shape is its equilibrium under the last command; False: it found none and kept its last shape.
 
         """
         started = time.perf_counter()

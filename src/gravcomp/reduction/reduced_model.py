@@ -46,7 +46,7 @@ class ReducedModel:
         return self.basis.shape[1]
 
     def observe(self, q: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return the sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`, and the results of `observation.observe` for them.
+        """Return the sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`, and `observation.observe` of them.
 
         answer (k, r): changes of q for which the changes of the effector are computed.
         """

@@ -7,11 +7,11 @@ e_i = sym G_i and e_ij = sym G_i^T G_j. It is taken in a basis of strains s_m th
     eps_m(q) = <s_m, E(q)> = a_m . q + 1/2 q . B_m q,    a_mi = <s_m, e_i>,    B_mij = <s_m, e_ij>,
     energy U = 1/2 sum eps_m^2,    f = J^T eps,    K = J^T J + sum eps_m B_m,    J = a + B q.
 
-The integrals are exact, so nothing is sampled. Were the s_m complete, U would be the exact polynomial of degree four
-(Barbic and James 2005). Taking the r strains e_i, which make the stiffness at rest exact, and the principal strains of
-the trained shapes besides does better: a combination of a few modes cannot bend without a little stretch that the body
-does not have, and with all strains the tangle of such stretches makes the reduced body too stiff. It is also cheaper, m
-r^2 products in place of r^4 / 4. Kelvin-Voigt's law with the time beta is the stress eps + beta d eps / dt.
+The integrals are exact; nothing is sampled. With a complete set of s_m, U would be the exact polynomial of degree four (Barbic
+and James 2005). Only the r strains e_i, which make the stiffness at rest exact, and the principal strains of the trained shapes
+are taken. That is more accurate: a combination of a few modes cannot bend without a small stretch that the real body does not
+have, and with all strains these stretches make the reduced body too stiff. It is also cheaper, m r^2 products instead of r^4 /
+4. The Kelvin-Voigt law with the time beta is the stress eps + beta d eps / dt.
 """
 
 from collections.abc import Iterator
@@ -31,35 +31,34 @@ _POINTS_AT_ONCE = 400
 
 @dataclass(frozen=True)
 class StrainPolynomials:
-    """linear a^T (r, m) and quadratic B^T (r (r + 1) / 2, m), in sqrt(J): of each symmetric B_m the lower half, row by row.
+    """linear a^T (r, m) and quadratic B^T (r (r + 1) / 2, m) in sqrt(J); the latter holds the lower half of each B_m row by row.
 
-    The strains run along the last axis, because so a step reads memory in order; B is in single precision, because reading it
-    is what a step waits for. Force and stiffness remain exact derivatives of one energy.
+    The strains run along the last axis, so that a step reads memory in order. B is in single precision, because reading it takes
+    most of the time of a step; force and stiffness are still exact derivatives of one energy.
     """
 
     linear: np.ndarray
     quadratic: np.ndarray
 
     def evaluate(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """At q (r,): internal force (r,), tangent stiffness (r, r) in its lower triangle, and the strain eps (m,)."""
+        """Return internal force (r,), tangent stiffness (r, r), lower triangle only, and strain eps (m,) at q (r,)."""
         jacobian, strain = strain_at(self.linear, self.quadratic, q)
         return jacobian @ strain, tangent(jacobian, self.quadratic, strain, 1.0), strain
 
 
 @njit(cache=True)
-def _packed(i, j):
-    """Where the entry (i, j) is in the lower half of a symmetric matrix, row by row."""
+def _packed(i: int, j: int) -> int:
+    """Return the position of the entry (i, j) of a symmetric matrix in its lower half, stored row by row."""
     return i * (i + 1) // 2 + j if j <= i else j * (j + 1) // 2 + i
 
 
 @njit(cache=True, fastmath=REORDERED)
-def strain_at(linear, quadratic, q):
-    """J^T (r, m) and eps (m,) at q (r,)."""
+def strain_at(linear: np.ndarray, quadratic: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return J^T (r, m) and eps (m,) at q (r,)."""
     r, modes = linear.shape
     jacobian, strain = linear.copy(), np.zeros(modes)
     for i in range(r):
-        # Entry (i, j) of the packed symmetric matrices; four at a time, so that the row that is added to is read and written
-        # less.
+        # Entries (i, j) of the packed symmetric matrices, four at a time: the row of the result is read and written less often.
         to, j = jacobian[i], 0
         while j + 4 <= r:
             p_0, p_1, p_2, p_3 = _packed(i, j), _packed(i, j + 1), _packed(i, j + 2), _packed(i, j + 3)
@@ -81,15 +80,15 @@ def strain_at(linear, quadratic, q):
 
 
 @njit(cache=True, fastmath=REORDERED)
-def tangent(jacobian, quadratic, stress, scale):
-    """scale J^T J + sum stress_m B_m (r, r), its lower triangle, from J^T (r, m) and the stress (m,)."""
+def tangent(jacobian: np.ndarray, quadratic: np.ndarray, stress: np.ndarray, scale: float) -> np.ndarray:
+    """Return the lower triangle of scale J^T J + sum stress_m B_m (r, r), from J^T (r, m) and the stress (m,)."""
     r, modes = jacobian.shape
     stiffness = np.empty((r, r))
     row, pair = np.empty(modes), 0
     for i in range(r):
         for m in range(modes):
             row[m] = scale * jacobian[i, m]
-        # Four entries at a time: what they share is read once.
+        # Four entries at a time: shared values are read once.
         j = 0
         while j + 4 <= i + 1:
             j_0, j_1, j_2, j_3 = jacobian[j], jacobian[j + 1], jacobian[j + 2], jacobian[j + 3]
@@ -113,9 +112,9 @@ def tangent(jacobian, quadratic, stress, scale):
 
 
 def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray, extra: int) -> StrainPolynomials:
-    """The polynomials for a basis (3 n_free, r) that is orthonormal in the energy at rest.
+    """Return the polynomials for a basis (3 n_free, r) that is orthonormal in the energy at rest.
 
-    snapshots (s, 3 n_free): trained shapes, whose `extra` principal strains are taken beside those of the basis.
+    snapshots (s, 3 n_free): trained shapes; their `extra` principal strains are used in addition to those of the basis.
     """
     r, s = basis.shape[1], len(snapshots)
     gram, shares = np.zeros((s, s)), np.zeros((r, s))
@@ -138,8 +137,10 @@ def strain_polynomials(elements: SolidElements, basis: np.ndarray, snapshots: np
 
 @dataclass(frozen=True)
 class _Points:
-    """Some quadrature points: gradient (p, 3, 3, r) of the modes, their linear strains (6 p, r), strains (6 p, s) of
-    the snapshots.
+    """A part of the quadrature points.
+
+    gradient (p, 3, 3, r) of the modes; linear (6 p, r): their linear strains; strains (6 p, s) of the snapshots; first_lame,
+    shear and weight (p,).
     """
 
     gradient: np.ndarray
@@ -150,18 +151,19 @@ class _Points:
     weight: np.ndarray
 
     def stress(self, strains: np.ndarray) -> np.ndarray:
-        """C : strains (6 p, k), times the points' weights."""
+        """Return C : strains (6 p, k), times the weights of the points."""
         strains = strains.reshape(len(self.weight), 6, -1)
         stress = self.shear[:, None, None] * strains
         stress[:, :3] = 2.0 * stress[:, :3] + (self.first_lame[:, None] * strains[:, :3].sum(axis=1))[:, None, :]
         return (stress * self.weight[:, None, None]).reshape(6 * len(self.weight), -1)
 
     def products(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """e_ij (6 p, k) of the pairs i = first (k,), j = second (k,)."""
+        """Return e_ij (6 p, k) of the pairs i = first (k,), j = second (k,)."""
         return _voigt(np.einsum("pkia,pkja->pija", self.gradient[..., first], self.gradient[..., second], optimize=True))
 
 
 def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) -> Iterator[_Points]:
+    """Yield the quadrature points in parts that fit into memory."""
     count = elements.weights.shape[1]
     at_once = max(1, _POINTS_AT_ONCE // count)
     modes, shapes = _on_nodes(elements, basis), _on_nodes(elements, snapshots.T)
@@ -179,21 +181,21 @@ def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) ->
 
 
 def _on_nodes(elements: SolidElements, columns: np.ndarray) -> np.ndarray:
-    """Fields (n, 3, k) of the unknowns (3 n_free, k), zero at the clamp."""
+    """Return fields (n, 3, k) of the unknowns (3 n_free, k), zero at the clamp."""
     fields = np.zeros((len(elements.mesh.nodes), 3, columns.shape[1]))
     fields[: elements.n_free] = columns.reshape(elements.n_free, 3, -1)
     return fields
 
 
 def _gradient(elements: SolidElements, part: slice, fields: np.ndarray) -> np.ndarray:
-    """d field_i / d X_j (p, 3, 3, k) at the points of some elements."""
+    """Return d field_i / d X_j (p, 3, 3, k) at the points of some elements."""
     local = fields[elements.mesh.elements[part]]
     gradient = np.einsum("kpjc,kcia->kpija", elements.gradients[part], local, optimize=True)
     return gradient.reshape(-1, 3, 3, fields.shape[-1])
 
 
 def _voigt(tensor: np.ndarray) -> np.ndarray:
-    """Symmetric part of (p, 3, 3, k) as strain (6 p, k)."""
+    """Return the symmetric part of (p, 3, 3, k) as strain (6 p, k)."""
     symmetric = 0.5 * (tensor[:, _ROWS, _COLUMNS] + tensor[:, _COLUMNS, _ROWS])
     symmetric[:, 3:] *= 2.0
     return symmetric.reshape(-1, tensor.shape[-1])

@@ -1,11 +1,10 @@
-"""Following the equilibrium in reduced coordinates: the same Newton step as the full model's (`simulation.statics`), in
-r unknowns.
+"""Tracking of the equilibrium in reduced coordinates, with the Newton step of `full_model.tracking` in r unknowns.
 
     A = K(q) + K_cables(q, lambda),   A y = Phi^T f_weight - f(q),   A X = H^T,   W = H X,   dq = y + X lambda
 
-with the tensions lambda from the cables' complementarity. One step follows a turning gravity; another is taken where
-the correction that the last factor still gives moves the tip by more than the tolerance. All of it is one compiled function:
-of many small calls a control step would spend more on calling than on computing.
+with the tensions lambda from the cables' complementarity. One step is enough to track a turning gravity; another is taken if
+the correction with the last factor moves the tip by more than the tolerance. All of it is one compiled function: with many
+small calls, a control step would spend more time on calling than on computing.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from numba import njit
 
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.body import body_of, cable_arrays, point_at
+from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -25,9 +24,10 @@ from gravcomp.rounding import REORDERED
 
 @dataclass
 class ReducedState:
-    """q (r,), tension (m,), displacement (m,) of the cables' paths; compliance (m, m) and answer X^T (m, r) of the last step;
-    residual (N): of the nodal forces out of balance, as far as the basis sees them, the norm, no less than the largest;
-    converged.
+    """State of the reduced model, with the compliance of the last step.
+
+    q (r,); tension (m,) in N; displacement (m,) of the cables' paths in m; compliance (m, m) in m/N; answer X^T (m, r); residual:
+    norm of the nodal forces out of balance in N, as far as the basis represents them; it is not less than the largest of them.
     """
 
     q: np.ndarray
@@ -40,13 +40,15 @@ class ReducedState:
 
 
 class ReducedTracker:
-    """Owns the current reduced state."""
+    """Tracks the equilibrium of a reduced model. Owns the current `state`."""
 
     def __init__(
         self, model: ReducedModel, length: float, tolerance: float = 5e-5, longest_step: float = 0.12, near: float = 0.02
     ):
-        """length (m) of the robot; tolerance, longest_step and near (the step up to which its own factor may judge it):
-        displacement of the tip as a fraction of it.
+        """Start from the straight robot of `length` m.
+
+        tolerance, longest_step and near (largest step whose factor may decide on convergence) are displacements of the tip as
+        fractions of the length.
         """
         self.model = model
         self._limits = longest_step * length, near * length, tolerance * length
@@ -60,24 +62,27 @@ class ReducedTracker:
         self._point = point_at(self._body, q)
 
     def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4) -> ReducedState:
-        """The state under gravity (3,) and the cables' input, from the present one; `converged` tells whether it was reached."""
+        """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`."""
         state = self.state
         wound, given = cable_arrays(cables, state.tension.size)
         weight = self.model.weight @ gravity
-        converged, self._point, *found = _followed(
+        converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body, self._point, state.q, state.tension, weight, wound, given, iterations, *self._limits
         )
         if not converged:
             return replace(state, residual=np.inf, converged=False)
-        self.state = ReducedState(*found, converged=True)
+        self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _followed(body, point, q, tension, weight, wound, given, iterations, longest_step, near, tolerance):
-    """Whether an equilibrium was reached, the point there (else the one at the start), the fields of its ReducedState up to the residual.
+def _tracked(
+    body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
+    iterations: int, longest_step: float, near: float, tolerance: float,
+) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
+    """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
-    wound (m,): displacements of the cables, NaN for released ones; given (m,): tensions that go first, or (0,).
+    wound and given: of `body.cable_arrays`; the last three in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))

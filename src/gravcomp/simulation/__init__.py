@@ -1,8 +1,8 @@
-"""The simulator: a robot's shape under gravity and cables, and how it answers to the cables.
+"""The simulator: a robot's shape under gravity and cables, and its linear response to the cables.
 
 simulator = Simulator(load_robot_file("article").robot)
-shape = simulator.step(gravity, displacement)      # warm-started tracking, one call a control step
-shape = simulator.solve(gravity, tension=tension)  # from far away, as exactly as asked for
+shape = simulator.step(gravity, displacement)      # tracking from the last shape, one call per control step
+shape = simulator.solve(gravity, tension=tension)  # independent of the last shape
 """
 
 from gravcomp.full_model.generalized_alpha import DynamicsOptions

@@ -1,4 +1,4 @@
-"""A robot in motion as one object: gravity, cables and time in, shape out."""
+"""Simulation of a robot in motion as one object: gravity, cables and time in, shape out."""
 
 import dataclasses
 import math
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.reduction.serving import ReducedServing
 
-# Distance of the two models' tips, as a fraction of the length, up to which the reduced one takes over.
+# Largest distance between the tips of the two models, as a fraction of the length, at which the reduced model takes over.
 _AGREEMENT = 5e-4
-# Steps of the full model until the reduced one is tried again.
+# Steps of the full model before the reduced model is tried again.
 _RETURN_AFTER = 25
-# How often a time step that does not converge is halved.
+# Largest number of times that a time step is halved if it does not converge.
 _HALVINGS = 4
 
 
@@ -44,26 +44,30 @@ class _LoadedMotion:
 
 
 class DynamicSimulator:
-    """Motion of a robot. The shape is the moving one; its response is that of the equilibrium toward which it moves,
-    because that is what a controller of shapes can steer: the answer within one step is mostly inertia.
+    """Motion of a robot.
 
-    The reduced model moves while it also serves the equilibrium, whose error it knows, and stays within what it was trained
-    for; else the full one does.
+    The shape is that of the moving robot. Its response is that of the equilibrium toward which it moves, because a controller
+    of shapes controls the equilibrium: the response within one step is mostly inertia. The reduced model is used for the motion
+    while it is used for the equilibrium, where its error is measured, and stays within its trained range; otherwise the full
+    model is used.
     """
 
-    def __init__(self, robot: Robot | RobotModel, options: DynamicsOptions = DynamicsOptions(), reduced: bool = True):
-        """`reduced`: use the reduced model where one is built. Raises MeshError for a body that cannot be computed with."""
+    def __init__(self, robot: Robot | RobotModel, options: DynamicsOptions | None = None, reduced: bool = True):
+        """options: default `DynamicsOptions()`; reduced: use the reduced model if one is built.
+
+        Raises MeshError for a body that cannot be meshed or computed.
+        """
         self.statics = Simulator(robot, reduced)
         self.model, self.robot = self.statics.model, self.statics.robot
-        self.options = options
-        self.solver = DynamicSolver(self.model, options)
+        self.options = options or DynamicsOptions()
+        self.solver = DynamicSolver(self.model, self.options)
         self._reduced, self._momentum = self._reduced_solver(self.statics.reduced_model)
         self._in_reduced, self._wait = False, 0
 
     def load_reduced(self) -> "_LoadedMotion | None":
         """As `Simulator.load_reduced`, with the motion."""
         serving = self.statics.load_reduced()
-        return serving and _LoadedMotion(serving, *self._reduced_solver(serving.reduced))
+        return None if serving is None else _LoadedMotion(serving, *self._reduced_solver(serving.reduced))
 
     def adopt(self, loaded: "_LoadedMotion") -> None:
         """As `Simulator.adopt`."""
@@ -72,21 +76,27 @@ class DynamicSimulator:
 
     @property
     def displacements(self) -> np.ndarray:
-        """(nodes, 3) displacements of the mesh's nodes at the present shape, in m."""
-        return self._lifted(self._reduced.state.q) if self._in_reduced else self.solver.state.u
+        """Displacements (nodes, 3) of the mesh's nodes at the present shape, in m."""
+        reduced = self._active_reduced
+        return self.solver.state.u if reduced is None else self._lifted(reduced, reduced.state.q)
+
+    @property
+    def _active_reduced(self) -> "ReducedDynamicSolver | None":
+        """The reduced model's solver while it computes the motion; None while the full model does."""
+        return self._reduced if self._in_reduced else None
 
     def reset(self) -> None:
-        """Back to the straight robot at rest."""
+        """Return to the straight robot at rest, without gravity."""
         self.statics.reset()
         self._place(np.zeros_like(self.model.mesh.nodes), np.zeros(self.model.tendons.count), np.zeros(3))
 
     def let_go(self, gravity: np.ndarray) -> None:
-        """Back to the straight robot at rest, on which gravity (3,) acts from now on."""
+        """Return to the straight robot at rest, on which gravity (3,) acts from now on."""
         self.statics.reset()
         self._place(np.zeros_like(self.model.mesh.nodes), np.zeros(self.model.tendons.count), np.asarray(gravity, dtype=float))
 
     def settle(self, gravity: np.ndarray, displacement: np.ndarray | None = None) -> Shape:
-        """At rest in the equilibrium under gravity (3,) and displacement (m,); motion starts from there."""
+        """Go to rest in the equilibrium under gravity (3,) and displacement (m,); motion starts from there."""
         shape = self.statics.solve(gravity, displacement)
         self._place(self.statics.displacements, shape.cable_tension, np.asarray(gravity, dtype=float))
         return shape
@@ -98,7 +108,7 @@ class DynamicSimulator:
         tension: np.ndarray | None = None,
         duration: float | None = None,
     ) -> Shape:
-        """Move on by `duration` seconds (default: one time step), in equal steps no longer than the options' time step.
+        """Move on by `duration` s (default: one time step), in equal steps that are not longer than the options' time step.
 
         The other arguments are those of `Simulator.step`.
         """
@@ -109,10 +119,12 @@ class DynamicSimulator:
         count = max(1, math.ceil(duration / self.options.time_step - 1e-6))
         motion = self._move(gravity, cables, duration / count, count)
         model = self.model
-        if self._in_reduced:
-            sections, _, _, orientation = self._reduced.model.observe(motion.q, np.zeros((0, motion.q.size)))
+        reduced = self._active_reduced
+        if reduced is not None:
+            q = reduced.state.q
+            sections, _, _, orientation = reduced.model.observe(q, np.zeros((0, q.size)))
         else:
-            sections = model.effectors.sections(model.mesh.nodes + motion.u)
+            sections = model.effectors.sections(model.mesh.nodes + self.solver.state.u)
             _, _, orientation = observe(sections, np.zeros((*sections.shape, 0)))
         ok = motion.converged
         return dataclasses.replace(
@@ -131,24 +143,28 @@ class DynamicSimulator:
         )
 
     def _move(self, gravity: np.ndarray, cables: CableInput, h: float, count: int) -> "Motion | ReducedMotion":
-        """The motion after `count` steps of h seconds, by the reduced model if it may."""
+        """Return the motion after `count` steps of h seconds, computed with the reduced model if possible."""
         self._wait -= 1
-        if self._may_reduce():
-            before = self._reduced.state
-            motion = _advanced(self._reduced, gravity, cables, h, count)
-            if motion.converged and self._reduced.model.outside(motion.q) <= 1.0:
+        reduced = self._usable_reduced()
+        if reduced is not None:
+            before = reduced.state
+            motion = _advanced(reduced, gravity, cables, h, count)
+            if motion.converged and reduced.model.outside(reduced.state.q) <= 1.0:
                 return motion
-            self._reduced.state, self._wait = before, _RETURN_AFTER
-        if self._in_reduced:
-            last = self._reduced.state
-            self.solver.take_over(*(self._lifted(x) for x in (last.q, last.velocity, last.acceleration)), last.tension)
+            reduced.state, self._wait = before, _RETURN_AFTER
+        left = self._active_reduced
+        if left is not None:
+            q, velocity, acceleration = (
+                self._lifted(left, x) for x in (left.state.q, left.state.velocity, left.state.acceleration)
+            )
+            self.solver.take_over(q, velocity, acceleration, left.state.tension)
             self._in_reduced = False
         return _advanced(self.solver, gravity, cables, h, count)
 
-    def _may_reduce(self) -> bool:
-        """Whether the reduced model may move; where the full one did until now, the reduced one is put where that is."""
-        if self._reduced is None or self.statics.reduced_model is None:
-            return False
+    def _usable_reduced(self) -> "ReducedDynamicSolver | None":
+        """Return the reduced model's solver if it may be used; if the full model was used before, at the full model's state."""
+        if self._reduced is None or self._momentum is None or self.statics.reduced_model is None:
+            return None
         if not self._in_reduced and self._wait <= 0:
             self._wait = _RETURN_AFTER
             last, free, reduced = self.solver.state, self.model.free, self._reduced.model
@@ -159,22 +175,23 @@ class DynamicSimulator:
                     q, self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration), last.tension
                 )
                 self._in_reduced = True
-        return self._in_reduced
+        return self._active_reduced
 
     def _place(self, u: np.ndarray, tension: np.ndarray, gravity: np.ndarray) -> None:
-        """At rest at the displacements u (n, 3)."""
+        """Go to rest at the displacements u (n, 3)."""
         self._in_reduced, self._wait = False, 0
         self.solver.place(u, tension, gravity)
 
-    def _lifted(self, q: np.ndarray) -> np.ndarray:
-        """The field (n, 3) of the reduced coordinates q (r,)."""
+    def _lifted(self, reduced: "ReducedDynamicSolver", q: np.ndarray) -> np.ndarray:
+        """Return the field (n, 3) of the reduced coordinates q (r,)."""
         field = np.zeros_like(self.model.mesh.nodes)
-        self.model.free(field)[:] = self._reduced.model.basis @ q
+        self.model.free(field)[:] = reduced.model.basis @ q
         return field
 
     def _reduced_solver(self, reduced: "ReducedModel | None") -> "tuple[ReducedDynamicSolver | None, np.ndarray | None]":
-        """The reduced model's motion, and the matrix (r, 3 n_free) to the coordinates' velocity of the same momentum; None
-        without a reduced model, and where the materials do not damp and creep alike.
+        """Return the reduced model's solver and the matrix (r, 3 n_free) to the coordinates' velocity of the same momentum.
+
+        Both are None without a reduced model, and if the materials differ in damping or creep.
         """
         laws = {(m.damping_time, m.creep_ratio, m.creep_time) for m in self.model.mesh.materials}
         if reduced is None or (len(laws) > 1 and self.options.damping == "kelvin_voigt"):
@@ -183,8 +200,9 @@ class DynamicSimulator:
 
         weighted = self.model.mass_matrix().multiply(reduced.basis)
         mass = reduced.basis.T @ weighted
-        damping_time, *creep = laws.pop()
-        solver = ReducedDynamicSolver(reduced, mass, damping_time, self.model.length, self.options, creep=tuple(creep))
+        damping_time, creep_ratio, creep_time = laws.pop()
+        creep = creep_ratio, creep_time
+        solver = ReducedDynamicSolver(reduced, mass, damping_time, self.model.length, self.options, creep=creep)
         return solver, np.linalg.solve(mass, weighted.T)
 
 
@@ -196,7 +214,7 @@ def _advanced(
     count: int = 1,
     halvings: int = _HALVINGS,
 ) -> "Motion | ReducedMotion":
-    """`count` steps of h seconds, each in halves where Newton's method does not settle; the last state where that does not help."""
+    """Take `count` steps of h seconds, halved if Newton's method does not converge; return the last motion."""
     for _ in range(count):
         motion = solver.step(gravity, cables, h)
         if not motion.converged and halvings > 0:

@@ -1,39 +1,39 @@
-"""How often a lost equilibrium is searched for.
+"""Pace of the searches for a lost equilibrium.
 
-A search takes a second, in which a controller would hear nothing that leads away from where there is no equilibrium. So it is repeated less
-and less often while it is in vain, and does not begin at once where the load has hardly moved since there was an equilibrium:
-whoever took that step can take it back.
+A search takes a second, during which a controller gets no shape and cannot react. So a search that finds nothing is repeated
+less and less often. The first search waits if the load has changed little since the last equilibrium: the controller can take
+that step back.
 """
 
 import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 
-# Steps before a search, the first and the longest pause.
+# Pause between two searches in steps: the first and the longest one.
 _FIRST_PAUSE, _LONGEST_PAUSE = 50, 3200
-# What counts as hardly moved, as a share of the gravity and of the robot's length.
+# A change of gravity or cables beyond this is a jump: fraction of the gravity, and of the robot's length.
 _GRAVITY_JUMP, _CABLE_JUMP = 0.2, 0.02
 
 
 class SearchPace:
-    """Counts the steps of a robot of `length` (m) that found no equilibrium nearby."""
+    """Counts the steps without equilibrium of a robot of `length` m, and decides when to search."""
 
     def __init__(self, length: float):
         self._length = length
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: the next search may be at once."""
+        """Forget all earlier steps; the next search may start immediately."""
         self._pause = self._remaining = 0
         self._found: tuple[np.ndarray, np.ndarray | None] | None = None
 
     def found(self, gravity: np.ndarray, cables: CableInput) -> None:
-        """An equilibrium was found for this load."""
+        """Record that an equilibrium was found for this load."""
         self._pause = 0
         self._found = gravity.copy(), None if cables.wound is None else cables.wound.copy()
 
     def may_search(self, gravity: np.ndarray, cables: CableInput) -> bool:
-        """Whether to search now; asked at every step without equilibrium."""
+        """Return whether to search now. Called at every step without equilibrium."""
         if self._pause == 0:
             self._pause = _FIRST_PAUSE
             self._remaining = 0 if self._has_jumped(gravity, cables) else _FIRST_PAUSE
@@ -45,6 +45,7 @@ class SearchPace:
         return True
 
     def _has_jumped(self, gravity: np.ndarray, cables: CableInput) -> bool:
+        """Return whether the load has changed much since the last equilibrium."""
         if self._found is None:
             return True
         before, wound = self._found

@@ -1,4 +1,4 @@
-"""A robot's statics as one object: gravity and cables in, shape and response out."""
+"""Quasi-static simulation of a robot as one object: gravity and cables in, shape and response out."""
 
 import dataclasses
 import math
@@ -14,23 +14,26 @@ from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
-from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.materials.laws import LAWS
+from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.reduction.serving import ReducedServing
 
-# Green's strain in compression from which on St. Venant-Kirchhoff's stress falls.
-_SOFTENING = -1.0 / 3.0
 _MORE_ITERATIONS = 12
+_LIMIT_POINT = "the robot has no equilibrium beyond it, or only at a distant shape"
 
 
 class Simulator:
-    """Quasi-static simulation of a robot. `step` uses the reduced model where one is built and holds; `solve` the full one."""
+    """Quasi-static simulation of a robot.
+
+    `step` uses the reduced model if one is built and its error is small, else the full model; `solve` uses the full model.
+    """
 
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
-        """`reduced`: use the reduced model where one is built. Raises MeshError for a body that cannot be computed with."""
+        """reduced: use the reduced model if one is built. Raises MeshError for a body that cannot be meshed or computed."""
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
@@ -38,43 +41,45 @@ class Simulator:
         self._serving = self.load_reduced() if reduced else None
 
     def load_reduced(self) -> "ReducedServing | None":
-        """Return the reduced model of this robot, ready to serve; None when none is stored. May run in a thread of its own."""
+        """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""
         from gravcomp.reduction.serving import ReducedServing
         from gravcomp.reduction.store import load
 
         reduction = load(self.model)
-        return reduction and ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
+        return None if reduction is None else ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
 
     def adopt(self, serving: "ReducedServing") -> None:
-        """Serve by `serving`, from `load_reduced`, as soon as it agrees with the full model's shape: the shape does not jump."""
+        """Use `serving`, from `load_reduced`, as soon as it agrees with the full model: the shape does not jump."""
         serving.stand_by()
         self._serving = serving
 
     @property
     def reduced_model(self) -> "ReducedModel | None":
-        """The reduced model that serves now; None while the full one does."""
+        """The reduced model while it is used; None while the full model is."""
         return self._serving.reduced if self._serving and self._serving.trusted else None
 
     @property
     def displacements(self) -> np.ndarray:
-        """(nodes, 3) displacements of the mesh's nodes at the present shape, in m."""
+        """Displacements (nodes, 3) of the mesh's nodes at the present shape, in m."""
         if self._serving and self._serving.trusted:
             return self._serving.displacements
         return self.solver.state.u
 
     def reset(self) -> None:
-        """Back to the straight robot."""
+        """Return to the straight robot."""
         self.solver.reset()
         self._pace.reset()
         if self._serving:
             self._serving.reset()
 
     def step(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
-        """Follow the equilibrium, starting from the last shape: for small changes, a control step apart. Where it is lost it is
-        searched for from the straight robot, now and then (see `SearchPace`): else the last shape is returned, NOT_CONVERGED.
+        """Track the equilibrium from the last shape, for changes of the size of a control step.
 
-        gravity (3,) in m/s^2; displacement (m,) in m, pulled in is positive, NaN for a released cable; or tension (m,) in
-        N; neither: all cables released. Raises ValueError for wrong lengths and numbers that are not finite.
+        If the equilibrium is lost, it is searched for from the straight robot, but only occasionally (see `SearchPace`). If
+        none is found or searched for, the last shape is returned with the status NOT_CONVERGED.
+
+        gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
+        cables are released. Raises ValueError for wrong lengths, numbers that are not finite, and negative tensions.
         """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
@@ -85,7 +90,7 @@ class Simulator:
         before = self.solver.state
         state = self.solver.track(gravity, cables)
         if not state.converged:
-            # More steps settle what is near; where the stiffness does not carry, nothing is.
+            # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
             state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True)
         if not state.converged:
             if self._pace.may_search(gravity, cables):
@@ -106,7 +111,7 @@ class Simulator:
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model serves")
 
     def solve(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
-        """The equilibrium from the straight robot, independent of what was computed before; arguments as in `step`."""
+        """Return the equilibrium found from the straight robot, independent of all earlier shapes; arguments as in `step`."""
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
         self.solver.reset()
@@ -121,11 +126,11 @@ class Simulator:
     def checked(
         self, gravity: np.ndarray, displacement: np.ndarray | None, tension: np.ndarray | None
     ) -> tuple[np.ndarray, CableInput]:
-        """Gravity and cable input as arrays; raises ValueError as `step` says."""
+        """Return gravity and cable input as arrays; raises ValueError as `step` does."""
         gravity = _vector("gravity", gravity, 3)
         count = self.model.tendons.count
         if displacement is not None and tension is not None:
-            raise ValueError("displacement and tension are both given; the cables are driven by one of them")
+            raise ValueError("displacement and tension are both given; only one of them is allowed")
         if tension is not None:
             tension = _vector("tension", tension, count)
             if (tension < 0).any():
@@ -136,6 +141,7 @@ class Simulator:
         return gravity, CableInput()
 
     def _shape(self, state: Equilibrium, gravity: np.ndarray, started: float) -> Shape:
+        """Return the shape and response of a state of the full model; started: of the computation, by `time.perf_counter`."""
         model = self.model
         sections = model.effectors.sections(model.mesh.nodes + state.u)
         effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
@@ -159,28 +165,34 @@ class Simulator:
             residual=state.residual,
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
-            message="" if state.converged else self._why_not(state),
+            message="" if state.converged else self._reason(state),
         )
 
-    def _why_not(self, state: Equilibrium) -> str:
-        """What a person should know about a load that found no equilibrium."""
-        if state.load_fraction == 1.0:  # not searched for
+    def _reason(self, state: Equilibrium) -> str:
+        """Return the reason why no equilibrium was found, as a sentence."""
+        if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        softened = np.array([material.law == "svk" for material in self.model.mesh.materials])[self.model.mesh.region]
-        if isinstance(self.model.elements, SolidElements) and softened.any():
-            least = self.model.elements.strains(state.u)[softened, :, :3].min()
-            if least < _SOFTENING:
-                compressed = f"the body is compressed to {100 * np.sqrt(1 + 2 * least):.0f} % of its length at a point"
-                return f"{message}: {compressed}, where the law 'svk' gives way; 'neo_hookean' carries more"
-        return f"{message}: the robot cannot carry the rest, or has to jump to another shape"
+        mesh, elements = self.model.mesh, self.model.elements
+        if isinstance(elements, CorotationalElements):
+            return f"{message}: {_LIMIT_POINT}"
+        for number, material in enumerate(mesh.materials):
+            softening, own = LAWS[material.law].softening_strain, mesh.region == number
+            least = elements.strains(state.u)[own, :, :3].min(initial=0.0)
+            if softening is not None and least < softening:
+                return (
+                    f"{message}: the body is compressed to {100 * np.sqrt(1 + 2 * least):.0f} % of its length at a point,"
+                    f" where the law '{material.law}' softens; choose another law for such loads"
+                )
+        return f"{message}: {_LIMIT_POINT}"
 
 
 def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) -> np.ndarray:
+    """Return the value as an array (length,). Raises ValueError."""
     vector = np.asarray(value, dtype=float)
     if vector.shape != (length,):
         raise ValueError(f"{name} has the shape {vector.shape}; ({length},) is needed")
-    finite = math.isfinite(vector.sum())  # mostly spares the closer look
+    finite = math.isfinite(vector.sum())  # usually makes the slower checks unnecessary
     if not finite and (np.isinf(vector).any() or (not allow_nan and np.isnan(vector).any())):
         raise ValueError(f"{name} is {vector}; finite numbers are needed")
     return vector

@@ -1,4 +1,4 @@
-"""Building a robot's reduced model: samples of the full model in the closed loop, basis, strain polynomials, test."""
+"""Training of a robot's reduced model: samples of the full model in the closed loop, basis, strain polynomials, test."""
 
 from gravcomp.training.build import BuildOptions, build
 from gravcomp.training.samples import TrainingOptions

@@ -1,11 +1,11 @@
-"""Building a robot's reduction: train, decompose, integrate, and test on motions that it was not trained for."""
+"""Building of a robot's reduction: sample, decompose, integrate, and test on motions that are not in the training set."""
 
 import contextlib
 import fcntl
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,31 +21,34 @@ from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
 from gravcomp.training.samples import Sample, TrainingOptions, samples
 
-# The trained |q| may be exceeded by this factor; the error is measured in any case.
+# The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
 
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """modes r; strains: principal strains beside those of the modes; decomposed: most snapshots to decompose; training;
-    test: motions to test with.
+    """Size of a reduction and of its training.
+
+    modes: r; strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to
+    decompose; training and test: motions to train and to test with.
     """
 
     modes: int = 44
     strains: int = 36
     decomposed: int = 1100
-    training: TrainingOptions = TrainingOptions()
-    test: TrainingOptions = TrainingOptions(paths=6, steps=20, seed=1000)
+    training: TrainingOptions = field(default_factory=TrainingOptions)
+    test: TrainingOptions = field(default_factory=lambda: TrainingOptions(paths=6, steps=20, seed=1000))
 
 
 def build(
-    model: RobotModel, options: BuildOptions = BuildOptions(), progress: Callable[[str, float], None] = lambda stage, share: None
+    model: RobotModel, options: BuildOptions | None = None, progress: Callable[[str, float], None] = lambda stage, share: None
 ) -> tuple[Reduction, float]:
-    """Build and store the model's reduction; returns it and the seconds it took. progress: called with the stage and
-    the share of it done.
+    """Build and store the model's reduction; return it and the time that it took in s.
 
-    Raises MeshError for a robot that cannot be reduced, or whose full model finds no equilibrium to train with.
+    options: default `BuildOptions()`; progress: called with the stage and the fraction of it that is done. Raises MeshError for
+    a robot that cannot be reduced, and if the full model finds too few equilibria.
     """
+    options = options or BuildOptions()
     started = time.perf_counter()
     reason = why_not(model)
     if reason:
@@ -53,7 +56,10 @@ def build(
     kept = path_of(model).with_suffix(".training") / content_key(options.training)
     trained = samples(model, options.training, lambda share: progress("training", share), kept)
     if len(trained) < options.modes:
-        raise MeshError(f"only {len(trained)} equilibria were found to train with; the robot may not carry its own weight")
+        raise MeshError(
+            f"only {len(trained)} equilibria were found for the training, at least {options.modes} are needed;"
+            " the robot may be too soft for its weight"
+        )
     progress("decomposing", 0.0)
     shapes = np.array([sample.unknowns for sample in trained])
     shapes = shapes[np.linspace(0, len(shapes) - 1, min(options.decomposed, len(shapes))).astype(int)]
@@ -79,7 +85,7 @@ def build(
     unseen = samples(model, options.test, lambda share: progress("testing", share))
     errors = tip_errors(model, reduction, unseen)
     if not errors.size:
-        raise MeshError("the reduced model finds none of the equilibria that it was tested with: the full model serves")
+        raise MeshError("the reduced model finds none of the test's equilibria: the full model serves")
     reduction = replace(reduction, error_median=float(np.median(errors)), error_worst=float(errors.max()))
     # A running simulator must find everything compiled when it finds the file.
     ReducedServing(model, reduction.reduced_model(model), StaticSolver(model)).warm_up()
@@ -101,8 +107,9 @@ def alone(model: RobotModel, waiting: Callable[[], None] = lambda: None) -> Iter
 
 
 def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) -> np.ndarray:
-    """Distances (k,) in m of the reduced model's tip from those of the samples that it finds; where it does not, the
-    full model would serve.
+    """Return the tip errors (k,) of the reduced model in m, for the samples at which it converges.
+
+    At the others the full model would be used.
     """
     reduced = reduction.reduced_model(model)
     tracker = ReducedTracker(reduced, model.length)

@@ -1,10 +1,9 @@
-"""Shapes to train the reduced basis with: closed-loop and free motions of the full model.
+"""Training set of the reduced basis: shapes from closed-loop and free motions of the full model.
 
-Young's moduli that are all `s` times as large are the same as gravity and tensions that are `s` times smaller, so the
-moduli to be served are trained by the size of gravity. Each path turns gravity in random directions. On most of them
-the inverse controller keeps the robot straight or bent into a random plane, with and without a weight on the tip's
-direction, so that the tensions are those the loop will ask for, its transients included; on the others the cables are
-released and the robot hangs.
+Young's moduli that are all `s` times as large are equivalent to gravity and tensions that are `s` times smaller, so the range
+of moduli is covered by the magnitude of gravity. Each path turns gravity in random directions. On most paths the inverse
+controller keeps the robot straight or bent in a random plane, with and without a weight on the tip's direction, so that the
+tensions are those of the closed loop, including its transients. On the other paths the cables are released.
 """
 
 import json
@@ -12,6 +11,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,19 +21,17 @@ from gravcomp.inverse import InverseController, bend_target
 from gravcomp.simulation.simulator import Simulator
 
 GRAVITY = 9.81
-# One step of a path: what gravity turns by, and the time in which the cables may follow.
+# One step of a path: rotation of gravity, and the time in which the cables may move.
 _TURN = np.radians(5.0)
 _INTERVAL = 0.05
 _STEPS_A_TURN = 15
-# Of the paths: those without control, and of the others those that keep the robot straight.
+# Fraction of paths with released cables, and of those that keep the robot straight.
 _RELEASED, _STRAIGHT = 0.15, 0.3
 
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """paths and steps of each; modulus_range: Young's moduli to be served, relative to the robot's; bend (rad): the
-    largest; seed.
-    """
+    """Random paths: paths, and steps of each; modulus_range: relative to the robot's modulus; bend: largest in rad; seed."""
 
     paths: int = 75
     steps: int = 30
@@ -47,7 +45,7 @@ _ARRAYS = ("unknowns", "gravity", "tension")
 
 @dataclass(frozen=True)
 class Sample:
-    """An equilibrium of the full model: unknowns (3 n_free,), gravity (3,), tension (m,)."""
+    """An equilibrium of the full model: unknowns (3 n_free,) in m, gravity (3,) in m/s^2, tension (m,) in N."""
 
     unknowns: np.ndarray
     gravity: np.ndarray
@@ -81,7 +79,7 @@ def samples(
 def _store(path: list[Sample], file: Path, rng: np.random.Generator) -> None:
     """Write a path, and the state of the random numbers after it; a reader never sees half of it."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    arrays = {name: np.array([getattr(sample, name) for sample in path]) for name in _ARRAYS}
+    arrays: dict[str, Any] = {name: np.array([getattr(sample, name) for sample in path]) for name in _ARRAYS}
     part = file.with_suffix(".part.npz")
     np.savez(part, state=np.array(json.dumps(rng.bit_generator.state)), **arrays)
     part.replace(file)
@@ -99,6 +97,7 @@ def _stored(file: Path, rng: np.random.Generator) -> list[Sample] | None:
 
 
 def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator) -> Iterator[Sample]:
+    """Yield the equilibria along one random path."""
     low, high = options.modulus_range
     size = GRAVITY / np.exp(rng.uniform(np.log(low), np.log(high)))
     kind = rng.random()
@@ -127,11 +126,12 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:
+    """Return a random unit vector (3,)."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 
 
 def _rotated(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rodrigues' rotation of the vector (3,) about the unit axis (3,)."""
+    """Return the vector (3,) rotated about the unit axis (3,), by Rodrigues' formula."""
     along = axis * (axis @ vector)
     return along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector)
