@@ -1,4 +1,4 @@
-"""Many alike computations side by side: over processes of this machine, or over a Dask cluster whose address is given."""
+"""Independent computations in parallel: in processes on this machine, or on a Dask cluster."""
 
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -8,27 +8,31 @@ from gravcomp.config import ConfigError
 
 
 class Sweep:
-    """`map(function, items)`: the results in the order of the items. Function and items have to be picklable.
+    """Parallel `map(function, items)`. Function and items must be picklable.
 
-    workers: processes (None: one a core; 1: this process alone); cluster: address of a Dask scheduler, as 'tcp://host:8786'.
+    workers: number of processes (None: one per core; 1: this process only); cluster: address of a Dask scheduler, as
+    'tcp://host:8786'. Raises ConfigError when `workers` is less than 1.
     """
 
     def __init__(self, workers: int | None = None, cluster: str | None = None):
         if workers is not None and workers < 1:
-            raise ConfigError(f"workers is {workers}; 1 or more are needed")
+            raise ConfigError(f"workers is {workers}; 1 or more is needed")
         self.workers = workers or len(os.sched_getaffinity(0))
         self.cluster = cluster
         self._pool: Any = None
 
     @property
     def place(self) -> str:
-        """Where the computations run, for reports."""
+        """Description of where the computations run, for reports."""
         if self.cluster:
             return f"Dask cluster at {self.cluster}"
         return f"{self.workers} processes" if self.workers > 1 else "one process"
 
     def map(self, function: Callable, items: Iterable, done: Callable[[int, int], None] | None = None) -> list:
-        """[function(item) for item in items]; `done(count, total)` is told after each."""
+        """Return [function(item) for item in items], in this order; `done(count, total)` is called after each.
+
+        Raises ConfigError when the cluster cannot be used.
+        """
         items = list(items)
         results: list = []
         for result in self._results(function, items):
@@ -50,7 +54,7 @@ class Sweep:
             import concurrent.futures
             import multiprocessing
 
-            # Spawned, not forked: threads of numerical libraries do not survive a fork.
+            # Spawned, not forked: the threads of numerical libraries do not survive a fork.
             context = multiprocessing.get_context("spawn")
             self._pool = concurrent.futures.ProcessPoolExecutor(self.workers, mp_context=context, initializer=_one_thread)
         return self._pool
@@ -61,7 +65,7 @@ class Sweep:
                 from dask.distributed import Client
             except ImportError as error:
                 raise ConfigError(
-                    "a Dask cluster is asked for and the package 'distributed' is not installed: pip install distributed"
+                    "a Dask cluster needs the package 'distributed', which is not installed: pip install distributed"
                 ) from error
             try:
                 self._pool = Client(self.cluster, timeout=10)
@@ -70,7 +74,7 @@ class Sweep:
         return self._pool
 
     def close(self) -> None:
-        """End the processes, or leave the cluster."""
+        """End the processes, or disconnect from the cluster."""
         if self._pool is not None:
             self._pool.close() if self.cluster else self._pool.shutdown(cancel_futures=True)
             self._pool = None
@@ -83,6 +87,6 @@ class Sweep:
 
 
 def _one_thread() -> None:
-    """A process a core: more threads would only wait for one another."""
+    """Use one thread per process: with one process per core, more threads would only wait for each other."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")

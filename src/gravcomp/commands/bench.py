@@ -21,7 +21,7 @@ BENCHMARKS = {
 }
 
 
-OPTIONS = {
+OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     "faults": {
         "kills": (20, "number of kills of each process"),
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
@@ -31,7 +31,7 @@ OPTIONS = {
 }
 """Keyword arguments of a benchmark's `run` that are options of the command: default and meaning."""
 
-BRIEF = {
+BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "estimator": {"every": 5},
     "graph": {"listen": 4.0, "cost": 4.0},

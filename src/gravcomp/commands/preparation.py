@@ -1,27 +1,45 @@
-"""What a command makes ready before it starts nodes: once for a robot, once for a machine."""
+"""Prepare a robot before its nodes start: check its file, compile what the nodes run, and start the build of the reduced model."""
 
-from gravcomp.commands.model.build import prepare_model
+import subprocess
+import sys
+
+from gravcomp.launcher import compilation
+from gravcomp.launcher.model_builder import ModelBuilder
 from gravcomp.launcher.robot_graph import check_robot_file
 
 
-def prepare(robot: str, virtual: bool) -> None:
-    """Check the robot's file, build its reduced model, and compile what the nodes will run. Raises ConfigError.
+def prepare(robot: str, virtual: bool) -> ModelBuilder:
+    """Check the robot's file and compile what its nodes run, where that is not done yet. Raises ConfigError.
 
-    Before the nodes start, because they share two minutes of compiling badly.
+    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager: within it a process of low priority
+    builds the model if it is missing, and the nodes use it as soon as it is there.
     """
     check_robot_file(robot)
-    prepare_model(robot)
-    _compile(robot, virtual)
+    _compile(virtual)
+    return ModelBuilder(robot)
 
 
-def _compile(robot: str, virtual: bool) -> None:
+def _compile(virtual: bool) -> None:
+    """Wait until all parts are compiled. A part that fails is left to the nodes, which report the error."""
+    missing = compilation.missing(compilation.LOOP + (compilation.VIRTUAL if virtual else ()))
+    if not missing:
+        return
     from rich.console import Console
 
-    from gravcomp.description.robot_file import load_robot_file
-    from gravcomp.inverse import warm_up as warm_up_inverse
-    from gravcomp.virtual.warm_up import warm_up as warm_up_virtual_robot
+    processes = compilation.start(missing)
+    try:
+        with Console(stderr=True).status("compiling, once for this machine (about a minute)"):
+            for part, process in zip(missing, processes):
+                _, errors = process.communicate()
+                if process.returncode:
+                    last = (errors.strip().splitlines() or [""])[-1]
+                    print(f"gravcomp: compiling the {part} failed ({last}); the nodes compile it", file=sys.stderr)
+    finally:
+        for process in processes:
+            _end(process)
 
-    with Console(stderr=True).status("preparing the nodes (compiles once)"):
-        warm_up_inverse(load_robot_file(robot).robot)
-        if virtual:
-            warm_up_virtual_robot()
+
+def _end(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.terminate()
+        process.wait()

@@ -1,1 +1,1 @@
-"""Examinations of the machine, a robot's file, a bus and a running graph, each giving findings."""
+"""Checks of the machine, a robot file, a CAN bus and a running graph; each returns findings."""

@@ -1,4 +1,4 @@
-"""A CAN bus: who speaks on it."""
+"""Check of a CAN bus: the frames received on it."""
 
 import time
 from collections import Counter
@@ -9,7 +9,7 @@ _LISTEN = 2.0  # s
 
 
 def examine(interface: str, channel: str) -> list[Finding]:
-    """Motors and board heard within two seconds, and frames that nobody knows."""
+    """Return a finding with the rates of the frames received within two seconds, unknown ones included."""
     from gravcomp.canbus import codec
     from gravcomp.canbus.bus import BusError, open_bus
     from gravcomp.description.hardware import CanInterface
@@ -34,8 +34,8 @@ def examine(interface: str, channel: str) -> list[Finding]:
             Finding(
                 "missing",
                 "bus",
-                f"{interface} {channel}: nothing was heard for {_LISTEN:g} s",
-                "are motors and board powered, the bus terminated?",
+                f"{interface} {channel}: no frame received for {_LISTEN:g} s",
+                "check that motors and board are powered and the bus is terminated",
             )
         ]
     rates = ", ".join(f"{name} {count / _LISTEN:.0f} Hz" for name, count in sorted(heard.items()))

@@ -1,11 +1,14 @@
-"""What an examination finds."""
+"""Finding of a check."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Finding:
-    """level: 'ok', 'optional' (something is missing that only some need) or 'missing'; remedy: the line that mends it."""
+    """One finding.
+
+    level: 'ok', 'optional' (missing, and needed for some tasks only) or 'missing'; remedy: command that installs what is missing.
+    """
 
     level: str
     subject: str

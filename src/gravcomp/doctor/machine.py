@@ -1,4 +1,4 @@
-"""This machine: Python, ROS, the workspace, CAN interfaces, and what only some tasks need."""
+"""Check of this machine: Python, ROS, the workspace, CAN interfaces, and programs that only some tasks need."""
 
 import importlib.metadata
 import os
@@ -15,7 +15,7 @@ _CAN_DEVICE = "280"  # ARPHRD_CAN in /sys/class/net/*/type
 
 
 def examine() -> list[Finding]:
-    """Findings about this machine."""
+    """Return the findings about this machine."""
     return [_python(), _ros(), *_packages(), *_executables(), _can(), *_optional()]
 
 
@@ -33,9 +33,9 @@ def _packages() -> list[Finding]:
     found, missing = [], []
     for name in _PACKAGES:
         try:
-            found.append(
-                f"{name} {importlib.metadata.version('ros-rclpy' if name == 'rclpy' and not os.environ.get('ROS_DISTRO') else name)}"
-            )
+            # The wheel of rclpy has another name than the package of an installed ROS.
+            distribution = "ros-rclpy" if name == "rclpy" and not os.environ.get("ROS_DISTRO") else name
+            found.append(f"{name} {importlib.metadata.version(distribution)}")
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
     findings = [Finding("ok", "packages", ", ".join(found))]
@@ -65,7 +65,7 @@ def _can() -> Finding:
     if devices:
         return Finding("ok", "CAN", ", ".join(sorted(devices)))
     return Finding(
-        "optional", "CAN", "no CAN device; the virtual robot needs none",
+        "optional", "CAN", "no CAN device (needed for: real hardware)",
         "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100",
     )  # fmt: skip
 
@@ -74,15 +74,18 @@ def _optional() -> list[Finding]:
     findings = []
     for program, use, remedy in (
         ("chromium", "tests of the viewer", "sudo apt-get install -y chromium"),
-        ("ccx", "comparison with CalculiX; its table is stored", "sudo apt-get install -y calculix-ccx"),
-        ("ros2", "ROS command line; comes with a ROS installation", ""),
+        ("ccx", "comparison with CalculiX; its results are stored", "sudo apt-get install -y calculix-ccx"),
+        ("ros2", "ROS command line; part of a ROS installation", ""),
     ):
         path = shutil.which(program)
-        findings.append(Finding("ok", program, path) if path else Finding("optional", program, f"not installed ({use})", remedy))
+        if path:
+            findings.append(Finding("ok", program, path))
+        else:
+            findings.append(Finding("optional", program, f"not installed (needed for: {use})", remedy))
     try:
         importlib.metadata.version("gmsh")
         findings.append(Finding("ok", "gmsh", importlib.metadata.version("gmsh")))
     except importlib.metadata.PackageNotFoundError:
         remedy = "sudo apt-get install -y libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 && .venv/bin/pip install gmsh"
-        findings.append(Finding("optional", "gmsh", "not installed (meshing bodies of one's own)", remedy))
+        findings.append(Finding("optional", "gmsh", "not installed (needed for: meshing a body from its surface)", remedy))
     return findings

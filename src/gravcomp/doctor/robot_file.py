@@ -1,4 +1,4 @@
-"""A robot's YAML, every section of it."""
+"""Check of a robot file, all sections."""
 
 from gravcomp.config import ConfigError
 from gravcomp.doctor.finding import Finding
@@ -6,7 +6,7 @@ from gravcomp.graph.nodes import NODES
 
 
 def examine(robot: str) -> list[Finding]:
-    """One finding: it can be used, or the first mistake in it."""
+    """Return one finding: the file can be used, or the first error in it."""
     from gravcomp.description import load_robot_file
     from gravcomp.launcher.robot_graph import check_robot_file
 

@@ -1,4 +1,4 @@
-"""The running graph, seen by a process of its own, because the core knows no ROS."""
+"""Check of the running graph, by a process of its own, because the core does not import ROS."""
 
 import json
 import subprocess
@@ -10,10 +10,10 @@ _TIMEOUT = 60.0  # s
 
 
 def examine(namespace: str = "") -> list[Finding]:
-    """Rates, delays and fitting QoS of every topic that keeps a rate."""
+    """Return the findings on rate, latency and QoS compatibility of every topic with a nominal rate."""
     command = NodeSpec("gravcomp_hw", "graph_probe", namespace=namespace).module_command()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT)
         return [Finding(**entry) for entry in json.loads(done.stdout.strip().splitlines()[-1])]
     except (subprocess.TimeoutExpired, ValueError, IndexError):
-        return [Finding("missing", "graph", "could not be looked at")]
+        return [Finding("missing", "graph", "could not be checked: the probe gave no answer")]

@@ -1,17 +1,18 @@
-"""The robot on an arm that turns its base through the article's five directions and back, two passes of 90 s, straight and bent."""
+"""An arm turns the base through the article's five inclinations and back: two passes of 90 s, straight and bent."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gravcomp.closed_loop.loop import ClosedLoop, Trace
+from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
 from gravcomp.evaluation import metrics
 from gravcomp.inverse.target import arc_points
 from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_robot, equal_axes, side_view
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, target_of
+from gravcomp.trials.holding import GROUND, Case, errors_to, target_of
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
@@ -19,11 +20,11 @@ TITLE = "On a moving arm"
 INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
 HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
-_START = 4.0  # s before the passes, for the robot to come to rest at its first pose
+_START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     setups = {"calibrated": context.once(calibrate_on_virtual_robot).setup, "not calibrated": context.setup}
     jobs = [
         (setup, bend, weightless, context.brief)
@@ -35,18 +36,18 @@ def run(context: Context) -> Result:
     for index, bend in enumerate((0.0, 30.0)):
         without, fitted, plain = traces[3 * index : 3 * index + 3]
         target = target_of(context.setup, Case(0.0, bend=bend))
-        judged = {
-            name: (_recovery(trace, target.tip_position), _errors(trace, target))
+        evaluated = {
+            name: (_recovery(trace, target.tip_position), errors_to(trace, target))
             for name, trace in (("without", without), ("calibrated", fitted), ("not calibrated", plain))
         }
         shape = f"bent by {bend:g} deg" if bend else "straight"
-        gain = judged["without"][1].distance.mean() / judged["calibrated"][1].distance.mean()
+        gain = evaluated["without"][1].distance.mean() / evaluated["calibrated"][1].distance.mean()
         figures += [
-            Figure(f"r, {shape}, calibrated", judged["calibrated"][0], "", ARTICLE[bend], 0.99, True, 5),
-            Figure(f"r, {shape}, without compensation", judged["without"][0], "", digits=5),
-            Figure(f"tip error smaller than without by the factor, {shape}", gain, "", limit=5.0, at_least=True),
+            Figure(f"recovery rate r, {shape}, calibrated", evaluated["calibrated"][0], "", ARTICLE[bend], 0.99, True, 5),
+            Figure(f"recovery rate r, {shape}, without compensation", evaluated["without"][0], "", digits=5),
+            Figure(f"tip error ratio, without / with compensation, {shape}", gain, "", limit=5.0, at_least=True),
         ]
-        for name, (r, errors) in judged.items():
+        for name, (r, errors) in evaluated.items():
             mean = [1e3 * errors.distance.mean(), 1e3 * errors.distance.max(), 1e3 * errors.lateral.mean()]
             rows.append((shape, name, f"{r:.5f}", *mean, float(np.degrees(errors.tilt.mean()))))
         plots.append(
@@ -57,38 +58,38 @@ def run(context: Context) -> Result:
                     fitted,
                     arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station),
                 ),
-                "From the side, gravity downwards, at the end of each stop of the first pass. Grey: the shape asked for. Pink: without compensation. Vermilion:"
-                " compensated, calibrated.",
+                "Side view, gravity downwards, at the end of each stop of the first pass. Grey: target shape. Pink: without"
+                " compensation. Vermilion: compensated, calibrated.",
             )
         )
         plots.append(
             Plot(
                 f"{shape.capitalize()}: tip over time",
                 _course(without, fitted, target.tip_position),
-                "Left: height of the tip over the base, in the world, against that of the shape asked for. Right: distance of the tip from"
-                " its target.",
+                "Left: height of the tip over the base, in the world, and height of the target. Right: distance of the tip"
+                " from its target.",
             )
         )
     return Result(
         name="arm",
         title=TITLE,
-        question="Does the robot keep its shape while its base is turned through the upright and downwards?",
-        ground=GROUND + " The base turns about a horizontal axis, as the virtual arm moves it; it does not travel.",
+        question="Does the robot keep its shape while its base turns from pointing up to pointing down?",
+        ground=GROUND + " The virtual arm turns the base about a horizontal axis; it does not translate it.",
         figures=figures,
         parts=[
             Table(
                 "All runs",
                 ("shape", "compensation", "r", "mean tip error, mm", "largest, mm", "mean lateral, mm", "mean tilt, deg"),
                 rows,
-                "r: the tip of the shape asked for and the true tip, both seen from the world over the base, over both passes.",
+                "r: correlation of target tip and true tip, both in world axes relative to the base, over both passes.",
             ),
             *plots,
         ],
         parameters={"inclinations_deg": INCLINATIONS, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
         notes=[
-            "Without compensation: straight means released cables; bent means the cables that bend the weightless robot stay where they are"
-            " and the others are released.",
-            "At the poses with the base upside down (135 deg) the uncompensated robot falls over to the other side, which is what r sees most.",
+            "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
+            " keep their displacement and the others are released.",
+            "With the base tilted back (135 deg) the uncompensated robot falls over to the other side; this dominates r.",
         ],
     )
 
@@ -109,22 +110,18 @@ def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     return loop.trace
 
 
-def _errors(trace: Trace, target) -> metrics.TipErrors:
-    return metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
-
-
 def _recovery(trace: Trace, target: np.ndarray) -> float:
-    """r between the tip asked for and the true one, in world axes from the base."""
+    """Return the recovery rate r between target tip and true tip, in world axes relative to the base."""
     wanted = Rotation.from_quat(trace.base_orientation).apply(target)
     return metrics.recovery_rate(wanted, Rotation.from_quat(trace.base_orientation).apply(trace.tip_position))
 
 
 def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
-    """`wanted`: backbone (b, 3) of the shape asked for, in soft_base."""
+    """Draw the shapes at the five poses. wanted: backbone (b, 3) of the target shape, in soft_base."""
     with Drawing(1, len(INCLINATIONS), width=11.5, height=2.9) as drawing:
         for axes, inclination in zip(drawing.axes, INCLINATIONS):
             base = base_orientation(np.radians(inclination))
-            draw_robot(axes, side_view(wanted, base), REST, "asked for")
+            draw_robot(axes, side_view(wanted, base), REST, "target")
             for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated")):
                 draw_robot(axes, side_view(trace.backbone[_end_of_stop(trace, base)], base), colour, label)
             axes.set_title(f"{inclination:g}°")
@@ -134,7 +131,7 @@ def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
 
 
 def _end_of_stop(trace: Trace, base: np.ndarray) -> int:
-    """The last sample of the first stretch during which the base stands as `base` (3, 3)."""
+    """Return the index of the last sample of the first stop at the orientation `base` (3, 3)."""
     q = np.moveaxis(trace.base_orientation, -1, 0)
     turned = 2.0 * np.arccos(np.clip(np.abs(quaternion(base) @ q), 0.0, 1.0))
     there = turned < np.radians(0.5)
@@ -147,7 +144,7 @@ def _course(without: Trace, fitted: Trace, target: np.ndarray) -> str:
     with Drawing(1, 2, width=10.5, height=3.2) as drawing:
         height, error = drawing.axes
         wanted = Rotation.from_quat(fitted.base_orientation).apply(target)
-        height.plot(fitted.time, 1e3 * wanted[:, 2], color=TARGET, label="asked for", linewidth=2.4, alpha=0.6)
+        height.plot(fitted.time, 1e3 * wanted[:, 2], color=TARGET, label="target", linewidth=2.4, alpha=0.6)
         for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated, calibrated")):
             tip = Rotation.from_quat(trace.base_orientation).apply(trace.tip_position)
             height.plot(trace.time, 1e3 * tip[:, 2], color=colour, label=label, linewidth=1.2)

@@ -1,6 +1,6 @@
-"""From the rectum into the first bend of the colon, the patient supine and on the left side: the same way in the body, another gravity.
+"""From the rectum into the first bend of the colon, patient supine and left lateral: the same path in the body, another gravity.
 
-Rectum: 40 mm straight; bend: 70 mm radius toward the patient's front; lumen 30 mm. The frame turns with the patient.
+Rectum: 40 mm straight; bend: 70 mm radius towards the front of the patient; lumen 30 mm. The frame turns with the patient.
 """
 
 import numpy as np
@@ -21,6 +21,6 @@ REACHES = tuple(
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
-    question = "Does the way through the colon stay the same when the patient is turned on the side?"
+    """Run the experiment."""
+    question = "Does the robot follow the same path through the colon when the patient is turned on the side?"
     return reaching(context, "colonoscopy", TITLE, question, REACHES)

@@ -1,7 +1,8 @@
-"""Sag under gravity alone: this model against the beam theories, linear tetrahedra of the article's number, and CalculiX as reference."""
+"""Sag under gravity alone: this model, beam theories and the article's number of linear tetrahedra against CalculiX."""
 
 import dataclasses
 import time
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +18,15 @@ from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Deflection under gravity"
 
-# 12 x 2 x 33 cells of six tetrahedra: 4,752, the article has 4,788.
-TETRAHEDRA = {"kind": "tet4", "around": 12, "radial": 2, "along": 33}
+# 12 x 2 x 33 cells of six tetrahedra: 4,752; the article uses 4,788.
+TETRAHEDRA: dict[str, Any] = {"kind": "tet4", "around": 12, "radial": 2, "along": 33}
 # SOFA v24.12 with SoftRobots, 4,797 linear tetrahedra, horizontal, cables at 3.4 mm: settled tip in mm by modulus in MPa.
 SOFA = {0.5: -35.32, 0.65: -28.27, 0.8: -23.47, 1.0: -19.07, 1.2: -16.03}
 METHODS = ("this model", "linear tetrahedra", "Euler-Bernoulli", "elastica")
 
 
 def tube_robot(youngs_modulus: float, poissons_ratio: float = 0.45, law: str = "svk", grading: float = 4.0) -> Robot:
-    """The tube of the stored table as a robot without cables."""
+    """Return the tube of the stored CalculiX table as a robot without cables."""
     r = calculix.REFERENCE
     material = Material(law, youngs_modulus, poissons_ratio, r["density"])
     segment = Segment("tube", r["length"], r["outer_diameter"], r["inner_diameter"], material)
@@ -33,7 +34,7 @@ def tube_robot(youngs_modulus: float, poissons_ratio: float = 0.45, law: str = "
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     rows = [r for r in calculix.stored_rows() if r.law == "svk" and r.poissons_ratio == 0.45]
     if context.brief:
         rows = [r for r in rows if r.youngs_modulus == 0.8e6]
@@ -46,9 +47,9 @@ def run(context: Context) -> Result:
         mesh = tube_mesh(tube_robot(0.8e6), around=10, along=24)
         for inclination in inclinations:
             reference[0.8e6, inclination] = calculix.solve(mesh, inclination)
-        source = "CalculiX, run now for 0.8 MPa and stored for the other moduli"
+        source = "CalculiX, run in this experiment for 0.8 MPa and stored for the other moduli"
     tips: dict[str, dict] = {name: {} for name in METHODS}
-    seconds = {}
+    seconds: dict[str, list[float]] = {}
     jobs = [(modulus, inclinations) for modulus in moduli]
     for modulus, solved in zip(moduli, context.map(_solve, jobs, "tubes of all moduli")):
         for name, tip, elapsed in solved:
@@ -56,38 +57,59 @@ def run(context: Context) -> Result:
             seconds.setdefault(name, []).append(elapsed)
     error = {name: {key: float(np.linalg.norm(tip - reference[key])) for key, tip in tips[name].items()} for name in METHODS}
     bent = [key for key in reference if abs(np.cos(key[1])) > 0.1]
-    own, beam = (np.mean([error[name][key] for key in bent]) for name in ("this model", "Euler-Bernoulli"))
+    own, beam = (float(np.mean([error[name][key] for key in bent])) for name in ("this model", "Euler-Bernoulli"))
     horizontal = (0.8e6, 0.0)
     sofa_error = abs(1e-3 * SOFA[0.8] - reference[horizontal][0])
     return Result(
         name="deflection",
         title=TITLE,
-        question="How well does the model foresee the robot's sag, and at what cost?",
-        ground=f"Computation only, no robot. The reference is the {source}: C3D20R, large displacements, hollow cylinder of 100 mm, 9 mm"
-        " outside, 3 mm inside.",
+        question="How accurately does the model predict the robot's sag, and at what cost?",
+        ground=f"Computation only, no robot. The reference is the {source}: C3D20R, large displacements, hollow cylinder of 100"
+        " mm, 9 mm outside, 3 mm inside.",
         figures=[
-            Figure("deflection error smaller than Euler-Bernoulli's by", 100 * (1 - own / beam), "%", "at least 83 %", 83.0, True, 4),
-            Figure("largest error of this model, all poses and moduli", 1e3 * max(error["this model"].values()), "mm", "COMSOL: similar"),
-            Figure("the same, linear tetrahedra", 1e3 * max(error["linear tetrahedra"].values()), "mm", "4,788 elements"),
-            Figure("the same, elastica", 1e3 * max(error["elastica"].values()), "mm"),
-            Figure("the same, Euler-Bernoulli", 1e3 * max(error["Euler-Bernoulli"].values()), "mm"),
-            Figure("time to solve a pose from straight", 1e3 * float(np.median(seconds["this model"])), "ms", "COMSOL: minutes"),
+            Figure(
+                "reduction of the deflection error against Euler-Bernoulli",
+                100 * (1 - own / beam),
+                "%",
+                "at least 83 %",
+                83.0,
+                True,
+                4,
+            ),
+            Figure(
+                "largest tip error, this model, all poses and moduli",
+                1e3 * max(error["this model"].values()),
+                "mm",
+                "COMSOL: similar",
+            ),
+            Figure(
+                "largest tip error, linear tetrahedra", 1e3 * max(error["linear tetrahedra"].values()), "mm", "4,788 elements"
+            ),
+            Figure("largest tip error, elastica", 1e3 * max(error["elastica"].values()), "mm"),
+            Figure("largest tip error, Euler-Bernoulli", 1e3 * max(error["Euler-Bernoulli"].values()), "mm"),
+            Figure(
+                "computing time of a pose, from straight", 1e3 * float(np.median(seconds["this model"])), "ms", "COMSOL: minutes"
+            ),
         ],
         parts=[
             Plot(
                 "Shapes at 0.8 MPa and tips by each method",
                 _shapes(inclinations, tips, reference),
-                "This model's shape over the rest shape; the markers are the tips of the methods. Euler-Bernoulli's tip does not come"
-                " nearer as it goes down, which is its main error.",
+                "Shape of this model over the rest shape; the markers are the tips of all methods. In the Euler-Bernoulli"
+                " theory a sagging tip does not move towards the base, which is its main error.",
             ),
             Table(
                 "Tip error at 0.8 MPa, mm",
                 ("inclination", "sag, mm", *METHODS),
                 [
-                    (f"{np.degrees(a):.0f}°", 1e3 * abs(reference[0.8e6, a][0]), *(1e3 * error[name][0.8e6, a] for name in METHODS))
+                    (
+                        f"{np.degrees(a):.0f}°",
+                        1e3 * abs(reference[0.8e6, a][0]),
+                        *(1e3 * error[name][0.8e6, a] for name in METHODS),
+                    )
                     for a in inclinations
                 ],
-                "Distance of the tip from the reference's.",
+                "Distance of the tip from that of the reference.",
             ),
             *(
                 []
@@ -97,13 +119,17 @@ def run(context: Context) -> Result:
                         "Horizontal sag by modulus, mm",
                         ("modulus, MPa", "CalculiX", *METHODS, "SOFA, 4,797 linear tetrahedra"),
                         [
-                            (f"{m * 1e-6:g}", -1e3 * reference[m, 0.0][0], *(-1e3 * tips[name][m, 0.0][0] for name in METHODS),
-                             -SOFA[round(m * 1e-6, 2)])
+                            (
+                                f"{m * 1e-6:g}",
+                                -1e3 * reference[m, 0.0][0],
+                                *(-1e3 * tips[name][m, 0.0][0] for name in METHODS),
+                                -SOFA[round(m * 1e-6, 2)],
+                            )
                             for m in moduli
                         ],
-                        "A tuned modulus hides the tetrahedra's locking: to sag as far as 0.8 MPa, they need about"
-                        f" {0.8 * tips['linear tetrahedra'][horizontal][0] / reference[horizontal][0]:.2f} MPa. SOFA was run once on this"
-                        f" tube with cables at 3.4 mm; it is off by {1e3 * sofa_error:.1f} mm at 0.8 MPa.",
+                        "A tuned modulus hides the locking of the tetrahedra: for the sag of 0.8 MPa they need about"
+                        f" {0.8 * tips['linear tetrahedra'][horizontal][0] / reference[horizontal][0]:.2f} MPa. SOFA was run"
+                        f" once on this tube with cables at 3.4 mm; its error is {1e3 * sofa_error:.1f} mm at 0.8 MPa.",
                     )
                 ]
             ),
@@ -115,11 +141,11 @@ def run(context: Context) -> Result:
             "tetrahedra": TETRAHEDRA,
         },
         data={"seconds": {name: float(np.median(values)) for name, values in seconds.items()}},
-    )  # fmt: skip
+    )
 
 
 def _solve(job: tuple[float, list[float]]) -> list[tuple[str, list, float]]:
-    """For one modulus: each method's tips at the inclinations, and its seconds a pose."""
+    """Return for one modulus each method's name, tips at the inclinations, and computing time per pose in s."""
     modulus, inclinations = job
     robot = tube_robot(modulus)
     r = calculix.REFERENCE
@@ -131,7 +157,7 @@ def _solve(job: tuple[float, list[float]]) -> list[tuple[str, list, float]]:
         ("this model", Simulator(robot, reduced=False)),
         ("linear tetrahedra", Simulator(tetrahedra, reduced=False)),
     ):
-        simulator.solve(np.zeros(3))  # compiles what is not compiled yet
+        simulator.solve(np.zeros(3))  # compiles, so that the time below is without compilation
         started = time.perf_counter()
         tips = [simulator.solve(_gravity(a)).tip_position - rest for a in inclinations]
         found.append((name, tips, (time.perf_counter() - started) / len(tips)))

@@ -1,4 +1,4 @@
-"""How late the robot answers to gravity: the delay of the running graph, what a delay costs while the base moves, and what prediction wins back."""
+"""Latency of the response to gravity: that of the running graph, its cost while the base moves, the effect of prediction."""
 
 import dataclasses
 import math
@@ -8,45 +8,45 @@ import numpy as np
 
 from gravcomp.closed_loop.loop import SAMPLE_PERIOD, ClosedLoop
 from gravcomp.closed_loop.setup import Setup
-from gravcomp.evaluation import metrics
 from gravcomp.launcher import LaunchError, NodeDied
 from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import Case, target_of
+from gravcomp.trials.holding import Case, errors_to, target_of
 from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
 
-TITLE = "Delay, and prediction of gravity"
+TITLE = "Latency, and prediction of gravity"
 
 DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
 ARTICLE_DELAY = 3.0  # s
 _START, _DURATION = 3.0, 12.0  # s
 _WARM_UP, _LISTEN = 5.0, 15.0  # s
-_LONGEST_HORIZON = 0.5  # s: the estimator's limit
+_LONGEST_HORIZON = 0.5  # s, limit of the estimator
 
 
 class SwingingMotion(SyntheticMotion):
-    """The base swings about a horizontal axis by +- amplitude (rad) with the period (s), after standing still."""
+    """The base swings about a horizontal axis by +- amplitude (rad) with the period (s), after `hold` s at rest."""
 
     def __init__(self, amplitude: float, period: float, hold: float):
         self._amplitude, self._period, self._hold = amplitude, period, hold
 
     @property
     def fastest(self) -> float:
-        """rad/s."""
+        """Largest rate, rad/s."""
         return 2 * math.pi / self._period * self._amplitude
 
     def pose(self, moment: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return orientation (3, 3) and position (3,) m of the base in the world at a time in s."""
         since = max(0.0, moment - self._hold)
-        # It starts with zero rate: 1 - cos rather than sin.
+        # 1 - cos rather than sin: it starts with zero rate.
         angle = self._amplitude * (1.0 - math.cos(2 * math.pi * since / self._period))
         return base_orientation(0.0) @ turned(np.array([0.0, angle, 0.0])), np.zeros(3)
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
-    measured, why = _graph_delays(context)
+    """Run the experiment."""
+    measured, failure = _graph_delays(context)
     setup = context.once(calibrate_on_virtual_robot).setup
     delays = DELAYS[:3] if context.brief else DELAYS
     jobs = [(setup, delay, predicted) for delay in delays for predicted in ((False, True) if delay else (False,))]
@@ -58,57 +58,75 @@ def run(context: Context) -> Result:
     p99 = float(np.percentile(in_ms, 99)) if len(in_ms) else math.nan
     pair = (10, False), (10, True)
     figures = [
-        Figure("delay from IMU sample to motor current, median", median, "ms", "about 3 s", 100.0),
-        Figure("delay from IMU sample to motor current, 99th percentile", p99, "ms", "about 3 s", 100.0),
+        Figure("latency from IMU sample to motor current, median", median, "ms", "about 3 s", 100.0),
+        Figure("latency from IMU sample to motor current, 99th percentile", p99, "ms", "about 3 s", 100.0),
     ]
     if pair[0] in runs:
         figures += [
-            Figure("tip moved by a delay of 100 ms, without prediction", 1e3 * moved[pair[0]], "mm"),
-            Figure("tip moved by a delay of 100 ms, predicted", 1e3 * moved[pair[1]], "mm"),
+            Figure("tip displacement caused by a delay of 100 ms, without prediction", 1e3 * moved[pair[0]], "mm"),
+            Figure("tip displacement caused by a delay of 100 ms, with prediction", 1e3 * moved[pair[1]], "mm"),
         ]
     if (300, False) in runs:
-        figures.append(Figure("tip moved by the article's delay of 3 s", 1e3 * moved[300, False], "mm"))
+        figures.append(Figure("tip displacement caused by the article's delay of 3 s", 1e3 * moved[300, False], "mm"))
     swing = SwingingMotion(np.radians(20.0), 6.0, 0.0)
     return Result(
         name="delay",
         title=TITLE,
-        question="How late does the cable answer to a turn of the base, and how much of that does prediction win back?",
+        question="How late do the cables respond to a rotation of the base, and how much of the error does prediction remove?",
         ground=(
-            "The delay is that of the running graph, four nodes and the virtual robot as processes on this machine, read from the CAN bus: from"
-            " an IMU sample's last frame to the first current frame that it caused."
-            if not why
-            else f"The running graph could not be measured here: {why}."
+            "The latency is that of the running graph, four nodes and the virtual robot as processes on this machine, measured"
+            " on the CAN bus: from the last frame of an IMU sample to the first current frame that it caused."
+            if not failure
+            else f"The running graph could not be measured here: {failure}."
         )
-        + " What delays cost was computed in the core at full speed against the virtual robot, with a delay put between loop and bridge.",
+        + " The cost of a delay is computed in the core, faster than real time, against the virtual robot, with a delay between"
+        " loop and bridge.",
         figures=figures,
         parts=[
             Plot(
-                "Delays",
+                "Latency",
                 _drawing(in_ms, moved),
-                "Left: delays in the running graph. Right: how far a delay moves the tip while the base swings, without prediction and with"
-                " gravity predicted by as much.",
+                "Left: latencies in the running graph. Right: tip displacement caused by a delay while the base swings,"
+                " without prediction and with gravity predicted ahead by the delay.",
             ),
             Table(
                 "Tip error on a swinging base",
-                ("delay, ms", "without prediction, mm RMS", "moved by the delay, mm RMS", "predicted, mm RMS", "moved, mm RMS"),
+                (
+                    "delay, ms",
+                    "tip error, mm RMS",
+                    "caused by the delay, mm RMS",
+                    "tip error predicted, mm RMS",
+                    "caused, mm RMS",
+                ),
                 [
-                    (10 * delay, 1e3 * errors[delay, False], 1e3 * moved[delay, False], 1e3 * errors[delay, True], 1e3 * moved[delay, True])
+                    (
+                        10 * delay,
+                        1e3 * errors[delay, False],
+                        1e3 * moved[delay, False],
+                        1e3 * errors[delay, True],
+                        1e3 * moved[delay, True],
+                    )
                     if delay
                     else (0, 1e3 * errors[0, False], "–", "–", "–")
                     for delay in delays
                 ],
-                f"The base swings by ±20 deg every 6 s, at most {np.degrees(swing.fastest):.0f} deg/s. RMS of the tip's distance from straight, and"
-                " of the tip's distance from where the undelayed run has it at the same moment. Prediction reaches at most"
-                f" {1e3 * _LONGEST_HORIZON:.0f} ms ahead.",
+                f"The base swings by ±20 deg every 6 s, at most {np.degrees(swing.fastest):.0f} deg/s. Tip error: distance of"
+                " the tip from that of the straight robot. Caused by the delay: distance of the tip from that of the run"
+                f" without delay at the same time. Gravity is predicted by at most {1e3 * _LONGEST_HORIZON:.0f} ms.",
             ),
         ],
-        parameters={"delays_ms": [10 * d for d in delays], "swing_deg": 20.0, "period_s": 6.0, "samples in the graph": len(in_ms)},
+        parameters={
+            "delays_ms": [10 * d for d in delays],
+            "swing_deg": 20.0,
+            "period_s": 6.0,
+            "samples in the graph": len(in_ms),
+        },
         data={"graph_delay_ms": {"median": median, "p99": p99, "samples": len(in_ms)}},
-    )  # fmt: skip
+    )
 
 
 def _graph_delays(context: Context) -> tuple[list[float], str]:
-    """Delays in s of the running graph, or none and why."""
+    """Return the latencies of the running graph in s, or none and the reason."""
     from gravcomp.evaluation.bus_delay import DelayListener
     from gravcomp.launcher.virtual_graph import RunningGraph
 
@@ -116,7 +134,7 @@ def _graph_delays(context: Context) -> tuple[list[float], str]:
     try:
         with RunningGraph() as graph:
             graph.wait_for_commands()
-            context.progress(f"delays of the running graph over {_WARM_UP + _LISTEN:.0f} s")
+            context.progress(f"latency of the running graph over {_WARM_UP + _LISTEN:.0f} s")
             time.sleep(_WARM_UP)
             listener = DelayListener(graph.can)
             listener.start()
@@ -130,14 +148,14 @@ def _graph_delays(context: Context) -> tuple[list[float], str]:
 
 @dataclasses.dataclass(frozen=True)
 class _Run:
-    """The tip's position (t, 3) m and its distance (t,) m from the target, from the moment at which the base begins to swing."""
+    """Tip position (t, 3) m and its distance (t,) m from the target, from the time at which the base begins to swing."""
 
     tip: np.ndarray
     error: np.ndarray
 
 
 def _swing(job: tuple[Setup, int, bool]) -> _Run:
-    """A run with a delay in samples, predicted or not."""
+    """Run one case. job: (setup, delay in samples, whether gravity is predicted)."""
     setup, delay, predicted = job
     if predicted:
         horizon = min(delay * SAMPLE_PERIOD, _LONGEST_HORIZON)
@@ -150,12 +168,11 @@ def _swing(job: tuple[Setup, int, bool]) -> _Run:
     loop.forget()
     loop.run(_DURATION)
     trace = loop.trace
-    error = metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
-    return _Run(trace.tip_position, error.distance)
+    return _Run(trace.tip_position, errors_to(trace, target).distance)
 
 
 def _rms(values: np.ndarray, delay: int) -> float:
-    """Of the samples (t,) from the first on that a command of the swinging base has reached."""
+    """Return the RMS of samples (t,) without the first `delay` ones, which precede the first command of the swinging base."""
     return float(np.sqrt((values[delay:] ** 2).mean()))
 
 
@@ -174,6 +191,6 @@ def _drawing(in_ms: np.ndarray, moved: dict) -> str:
         cost.set_xscale("log")
         cost.set_yscale("symlog", linthresh=0.1)
         cost.set_xlabel("delay in ms")
-        cost.set_ylabel("tip moved in mm")
+        cost.set_ylabel("tip displacement in mm")
         cost.legend()
     return drawing.svg

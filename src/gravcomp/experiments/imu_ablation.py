@@ -1,5 +1,6 @@
 """Yaw over nine minutes with and without the orientation filter and the heating, at rest and turning at 23 deg/s."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -8,19 +9,19 @@ from gravcomp.report.drawing import MODEL, REAL, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.thermal import HeaterOptions, ThermalPlantOptions
 from gravcomp.trials.context import Context
-from gravcomp.trials.yaw_drift import COLD, DURATION, RATE, REST, ROOM, board_samples, yaw_errors
+from gravcomp.trials.yaw_drift import COLD, DURATION, RATE, REST, ROOM, BoardSample, board_samples, turning_after, yaw_errors
 from gravcomp.virtual.board import SAMPLE_PERIOD
 from gravcomp.virtual.parameters import Board
 
 TITLE = "IMU: filter and heating"
 
-_WINDOW = 30.0  # s, over which the article saw 20 deg
+_WINDOW = 30.0  # s, over which the article reports 20 deg
 _MOTIONS = (("at rest", 0.0), ("turning at 23 deg/s", RATE))
 _FILTERS = (("filter", "with filter"), ("no_filter", "raw rate integrated"))
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     duration = DURATION / 9 if context.brief else DURATION
     jobs = [
         (context.setup.truth.board, rate, heated, duration, context.setup.seed)
@@ -38,7 +39,7 @@ def run(context: Context) -> Result:
                 (motion, label, heating, float(np.abs(yaw).max()), _within(yaw, _WINDOW), float(course["temperature"].std()))
             )
             if key == "filter" or not heated:
-                article = "wanders about 20 deg in 30 s" if (key, heated, motion) == ("no_filter", False, "at rest") else ""
+                article = "drifts by about 20 deg in 30 s" if (key, heated, motion) == ("no_filter", False, "at rest") else ""
                 limit = 1.0 if (key, heated, motion) == ("filter", True, "at rest") else None
                 figures.append(
                     Figure(f"yaw drift, {motion}, {label}, {heating}", float(np.abs(yaw).max()), "deg", article, limit)
@@ -46,15 +47,16 @@ def run(context: Context) -> Result:
     return Result(
         name="imu-ablation",
         title=TITLE,
-        question="What do the orientation filter and the heating each contribute to a quiet sense of direction?",
-        ground="Virtual board alone (BMI088 noise, bias, temperature coefficient, quantisation, heater and chip), read through its CAN frames, in"
-        f" the core at full speed. Stored at {COLD:g} degC, in a room of {ROOM:g} degC; yaw against the truth after {REST:g} s at rest.",
+        question="How much do the orientation filter and the heating each reduce the drift of the orientation?",
+        ground="The virtual board alone (BMI088 noise, bias, temperature coefficient, quantisation, heater and chip), read"
+        f" through its CAN frames, in the core faster than real time. Stored at {COLD:g} degC, in a room of {ROOM:g} degC; yaw"
+        f" against the ground truth after {REST:g} s at rest.",
         figures=figures,
         parts=[
             Plot(
                 "Yaw drift over nine minutes",
                 _panels(runs, courses),
-                "Mind the different scales: the filter's panels would be a line in the others.",
+                "The scales differ: the curves of the filter would be a line in the other panels.",
             ),
             Table(
                 "All eight pipelines",
@@ -64,11 +66,11 @@ def run(context: Context) -> Result:
                     "heating",
                     "largest drift, deg",
                     "largest within 30 s, deg",
-                    "temperature's deviation, degC",
+                    "temperature, standard deviation, degC",
                 ),
                 rows,
-                "Yaw alone: it is not observable from gravity, so it shows the gyroscope's bias at its barest. Compensation needs only the"
-                " direction of gravity, which the accelerometer holds.",
+                "Only yaw: it is not observable from gravity, so it shows the bias of the gyroscope directly. Compensation"
+                " needs only the direction of gravity, which the accelerometer observes.",
             ),
         ],
         parameters={
@@ -81,14 +83,14 @@ def run(context: Context) -> Result:
 
 
 def _drift(job: tuple[Board, float, bool, float, int]) -> dict[str, np.ndarray]:
-    """Yaw drift in deg and temperature, one row a second."""
+    """Return yaw drift in deg and temperature in degC, one row per second."""
     board, rate, heated, duration, seed = job
     board = replace(board, thermal=ThermalPlantOptions(ambient=ROOM, start=COLD))
-    temperatures = []
+    temperatures: list[float] = []
 
-    def samples():
+    def samples() -> Iterator[BoardSample]:
         heater = HeaterOptions() if heated else None
-        for sample in board_samples(board, heater, REST + duration, lambda t: rate if t > REST else 0.0, seed):
+        for sample in board_samples(board, heater, REST + duration, turning_after(REST, rate), seed):
             temperatures.append(sample.true_temperature)
             yield sample
 

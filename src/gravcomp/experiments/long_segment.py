@@ -1,4 +1,4 @@
-"""The distal segment replaced by one of 80 mm: only the geometry changes, material and cables stay as calibrated on the short robot."""
+"""A distal segment of 80 mm: only the geometry changes; material and cables are those calibrated on the short robot."""
 
 import dataclasses
 
@@ -16,21 +16,21 @@ from gravcomp.virtual.motion import base_orientation
 TITLE = "A longer distal segment"
 
 DISTAL_LENGTH = 0.080  # m
-# Points in the middle of the long segment. Two cables' moments in the plane of the sag cannot hold the tip's position, its direction and the
-# middle at once, so the direction is let go for the middle.
+# Points in the middle of the long segment. The moments of two cables in the plane of the sag cannot control the position and
+# direction of the tip and the middle together, so the direction has no weight.
 BACKBONE = {"backbone_station": (0.5, 0.6, 0.7, 0.8), "backbone_weight": (1.0, 1.0, 1.0, 1.0), "tip_direction_weight": 0.0}
 INCLINATIONS = (45.0, 0.0, -45.0)
-RELEASED = 6.0  # s: it swings slower than the short one, and after half of that by millimetres still
+RELEASED = 6.0  # s: it swings slower than the short robot, after 3 s still by millimetres
 
 
 def lengthened(robot: Robot) -> Robot:
-    """The robot with a distal segment of 80 mm; its cables end where the segments do."""
+    """Return the robot with a distal segment of 80 mm; the cables end where the segments do."""
     segments = (*robot.segments[:-1], dataclasses.replace(robot.segments[-1], length=DISTAL_LENGTH))
     return dataclasses.replace(robot, name=f"{robot.name} 80 mm", segments=segments)
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     calibrated = context.once(calibrate_on_virtual_robot).setup
     setup = dataclasses.replace(calibrated, robot=lengthened(calibrated.robot), nominal=lengthened(calibrated.nominal))
     inclinations = INCLINATIONS[1:2] if context.brief else INCLINATIONS
@@ -42,7 +42,7 @@ def run(context: Context) -> Result:
     distal[-1] = False
 
     def middle(o: Outcome, shape: np.ndarray) -> float:
-        """Largest sag of the long segment between its ends, m."""
+        """Return the largest sag of the long segment between its ends, m."""
         return float(metrics.sag(shape, o.target_backbone)[distal].max())
 
     def worst(group: list[Outcome]) -> float:
@@ -51,52 +51,82 @@ def run(context: Context) -> Result:
     return Result(
         name="long-segment",
         title=TITLE,
-        question="Does the method carry over to another robot by its geometry alone, and what happens to its middle?",
+        question="Does the method transfer to another robot when only the geometry is changed, and how far does the middle sag?",
         ground=GROUND,
         figures=[
             Figure("recovery rate r at rest", pooled_recovery(outcomes), "", "still works", 0.999, True, 5),
-            Figure("largest lateral residual of the tip", 1e3 * max(o.held.lateral for o in tip_only), "mm"),
+            Figure("largest lateral tip error", 1e3 * max(o.held.lateral for o in tip_only), "mm"),
             Figure("largest tip error without compensation", 1e3 * max(o.without.distance for o in tip_only), "mm"),
-            Figure("sag of the long segment's middle, tip alone asked for", 1e3 * worst(tip_only), "mm", "mid-section sags"),
-            Figure("sag of the long segment's middle, backbone weighted", 1e3 * worst(weighted), "mm", "", 1e3 * worst(tip_only)),
-            Figure("the same without compensation", 1e3 * max(middle(o, o.shape_without) for o in tip_only), "mm"),
-            Figure("lateral residual of the tip, backbone weighted", 1e3 * max(o.held.lateral for o in weighted), "mm"),
+            Figure("sag of the long segment's middle, target: tip", 1e3 * worst(tip_only), "mm", "mid-section sags"),
+            Figure(
+                "sag of the long segment's middle, target: tip and backbone",
+                1e3 * worst(weighted),
+                "mm",
+                "",
+                1e3 * worst(tip_only),
+            ),
+            Figure(
+                "sag of the long segment's middle, without compensation",
+                1e3 * max(middle(o, o.shape_without) for o in tip_only),
+                "mm",
+            ),
+            Figure("largest lateral tip error, target: tip and backbone", 1e3 * max(o.held.lateral for o in weighted), "mm"),
         ],
         parts=[
             Plot(
                 "Shapes with and without weights on the backbone",
                 _shapes(tip_only, weighted),
-                "Side view. Grey: straight. Pink: released. Blue: only the tip's position and direction are asked for. Vermilion: points of the"
-                " backbone have weights besides.",
+                "Side view. Grey: straight. Pink: released. Blue: target with position and direction of the tip. Vermilion:"
+                " target with position of the tip and points of the backbone.",
             ),
             Table(
                 "All poses",
                 (
-                    "pose", "asked for", "tip error without, mm", "with, mm", "lateral, mm", "tilt, deg", "middle without, mm", "with, mm",
+                    "pose",
+                    "target",
+                    "tip error without, mm",
+                    "with, mm",
+                    "lateral, mm",
+                    "tilt, deg",
+                    "middle without, mm",
+                    "with, mm",
                     "whole body, mm",
                 ),
                 [
-                    (f"{o.case.inclination:g}°", kind, 1e3 * o.without.distance, 1e3 * o.held.distance, 1e3 * o.held.lateral,
-                     float(np.degrees(o.held.tilt)), 1e3 * middle(o, o.shape_without), 1e3 * middle(o, o.shape_held), 1e3 * o.sag_held)
+                    (
+                        f"{o.case.inclination:g}°",
+                        kind,
+                        1e3 * o.without.distance,
+                        1e3 * o.held.distance,
+                        1e3 * o.held.lateral,
+                        float(np.degrees(o.held.tilt)),
+                        1e3 * middle(o, o.shape_without),
+                        1e3 * middle(o, o.shape_held),
+                        1e3 * o.sag_held,
+                    )
                     for kind, group in (("tip", tip_only), ("tip and backbone", weighted))
                     for o in group
                 ],
-                "Middle: largest sag of the long segment between its ends, across the straight axis; whole body: the same of both segments. The robot"
-                f" with segments of 50 mm, horizontal, for comparison: tip error {1e3 * short.without.distance:.1f} mm without,"
-                f" {1e3 * short.held.distance:.2f} mm with; whole body {1e3 * short.sag_held:.2f} mm.",
+                "Middle: largest sag of the long segment between its ends, across the straight axis; whole body: largest sag"
+                " of both segments. The robot with segments of 50 mm, horizontal, for comparison: tip error"
+                f" {1e3 * short.without.distance:.1f} mm without, {1e3 * short.held.distance:.2f} mm with; whole body"
+                f" {1e3 * short.sag_held:.2f} mm.",
             ),
         ],
         parameters={
-            "distal segment": "80 mm", "slenderness": round(setup.robot.length / setup.robot.segments[0].outer_diameter, 2),
+            "distal segment": "80 mm",
+            "slenderness": round(setup.robot.length / setup.robot.segments[0].outer_diameter, 2),
             "backbone-weighted target": BACKBONE,
         },
         notes=[
-            "Material, cable elasticity and cable offsets are those of the calibration on the short robot; nothing was tuned for the long one.",
-            "Between its cables' ends a segment under gravity bends as it must: each segment's cables give one moment in the plane of the sag, so"
-            " position and direction of the tip take all there is. With weights on the middle of the long segment the direction is let go, and"
-            " the tilt pays for it; the first segment sags as before.",
+            "Material, cable elasticity and cable offsets are those calibrated on the short robot; nothing was tuned for the"
+            " long one.",
+            "The cables of a segment give one moment in the plane of the sag. The two moments are used up by position and"
+            " direction of the tip; the bending of a segment between the ends of its cables cannot be controlled. With weights"
+            " on the middle of the long segment the direction has no weight: the tilt is larger, and the first segment sags as"
+            " before.",
         ],
-    )  # fmt: skip
+    )
 
 
 def _shapes(tip_only: list[Outcome], weighted: list[Outcome]) -> str:

@@ -1,4 +1,4 @@
-"""What the two experiments in lumens have in common: their runs, figures, tables and drawings."""
+"""Runs, figures, tables and drawings that the two experiments in lumens share."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gravcomp.trials.lumen import FED, HELD, WITHOUT, Reach, Reached, run_reach
 
 
 def reaching(context: Context, name: str, title: str, question: str, reaches: tuple[Reach, ...]) -> Result:
-    """Every reach without and with compensation, and with a base that is fed, by the calibrated controller."""
+    """Run every reach with the calibrated controller: without compensation, with it, and with it and a base that is fed."""
     setup = context.once(calibrate_on_virtual_robot).setup
     if context.brief:
         reaches = reaches[-1:]
@@ -24,22 +24,42 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
     for without, held, fed in triples:
         gain = float(without.tip_error.mean() / held.tip_error.mean())
         figures += [
-            Figure(f"{held.reach.name}: tip error smaller than without by the factor", gain, "", limit=5.0, at_least=True),
+            Figure(f"{held.reach.name}: tip error ratio, without / with compensation", gain, "", limit=5.0, at_least=True),
             Figure(
-                f"{held.reach.name}: the same, base fed by what the model is short by",
-                float(without.tip_error.mean() / fed.tip_error.mean()), "", limit=5.0, at_least=True,
+                f"{held.reach.name}: tip error ratio, base fed by the predicted shortening",
+                float(without.tip_error.mean() / fed.tip_error.mean()),
+                "",
+                limit=5.0,
+                at_least=True,
             ),
-            Figure(f"{held.reach.name}: the same, not fed, across the robot", float(without.lateral.mean() / held.lateral.mean()), ""),
-            Figure(f"{held.reach.name}: least clearance to the wall", 1e3 * float(held.clearance.min()), "mm"),
-            Figure(f"{held.reach.name}: the same without compensation", 1e3 * float(without.clearance.min()), "mm"),
+            Figure(
+                f"{held.reach.name}: lateral tip error ratio, without / with compensation",
+                float(without.lateral.mean() / held.lateral.mean()),
+                "",
+            ),
+            Figure(f"{held.reach.name}: smallest clearance to the wall", 1e3 * float(held.clearance.min()), "mm"),
+            Figure(
+                f"{held.reach.name}: smallest clearance to the wall, without compensation",
+                1e3 * float(without.clearance.min()),
+                "mm",
+            ),
             Figure(f"{held.reach.name}: camera axis error, mean", float(np.degrees(held.camera.mean())), "deg"),
-        ]  # fmt: skip
+        ]
     rows = [
-        (r.reach.name, kind, 1e3 * r.clearance.min(), 1e3 * r.clearance[np.isfinite(r.clearance)].mean(), 1e3 * r.deviation.mean(),
-         1e3 * r.tip_error.mean(), 1e3 * r.lateral.mean(), float(np.degrees(r.camera.mean())), float(np.degrees(r.camera.max())))
+        (
+            r.reach.name,
+            kind,
+            1e3 * r.clearance.min(),
+            1e3 * r.clearance[np.isfinite(r.clearance)].mean(),
+            1e3 * r.deviation.mean(),
+            1e3 * r.tip_error.mean(),
+            1e3 * r.lateral.mean(),
+            float(np.degrees(r.camera.mean())),
+            float(np.degrees(r.camera.max())),
+        )
         for triple in triples
         for kind, r in zip(ways, triple)
-    ]  # fmt: skip
+    ]
     return Result(
         name=name,
         title=title,
@@ -50,36 +70,58 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
             Plot(
                 "Bodies in the lumen",
                 _bodies(pairs),
-                "The lumen's section in its own plane of bending (first of each pair) and across it; vermilion with compensation, pink without;"
-                " three moments of the way.",
+                "Section of the lumen in its plane of bending (first of each pair) and across it; vermilion with compensation,"
+                " pink without; at three times.",
             ),
-            Plot("Along the way", _courses(pairs), "Least clearance to the wall and camera axis error over the depth of the tip."),
+            Plot(
+                "Over the depth",
+                _courses(pairs),
+                "Smallest clearance to the wall and camera axis error over the depth of the tip.",
+            ),
             Table(
                 "With and without compensation",
-                ("lumen", "compensation", "least clearance, mm", "mean clearance, mm", "tip from centreline, mm", "tip error, mm",
-                 "across, mm", "camera error, deg", "largest, deg"),
+                (
+                    "lumen",
+                    "compensation",
+                    "smallest clearance, mm",
+                    "mean clearance, mm",
+                    "tip from centreline, mm",
+                    "tip error, mm",
+                    "lateral, mm",
+                    "camera error, deg",
+                    "largest, deg",
+                ),
                 rows,
-                "Tip error: against the shape asked for in the robot's base; base fed: who pushes it pushes on by what the model is short by; across: without what it is too short by. Tip from"
-                " centreline and clearance: in the lumen's frame, so they hold"
-                " what the hand's trembling does to the base, too, which no cable can undo.",
+                "Tip error: distance to the target in soft_base; lateral: its part across the target direction, without the"
+                " shortening. Base fed: the base is advanced by the shortening that the model predicts. Tip from centreline"
+                " and clearance: in the lumen's frame, so they include the tremor of the base, which no cable can compensate.",
             ),
         ],
         parameters={
             reach.name: {
-                "inlet_mm": 1e3 * reach.lumen.inlet, "radius_mm": 1e3 * reach.lumen.radius, "plane_deg": float(np.degrees(reach.lumen.plane)),
-                "diameter_mm": 1e3 * reach.lumen.diameter, "inclination_deg": reach.inclination, "roll_deg": reach.roll,
-                "tip from mm": 1e3 * reach.first, "to mm": 1e3 * reach.last, "duration_s": reach.duration, "trembling hand": reach.hand,
+                "inlet_mm": 1e3 * reach.lumen.inlet,
+                "radius_mm": 1e3 * reach.lumen.radius,
+                "plane_deg": float(np.degrees(reach.lumen.plane)),
+                "diameter_mm": 1e3 * reach.lumen.diameter,
+                "inclination_deg": reach.inclination,
+                "roll_deg": reach.roll,
+                "tip from mm": 1e3 * reach.first,
+                "to mm": 1e3 * reach.last,
+                "duration_s": reach.duration,
+                "trembling hand": reach.hand,
             }
             for reach in reaches
         },
         notes=[
-            "Cables only pull: what bends the robot also shortens it, by some millimetres at the end of a bend, with compensation and without. No cable"
-            " can undo that; who pushes the base can, by what the model says (base fed). It is in the tip error, not in its part across.",
-            "No contact is computed, neither in the model nor in the virtual robot: a negative clearance says by how much the robot would press"
-            " into the wall, which a wall would then bear.",
-            "Without compensation: the cables that would bend the weightless robot along the lumen are wound in, the others are released.",
+            "Cables only pull: bending the robot also shortens it, by some millimetres at the end of a bend, with compensation"
+            " and without. No cable can compensate this; advancing the base can, by the shortening that the model predicts"
+            " (base fed). The shortening is part of the tip error, not of the lateral error.",
+            "Contact is not modelled, neither in the model nor in the virtual robot: a negative clearance is the depth of"
+            " penetration into the wall. A real wall would carry that load.",
+            "Without compensation: the cables that bend the weightless robot along the lumen are pulled in, the others are"
+            " released.",
         ],
-    )  # fmt: skip
+    )
 
 
 def _bodies(pairs: list[tuple[Reached, Reached]]) -> str:
@@ -105,7 +147,7 @@ def _bodies(pairs: list[tuple[Reached, Reached]]) -> str:
                         body = result.body[k]
                         draw_robot(axes, np.stack([body @ sideways, body[:, 2]], axis=1), colour, alpha=0.35 + 0.65 * moment)
                 axes.set_aspect("equal")
-                axes.set_xlabel("in the bend's plane, mm" if sideways is plane else "across it, mm")
+                axes.set_xlabel("in the plane of bending, mm" if sideways is plane else "across the plane of bending, mm")
                 axes.set_ylabel("along the inlet, mm")
                 axes.set_ylim(bottom=-30.0)
             drawing.axes[0, 2 * index].set_title(held.reach.name)

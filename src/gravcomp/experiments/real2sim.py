@@ -1,4 +1,4 @@
-"""Free fall from straight at the article's five inclinations: the model's course of position and direction against the virtual robot's."""
+"""Free fall from straight at the article's five inclinations: the tip over time, model against virtual robot."""
 
 import numpy as np
 
@@ -16,31 +16,31 @@ from gravcomp.virtual.motion import base_orientation
 TITLE = "Real to simulation: free fall"
 
 INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
-_FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll: none of those that are judged
-_DURATION, _REST = 4.0, 1.0  # s: of a fall, and of its end that counts as rest
-_SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after it was let go at which shapes are drawn
+_FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
+_DURATION, _REST = 4.0, 1.0  # s: of a fall, and of its last part, which counts as rest
+_SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after the start of the fall at which shapes are drawn
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     setup = context.setup
     duration = 2.0 if context.brief else _DURATION
     inclinations = INCLINATIONS[2:4] if context.brief else INCLINATIONS
     poses = [(i, 0.0) for i in inclinations] + list(_FITTED_POSES[: 1 if context.brief else 2])
     jobs = [(setup, i, roll, duration, trial) for trial, (i, roll) in enumerate(poses)]
     falls = context.map(free_fall, jobs, "free fall of the virtual robot")
-    judged = falls[: len(inclinations)]
+    evaluated = falls[: len(inclinations)]
     fit = fit_motion(
         setup.robot,
         falls[len(inclinations) :],
         mapper=context.sweep.map,
-        progress=lambda sentence: context.progress(f"fitting the fall: {sentence}"),
+        progress=lambda stage: context.progress(f"fitting the fall: {stage}"),
     )
-    robots = {"as described": setup.robot, "calibrated": fit.robot}
-    jobs = [(robot, course) for robot in robots.values() for course in judged]
-    predicted = context.map(_predict, jobs, "the model's fall")
-    courses = {name: predicted[k * len(judged) : (k + 1) * len(judged)] for k, name in enumerate(robots)}
-    errors = {name: [_errors(course, *model) for course, model in zip(judged, models)] for name, models in courses.items()}
+    robots = {"not calibrated": setup.robot, "calibrated": fit.robot}
+    falls_of_models = [(robot, course) for robot in robots.values() for course in evaluated]
+    predicted = context.map(_predict, falls_of_models, "fall of the model")
+    courses = {name: predicted[k * len(evaluated) : (k + 1) * len(evaluated)] for k, name in enumerate(robots)}
+    errors = {name: [_errors(course, *model) for course, model in zip(evaluated, models)] for name, models in courses.items()}
     rest = slice(-round(_REST / 0.01), None)
     whole = slice(None)
 
@@ -50,34 +50,34 @@ def run(context: Context) -> Result:
     return Result(
         name="real2sim",
         title=TITLE,
-        question="Does the model fall, swing and come to rest as the robot does?",
-        ground="The model in motion (finite elements, generalized-alpha, damping and one branch that creeps), in the core, against the virtual"
-        " robot: a rod that creeps at three paces and has a hysteresis that the model lacks. Gravity is what the orientation filter makes of"
-        " the virtual IMU.",
+        question="Does the model fall, swing and come to rest like the robot?",
+        ground="The dynamic model (finite elements, generalized-alpha, damping and one creep branch), in the core, against the"
+        " virtual robot: a rod with three creep branches and a hysteresis that the model does not have. Gravity is estimated"
+        " by the orientation filter from the virtual IMU.",
         figures=[
             Figure("worst position error over the whole fall", 1e3 * worst("calibrated", 0, whole), "mm", "4.7 mm", 2.0),
             Figure("worst direction error over the whole fall", np.degrees(worst("calibrated", 1, whole)), "deg", "5.2 deg", 2.0),
             Figure("worst position error at rest", 1e3 * worst("calibrated", 0, rest), "mm", "4.7 mm", 2.0),
             Figure("worst direction error at rest", np.degrees(worst("calibrated", 1, rest)), "deg", "5.2 deg", 2.0),
             Figure("mean position error over the whole fall", 1e3 * np.mean([p.mean() for p, _ in errors["calibrated"]]), "mm"),
-            Figure("worst position error at rest, model as described", 1e3 * worst("as described", 0, rest), "mm"),
-            Figure("worst position error over the whole fall, as described", 1e3 * worst("as described", 0, whole), "mm"),
+            Figure("worst position error at rest, not calibrated", 1e3 * worst("not calibrated", 0, rest), "mm"),
+            Figure("worst position error over the whole fall, not calibrated", 1e3 * worst("not calibrated", 0, whole), "mm"),
         ],
         parts=[
             Plot(
                 "Tip over time",
-                _courses(inclinations, judged, courses["calibrated"]),
-                "Across the robot, in the vertical plane: vermilion the virtual robot, blue the calibrated model. Below: distance and angle"
-                " between both.",
+                _courses(inclinations, evaluated, courses["calibrated"]),
+                "Above: lateral tip position in the vertical plane; vermilion: virtual robot, blue: calibrated model. Below:"
+                " distance and angle between the two.",
             ),
             Plot(
                 "Shapes",
                 _shapes(
-                    [(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, judged) if i != 90.0],
+                    [(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, evaluated) if i != 90.0],
                     setup.robot.length,
                 ),
-                f"From the side, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the robot was let go. Grey the rest shape without"
-                " gravity, vermilion the virtual robot, blue the calibrated model's axis.",
+                f"Side view, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the start of the fall."
+                " Grey: rest shape without gravity, vermilion: virtual robot, blue: axis of the calibrated model.",
             ),
             Table(
                 "Errors by pose",
@@ -97,20 +97,20 @@ def run(context: Context) -> Result:
             ),
         ],
         parameters={
-            "modulus that lasts": f"{fit.youngs_modulus * 1e-6:.4f} ± {fit.modulus_interval * 1e-6:.4f} MPa",
+            "long-term modulus": f"{fit.youngs_modulus * 1e-6:.4f} ± {fit.modulus_interval * 1e-6:.4f} MPa",
             "damping time": f"{1e3 * fit.damping_time:.2f} ± {1e3 * fit.damping_interval:.2f} ms",
             "creep": f"{fit.creep_ratio:.4f} ± {fit.creep_ratio_interval:.4f} of the modulus within"
             f" {fit.creep_time:.3f} ± {fit.creep_time_interval:.3f} s",
-            "virtual robot": f"{setup.truth.body.youngs_modulus * 1e-6:g} MPa in the long term, creep {setup.truth.body.creep_ratio} over"
-            f" {setup.truth.body.creep_time} s",
+            "virtual robot": f"{setup.truth.body.youngs_modulus * 1e-6:g} MPa in the long term, creep"
+            f" {setup.truth.body.creep_ratio} over {setup.truth.body.creep_time} s",
             "duration_s": duration,
         },
         notes=[
-            f"One model for the fall and for the rest after it, fitted at other poses than those judged: inclination and roll"
-            f" {', '.join(f'{i:g}° and {r:g}°' for i, r in poses[len(inclinations) :])}.",
-            "At rest counts the last second. At 90° the robot stands upright and nothing moves; 135° and 45° are mirror images.",
-            "A body that creeps is stiffer while it swings than at rest: with one modulus and damping alone the swing runs ahead of the model's, or"
-            " the rest is missed.",
+            "One model for the fall and for the rest after it, fitted at other poses than the evaluated ones: inclination and"
+            f" roll {', '.join(f'{i:g}° and {r:g}°' for i, r in poses[len(inclinations) :])}.",
+            "The last second counts as rest. At 90° the robot points up and does not move; 135° and 45° are mirror images.",
+            "A material with creep is stiffer during the swing than at rest: a model with one modulus and damping alone has an"
+            " error either in the frequency of the swing or at rest.",
         ],
     )
 
@@ -120,17 +120,24 @@ def _predict(job: tuple[Robot, Measured]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _errors(course: Measured, tip: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances (t,) m and the angles (t,) rad between a model's tips and the measured ones."""
+    assert course.tip_direction is not None
     return np.linalg.norm(tip - course.tip_position, axis=1), angle_between(direction, course.tip_direction)
 
 
 def _fall_shapes(setup: Setup, robot: Robot, inclination: float, fall: Measured) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at the times shown."""
+    """Return backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at the drawn times."""
     base = base_orientation(np.radians(inclination))
     samples = [round(t / SAMPLE) for t in _SHOWN]
     course = fall.rows(np.arange(samples[-1] + 1))
     modelled = dict(enumerate(predict_shapes(robot, course)))
     true = dict(enumerate(falling_rod(setup, base, _SHOWN[-1])))
-    return [(true[k][0], modelled[k].backbone_position @ base.T) for k in samples]
+    found = []
+    for k in samples:
+        shape = modelled[k]
+        assert shape is not None  # only the straight robot at the start has none
+        found.append((true[k][0], shape.backbone_position @ base.T))
+    return found
 
 
 def _shapes(falls: list[tuple[float, list]], length: float) -> str:
@@ -162,7 +169,7 @@ def _courses(inclinations: tuple, falls: list[Measured], models: list) -> str:
             below.plot(fall.time, 1e3 * position, color="#37404a", label="mm")
             below.plot(fall.time, np.degrees(angle), color="#e69f00", label="deg")
             below.set_xlabel("time in s")
-        drawing.axes[0, 0].set_ylabel("tip across in mm")
+        drawing.axes[0, 0].set_ylabel("lateral tip position in mm")
         drawing.axes[1, 0].set_ylabel("error")
         drawing.axes[0, 0].legend()
         drawing.axes[1, 0].legend()

@@ -1,5 +1,6 @@
-"""Static compensation: released at several poses, then held straight or bent; by a controller that knows nothing of the virtual robot's
-own parameters, and by the same controller after calibration.
+"""Static compensation: the robot is released at several poses, then compensated towards a straight or bent target.
+
+The controller has nominal parameters, other than those of the virtual robot, or calibrated ones.
 """
 
 import numpy as np
@@ -27,7 +28,7 @@ CASES = (
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     cases = CASES[3::3] if context.brief else CASES
     calibrated = context.once(calibrate_on_virtual_robot)
     jobs = [(setup, case) for setup in (context.setup, calibrated.setup) for case in cases]
@@ -37,31 +38,31 @@ def run(context: Context) -> Result:
     return Result(
         name="static",
         title=TITLE,
-        question="How straight, and how exactly bent, does the robot stay against gravity at rest?",
+        question="How accurately does the robot keep a straight and a bent shape against gravity at rest?",
         ground=GROUND,
         figures=[
             Figure(
                 "recovery rate r at rest, calibrated", pooled_recovery(fitted), "", "> 0.99", limit=0.999, at_least=True, digits=6
             ),
             Figure("recovery rate r at rest, not calibrated", pooled_recovery(plain), "", "> 0.99", digits=6),
-            Figure("r with the way between, calibrated", pooled_recovery(fitted, at_rest=False), "", digits=4),
-            Figure("largest lateral residual, calibrated", 1e3 * max(o.held.lateral for o in fitted), "mm", limit=1.0),
-            Figure("largest lateral residual, not calibrated", 1e3 * max(o.held.lateral for o in plain), "mm"),
+            Figure("recovery rate r including the transition, calibrated", pooled_recovery(fitted, at_rest=False), "", digits=4),
+            Figure("largest lateral error, calibrated", 1e3 * max(o.held.lateral for o in fitted), "mm", limit=1.0),
+            Figure("largest lateral error, not calibrated", 1e3 * max(o.held.lateral for o in plain), "mm"),
             Figure("largest tip error without compensation", 1e3 * max(o.without.distance for o in straight), "mm"),
             Figure("largest tilt of the tip, calibrated", np.degrees(max(o.held.tilt for o in fitted)), "deg"),
-            Figure("longest time to converge, calibrated", float(np.nanmax([o.converged for o in fitted])), "s", "about 6 s"),
+            Figure("longest settling time, calibrated", float(np.nanmax([o.converged for o in fitted])), "s", "about 6 s"),
         ],
         parts=[
             Plot(
-                "Released, and held by the calibrated controller",
+                "Released, and compensated by the calibrated controller",
                 _shapes([o for o in fitted if not o.case.roll]),
-                "Side view, gravity downwards. Grey: the shape asked for. Pink: released. Vermilion: compensated, the virtual robot's true"
-                " shape. Targets bent out of the drawn plane are seen from the side.",
+                "Side view, gravity downwards. Grey: target shape. Pink: released. Vermilion: compensated, true shape of the"
+                " virtual robot. Targets that bend out of the drawn plane are projected onto it.",
             ),
             _table("Calibrated", fitted),
             _table("Not calibrated", plain),
             Plot(
-                "Tip over time, horizontal, held straight from 3 s on",
+                "Tip over time, horizontal, compensated from 3 s on",
                 _course(*(next(o for o in group if o.case.inclination == 0.0) for group in (plain, fitted))),
                 "Distance of the virtual robot's tip from its target.",
             ),
@@ -73,10 +74,12 @@ def run(context: Context) -> Result:
             "seed": context.setup.seed,
         },
         notes=[
-            "The recovery rate correlates the simulated and the true tip, all poses together, the three coordinates centred one by one: at rest, over"
-            " half a second each of the released and of the held robot; with the way between, from half a second before the target is set to the"
-            " end. On the way the robot lags behind its model by the tenth of a second in which the motors take up the released cables.",
-            "Compensation shortens the robot, because cables only pull: the axial residual is part of the shape, not an error of control.",
+            "The recovery rate is the correlation of the simulated and the true tip over all poses, each of the three"
+            " coordinates centred. At rest: over half a second each of the released and of the compensated robot. Including"
+            " the transition: from half a second before the target is set to the end. In the transition the robot lags behind"
+            " its model by the 0.1 s in which the motors wind up the released cables.",
+            "Compensation shortens the robot, because cables only pull: the axial error is a property of the shape, not of the"
+            " control.",
             *calibrated.fit.warnings,
         ],
     )
@@ -85,7 +88,7 @@ def run(context: Context) -> Result:
 def _table(title: str, outcomes: list[Outcome]) -> Table:
     header = (
         "pose and target", "tip error without, mm", "with, mm", "lateral, mm", "axial, mm", "tilt, deg", "mid-body without, mm",
-        "with, mm", "r", "converged after, s",
+        "with, mm", "r", "settled after, s",
     )  # fmt: skip
     rows = [
         (
@@ -95,7 +98,9 @@ def _table(title: str, outcomes: list[Outcome]) -> Table:
         )
         for o in outcomes
     ]  # fmt: skip
-    note = "Mid-body: largest distance of the backbone between base and tip from the shape asked for, across it. r is left out where nothing moves."
+    note = (
+        "Mid-body: largest lateral distance of the backbone between base and tip from the target shape. No r where nothing moves."
+    )
     return Table(title, header, rows, note)
 
 
@@ -105,7 +110,7 @@ def _shapes(outcomes: list[Outcome]) -> str:
     with Drawing(rows, columns, width=10.5, height=2.9 * rows, squeeze=False) as drawing:
         for axes, o in zip(drawing.axes.flat, outcomes):
             base = base_orientation(np.radians(o.case.inclination))
-            draw_robot(axes, side_view(o.target_backbone, base), REST, "asked for")
+            draw_robot(axes, side_view(o.target_backbone, base), REST, "target")
             draw_robot(axes, side_view(o.shape_without, base), WITHOUT, "released")
             draw_robot(axes, side_view(o.shape_held, base), REAL, "compensated")
             axes.set_title(o.case.name.replace(" towards ", "\ntowards "))
@@ -132,6 +137,6 @@ def _course(plain: Outcome, fitted: Outcome) -> str:
             axes.set_ylabel("tip error in mm")
             if limit:
                 axes.set_ylim(0, limit)
-                axes.set_title("the same, enlarged")
+                axes.set_title("enlarged")
         drawing.axes[0].legend()
     return drawing.svg

@@ -1,4 +1,4 @@
-"""The article's tuning, a grid of 25 pairs of modulus and Rayleigh damping, and the calibration that takes its place.
+"""The article's tuning, a grid of 25 pairs of modulus and Rayleigh damping, against calibration.
 
 e_total = (sum_k e_k) Var(e),    e_k = |p_sim(t_k) - p_real(t_k)|
 """
@@ -16,68 +16,74 @@ from gravcomp.trials.context import Context
 from gravcomp.trials.free_fall import free_fall
 from gravcomp.trials.known_robot import Recovered, recover
 
-TITLE = "Tuning: the grid, and calibration"
+TITLE = "Tuning: grid against calibration"
 
 MODULI = (0.50, 0.65, 0.80, 1.00, 1.20)  # MPa
-RAYLEIGH = (0.10, 0.30, 0.50, 0.70, 1.00)  # alpha in 1/s and beta in s alike, as in the article
+RAYLEIGH = (0.10, 0.30, 0.50, 0.70, 1.00)  # C: alpha in 1/s and beta in s have the same value, as in the article
 POSES = ((0.0, 0.0), (45.0, 0.0), (-45.0, 90.0))  # inclination, roll in deg
 _DURATION = 1.5  # s
 
 
 def run(context: Context) -> Result:
-    """The experiment."""
+    """Run the experiment."""
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
     moduli, dampings = (MODULI[1:4], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
     falls = context.map(
-        free_fall, [(setup, *pose, _DURATION, trial) for trial, pose in enumerate(poses)], "free falls to tune by"
+        free_fall, [(setup, *pose, _DURATION, trial) for trial, pose in enumerate(poses)], "free falls for tuning"
     )
     pairs = [(m, c) for m in moduli for c in dampings]
-    errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c) for m, c in pairs], "the grid")))
+    errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c) for m, c in pairs], "grid")))
     best = min(pairs, key=lambda pair: total(errors[pair]))
-    # Modulus and damping alone, as the grid: two parameters against two.
+    # Only modulus and damping, as in the grid: two parameters against two.
     fit = fit_motion(
         setup.robot, falls, mapper=context.sweep.map, progress=lambda s: context.progress(f"calibration: {s}"), creep=False
     )
     fitted = np.concatenate([np.linalg.norm(tip - f.tip_position, axis=1) for tip, f in zip(fit.predicted, falls)])
     recovered = recover(context)
-    judged = [r for r in recovered if "offset" not in r.name]
+    material = [r for r in recovered if "offset" not in r.name]
     offsets = [r for r in recovered if "offset" in r.name]
     ratio = total(errors[best]) / total(fitted)
     return Result(
         name="tuning",
         title=TITLE,
-        question="Which modulus and which damping make the model fall like the robot, and how many simulations does it take to find them?",
-        ground="The model in motion, in the core, against free falls of the virtual robot from straight; the known robots of the last table are virtual"
-        " ones, too, a rod and not the model's finite elements.",
+        question="With which modulus and damping does the model fall like the robot, and how many simulations are needed to"
+        " find them?",
+        ground="The dynamic model, in the core, against free falls of the virtual robot from straight. The robots with known"
+        " parameters in the last table are virtual robots as well: a rod, not the finite elements of the model.",
         figures=[
-            Figure("e_total of the grid's best pair over the calibration's", ratio, "", "best pair of the grid", 1.0, True),
+            Figure("e_total ratio, best pair of the grid / calibration", ratio, "", "best pair of the grid", 1.0, True),
             Figure("RMS error, best pair of the grid", 1e3 * _rms(errors[best]), "mm"),
             Figure("RMS error, calibration", 1e3 * _rms(fitted), "mm", "", 1e3 * _rms(errors[best])),
             Figure(
                 "evaluations, calibration", fit.evaluations, "", f"{len(MODULI) * len(RAYLEIGH)} pairs", float(len(pairs) - 1)
             ),
-            Figure("known modulus and damping recovered within", 100 * max(r.error for r in judged), "%", "", 2.0),
-            Figure("known cable offsets recovered within", max((abs(r.fitted - r.true) for r in offsets), default=np.nan), "mm"),
+            Figure("known modulus and damping, largest error of the fit", 100 * max(r.error for r in material), "%", "", 2.0),
+            Figure(
+                "known cable offsets, largest error of the fit",
+                max((abs(r.fitted - r.true) for r in offsets), default=np.nan),
+                "mm",
+            ),
         ],
         parts=[
             Plot(
                 "The grid",
                 _heat_map(moduli, dampings, errors, best, fit.youngs_modulus * 1e-6),
-                "log10 of e_total (mm and mm²), a cubic spline through the 25 pairs (points). Circle: the best pair. Line: the modulus that calibration"
-                " finds, with a damping that the grid does not have.",
+                "log10 of e_total (mm and mm²), a cubic spline through the 25 pairs (points). Circle: best pair. Line:"
+                " calibrated modulus; the calibrated damping is not of the grid's kind.",
             ),
             Plot(
-                "The fall in the first pose",
+                "Fall in the first pose",
                 _fall(setup.robot, falls[0], best, fit.predicted[0]),
-                "Tip across the robot. The grid's Rayleigh damping, 0.1 s and more of stiffness part, lets the robot sink like in honey: it cannot"
-                " swing as the real one does.",
+                "Lateral tip position. With the Rayleigh damping of the grid, whose stiffness part is 0.1 s and more, the"
+                " robot is overdamped: it sinks slowly and does not swing as the virtual robot does.",
             ),
             Table(
                 "e_total of the grid",
                 ("modulus, MPa", *(f"C = {c:g}" for c in dampings)),
                 [(f"{m:g}", *(total(errors[m, c]) for c in dampings)) for m in moduli],
-                f"Best pair: {best[0]:g} MPa and C = {best[1]:g}, e_total {total(errors[best]):.3g}; calibration: {total(fitted):.3g}.",
+                f"Best pair: {best[0]:g} MPa and C = {best[1]:g}, e_total {total(errors[best]):.3g}; calibration:"
+                f" {total(fitted):.3g}.",
             ),
             _recovery_table(recovered),
         ],
@@ -89,19 +95,19 @@ def run(context: Context) -> Result:
         },
         notes=[
             "An evaluation is a simulation of all poses with one pair; the calibration's include those for its derivatives.",
-            "The finite elements give way around a cable's end, which the rod does not: the offsets of the known robots make good for it, so they are"
-            " off by some hundredths of a millimetre more than their intervals say.",
+            "The finite elements are compliant around the end of a cable, the rod is not. The fitted offsets compensate this;"
+            " their error exceeds their intervals by some hundredths of a millimetre.",
         ],
     )
 
 
 def total(error: np.ndarray) -> float:
-    """The article's e_total in mm and mm^2 of errors (t,) in m."""
+    """Return the article's e_total (mm and mm^2) of errors (t,) in m."""
     return float((1e3 * error).sum() * np.var(1e3 * error))
 
 
 def _pair(job: tuple[Robot, list[Measured], float, float]) -> np.ndarray:
-    """(t,) m: errors of all falls with one pair."""
+    """Return the errors (t,) in m of all falls with one pair of modulus and damping."""
     robot, falls, modulus, damping = job
     return np.concatenate(
         [np.linalg.norm(_rayleigh_fall(robot, fall, modulus, damping) - fall.tip_position, axis=1) for fall in falls]
@@ -119,15 +125,17 @@ def _rms(error: np.ndarray) -> float:
 
 def _recovery_table(recovered: list[Recovered]) -> Table:
     rows = [
-        (r.name, f"{r.true:.4g} {r.unit}", f"{r.fitted:.4g} ± {r.interval:.2g} {r.unit}", f"{100 * r.error:.2f} %" if "offset" not in r.name else
+        (r.name, f"{r.true:.4g} {r.unit}", f"{r.fitted:.4g} ± {r.interval:.2g} {r.unit}", f"{100 * r.error:.2f} %" if "offset"
+        not in r.name else
          f"{abs(r.fitted - r.true):.3f} mm")
         for r in recovered
     ]  # fmt: skip
     return Table(
-        "Known parameters of virtual robots, recovered",
+        "Known parameters of virtual robots, and their fit",
         ("parameter", "known", "fitted, interval at 95 %", "error"),
         rows,
-        "At rest: 39 resting tips, released and with each cable pulled in twice, with 0.1 mm of noise a coordinate and picture. In motion: two free falls.",
+        "At rest: 39 tips at rest, released and with each cable pulled in twice, with noise of 0.1 mm per coordinate and"
+        " image. In motion: two free falls.",
     )
 
 
@@ -157,6 +165,6 @@ def _fall(robot: Robot, fall: Measured, best: tuple, calibrated: np.ndarray) -> 
         axes.plot(fall.time, 1e3 * _rayleigh_fall(robot, fall, *best)[:, 0], color=WITHOUT, label="best pair of the grid")
         axes.plot(fall.time, 1e3 * calibrated[:, 0], color=MODEL, label="calibration")
         axes.set_xlabel("time in s")
-        axes.set_ylabel("tip across in mm")
+        axes.set_ylabel("lateral tip position in mm")
         axes.legend()
     return drawing.svg

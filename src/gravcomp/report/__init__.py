@@ -1,1 +1,1 @@
-"""Reports: figures, tables and plots as data, and the HTML page, the terminal table and the Markdown table made of them."""
+"""Reports: figures, tables and plots as data, and the HTML page, terminal table and Markdown table made from them."""

@@ -1,7 +1,7 @@
-"""Drawings as SVG, all in one style: `with drawing(...) as axes:` gives axes, and the result is text to be put into a page.
+"""Drawings as SVG text for a page, all in one style: `with Drawing(...) as drawing:` gives `drawing.axes`.
 
-Colours are Okabe's and Ito's, which people with any colour vision tell apart. Grey is the robot at rest, blue what is simulated, vermilion
-what is measured, green what is wanted.
+Colours are those of Okabe and Ito, which can be distinguished with any colour vision. Grey: rest shape, blue: simulated,
+vermilion: measured, green: target.
 """
 
 import io
@@ -12,7 +12,7 @@ import numpy as np
 REST, MODEL, REAL, TARGET, WITHOUT = "#9aa3ad", "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 CYCLE = (MODEL, REAL, TARGET, WITHOUT, "#e69f00", "#56b4e9", "#4d4d4d")
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "figure.facecolor": "none",
     "axes.facecolor": "white",
     "axes.edgecolor": "#c4cad1",
@@ -38,13 +38,13 @@ _STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "svg.fonttype": "path",
-    # The same drawing gives the same text, so that reports of the same run can be compared.
+    # A fixed salt: the same drawing gives the same text, so that reports can be compared.
     "svg.hashsalt": "gravcomp",
 }
 
 
 class Drawing:
-    """Axes in `rows` x `columns` (axes: an array of that shape, squeezed) and, after the with-block, `svg`."""
+    """Figure with `rows` x `columns` axes (`axes`: array of that shape, squeezed) in the with-block; afterwards `svg` is set."""
 
     def __init__(self, rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.2, **options: Any):
         self._arguments = rows, columns, width, height, options
@@ -55,8 +55,9 @@ class Drawing:
 
         provide_extra("reports")
         import matplotlib
+        from cycler import cycler
 
-        self._context = matplotlib.rc_context({**_STYLE, "axes.prop_cycle": matplotlib.cycler(color=CYCLE)})
+        self._context = matplotlib.rc_context({**_STYLE, "axes.prop_cycle": cycler(color=CYCLE)})
         self._context.__enter__()
         from matplotlib.figure import Figure
 
@@ -79,7 +80,7 @@ class Drawing:
 def draw_robot(
     axes: Any, backbone: np.ndarray, colour: str, label: str | None = None, diameter: float = 9e-3, alpha: float = 1.0
 ) -> None:
-    """The robot's outline and axis from its backbone (b, 2), in m, in the plane of the drawing, in mm."""
+    """Draw outline and axis of the robot in mm, from its backbone (b, 2) in the plane of the drawing and its diameter, in m."""
     points = _smooth(np.asarray(backbone) * 1e3)
     tangent = np.gradient(points, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -90,23 +91,23 @@ def draw_robot(
 
 
 def equal_axes(axes: Any, horizontal: str = "horizontal in mm", vertical: str = "height in mm") -> None:
-    """Both axes in mm to the same scale."""
+    """Give both axes the same scale, and label them."""
     axes.set_aspect("equal")
     axes.set_xlabel(horizontal)
     axes.set_ylabel(vertical)
 
 
 def side_view(backbone: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """(b, 2): a backbone (b, 3) in soft_base, seen from the side in the vertical plane that holds the base's axis.
+    """Project a backbone (b, 3) in soft_base onto the vertical plane that contains the axis of the base. Returns (b, 2).
 
-    base (3, 3): world from soft_base, without roll about the vertical (`base_orientation` gives such ones).
+    base (3, 3): world from soft_base, without rotation about the vertical, as `base_orientation` returns it.
     """
     world = np.asarray(backbone) @ np.asarray(base).T
     return world[..., [0, 2]]
 
 
 def _smooth(points: np.ndarray) -> np.ndarray:
-    """A cubic spline through the points, drawn finely."""
+    """Return ten times as many points on a cubic spline through the points."""
     from scipy.interpolate import CubicSpline
 
     along = np.linspace(0.0, 1.0, len(points))

@@ -1,6 +1,6 @@
-"""Figures as a table: on the terminal, and in a Markdown document, renewed in place by the command that measured them.
+"""Figures as a table: on the terminal, and in a Markdown document, where the command that measures them updates it in place.
 
-A table stands between `<!-- figures COMMAND -->` and `<!-- end -->`, COMMAND as in `./gravcomp COMMAND`.
+The table is between the markers `<!-- figures COMMAND -->` and `<!-- end -->`, COMMAND as in `./gravcomp COMMAND`.
 """
 
 import datetime
@@ -9,13 +9,17 @@ import platform
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError
 from gravcomp.report.result import Figure
 
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
 
-def rich_table(title: str, figures: Sequence[Figure]):
-    """The figures for a terminal, as a rich.table.Table."""
+
+def rich_table(title: str, figures: Sequence[Figure]) -> "RichTable":
+    """Return the figures as a table for the terminal."""
     from rich.table import Table
 
     words = {True: "[green]reached[/green]", False: "[red]missed[/red]", None: ""}
@@ -29,34 +33,34 @@ def rich_table(title: str, figures: Sequence[Figure]):
 
 
 def markdown_table(figures: Sequence[Figure]) -> str:
-    """The figures as Markdown."""
+    """Return the figures as a Markdown table."""
     header, rows = _cells(figures, {True: "reached", False: "**missed**", None: ""})
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (header, ["---"] * len(header), *rows)) + "\n"
 
 
 def check_place(path: Path, command: str) -> None:
-    """Before hours of measuring: raises ConfigError when the document cannot be read or has no place for the command's table."""
+    """Raise ConfigError when the document cannot be read or has no markers for the table; called before measuring."""
     try:
         text = path.read_text()
     except OSError as error:
         raise ConfigError(f"--write is {path}: cannot be read: {error.strerror}") from error
     if not _place(command).search(text):
         raise ConfigError(
-            f"--write is {path}: it has no place for the table; needed: '<!-- figures {command} -->' and after it '<!-- end -->'"
+            f"--write is {path}: no markers for the table; needed: '<!-- figures {command} -->' and after it '<!-- end -->'"
         )
 
 
 def renew(path: Path, command: str, figures: Sequence[Figure]) -> None:
-    """Put the figures into the document, with the day and the kind of machine. Raises ConfigError as `check_place`."""
+    """Write the figures into the document, with the date and the processor. Raises ConfigError as `check_place`."""
     check_place(path, command)
     where = f"\n`./gravcomp {command}`, {datetime.date.today().isoformat()}, {os.cpu_count()} cores of {_processor()}.\n"
     path.write_text(_place(command).sub(lambda match: match[1] + markdown_table(figures) + where + match[2], path.read_text()))
 
 
 def _cells(figures: Sequence[Figure], words: dict) -> tuple[list[str], list[list[str]]]:
-    """Header and rows; the article's column only where it says something."""
+    """Return header and rows; the article's column is left out when it is empty."""
     article = any(figure.article for figure in figures)
-    header = ["figure", "here", *(["the article"] if article else []), "to be reached", ""]
+    header = ["figure", "measured", *(["article"] if article else []), "limit", ""]
     return header, [[f.name, f.text, *([f.article] if article else []), f.target, words[f.reached]] for f in figures]
 
 

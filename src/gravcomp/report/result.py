@@ -1,4 +1,4 @@
-"""What an experiment hands over: figures beside the article's, tables, plots, parameters; as plain data for JSON and for the page."""
+"""Result of an experiment as plain data, for JSON and the report page: figures, tables, plots, parameters."""
 
 import dataclasses
 import math
@@ -8,7 +8,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure of merit. `article`: what the article reports, in words; `limit` with `at_least`: what is to be reached, or None."""
+    """One figure of merit.
+
+    article: the article's value, as text; limit: to be reached, from above when `at_least`, else from below, or None; digits:
+    significant digits of the text.
+    """
 
     name: str
     value: float
@@ -20,21 +24,21 @@ class Figure:
 
     @property
     def reached(self) -> bool | None:
-        """Whether the limit is kept; None without one. NaN reaches nothing."""
+        """Whether the figure reaches its limit; None without a limit. NaN reaches no limit."""
         if self.limit is None:
             return None
         return bool(self.value >= self.limit if self.at_least else self.value <= self.limit)
 
     @property
     def target(self) -> str:
-        """The limit in words."""
+        """The limit as text."""
         if self.limit is None:
             return ""
         return f"{'≥' if self.at_least else '≤'} {self.limit:g} {self.unit}".rstrip()
 
     @property
     def text(self) -> str:
-        """Value and unit."""
+        """Value and unit as text."""
         return f"{number(self.value, self.digits)} {self.unit}".rstrip()
 
 
@@ -59,8 +63,10 @@ class Plot:
 
 @dataclass
 class Result:
-    """One experiment. `ground` says what was run and what stood for the real robot; `parts` are tables and plots in reading order; `bag`: the
-    recording that was judged in place of the virtual robot.
+    """Result of one experiment.
+
+    ground: what was run, and on which robot; parts: tables and plots in reading order; bag: the recording that was evaluated,
+    empty for the virtual robot.
     """
 
     name: str
@@ -77,12 +83,12 @@ class Result:
 
     @property
     def file(self) -> str:
-        """The name of its page's and JSON's files, without their ending."""
+        """Name of the page and JSON files, without suffix."""
         return f"{self.name}-recorded" if self.bag else self.name
 
     @property
     def command(self) -> str:
-        """What makes it."""
+        """Command that makes this result, without `./gravcomp`."""
         return f"reproduce {self.name} --bag {self.bag}" if self.bag else f"reproduce {self.name}"
 
     @property
@@ -91,7 +97,7 @@ class Result:
         return all(figure.reached is not False for figure in self.figures)
 
     def to_mapping(self) -> dict:
-        """Plain data; numbers that are not finite become None, as JSON has no others."""
+        """Return the result as data for JSON; numbers that are not finite become None."""
         figures = [
             {
                 "name": f.name, "value": f.value, "unit": f.unit, "article": f.article, "target": f.target, "reached": f.reached,
@@ -116,7 +122,7 @@ class Result:
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """A number for people: `digits` significant ones, no exponent where it can be read without."""
+    """Format a number with `digits` significant digits, with an exponent only below 1e-3 and from 1e5."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool) or value is None:
@@ -133,7 +139,7 @@ def number(value: Any, digits: int = 3) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The value out of types that JSON knows."""
+    """Convert a value to types that JSON has; arrays become lists, numbers that are not finite None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

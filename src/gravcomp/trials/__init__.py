@@ -1,1 +1,1 @@
-"""Single runs on the virtual robot that measure something: a pose held, a free fall, a calibration run, a lumen reached through, a drift of yaw."""
+"""Measurements on the virtual robot: compensation at a pose, free fall, calibration run, reaching through a lumen, yaw drift."""

@@ -1,7 +1,8 @@
-"""A calibration run on the virtual robot: the measurement that a person would make with a camera over the real one.
+"""A calibration run on the virtual robot: the measurement that a user makes on the real robot with a camera.
 
-The base stands in a few poses; in each the cables are released, and then the uncalibrated controller straightens and bends the robot, so that
-every cable is taut somewhere. Recorded are gravity as estimated, the commanded displacements, and the true tip with a camera's noise.
+The base is at rest in several poses. In each pose the cables are released first; then the uncalibrated controller straightens
+and bends the robot, so that every cable is taut in some pose. Recorded are the estimated gravity, the commanded displacements,
+and the true tip position with a camera's noise.
 """
 
 import dataclasses
@@ -12,22 +13,27 @@ import numpy as np
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
 from gravcomp.calibration.fit import StaticFit, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
-from gravcomp.closed_loop.loop import ClosedLoop, Trace
+from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
 from gravcomp.inverse import bend_target, straight_target
 from gravcomp.trials.context import Context
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-CAMERA_NOISE = 0.1e-3  # m, a coordinate
-_DECIMATION = 5  # 20 Hz: a camera's pace
+CAMERA_NOISE = 0.1e-3  # m, standard deviation per coordinate
+_DECIMATION = 5  # 20 Hz, the rate of a camera
 
 CALIBRATION_POSES = ((0.0, 0.0), (0.0, 60.0), (0.0, 120.0), (0.0, 180.0), (0.0, 240.0), (0.0, 300.0))
-"""Inclination and roll in degrees; the rolls let each cable carry the robot in turn."""
+"""Inclination and roll in degrees; the rolls make each cable support the robot in turn."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """measured: the run; fit: to its still windows; setup: the same virtual robot under the calibrated controller."""
+    """Result of a calibration.
+
+    measured: the run; fit: parameters fitted to its windows at rest; setup: the same virtual robot with the calibrated
+    controller.
+    """
 
     measured: Measured
     fit: StaticFit
@@ -35,26 +41,26 @@ class Calibration:
 
 
 def measure(context: Context) -> Measured:
-    """The calibration run in all poses."""
+    """Return the measurements of the calibration run in all poses."""
     poses = CALIBRATION_POSES[:: 3 if context.brief else 1]
     jobs = [(context.setup, pose, trial, 2.5 if context.brief else 4.0) for trial, pose in enumerate(poses)]
     return joined(context.map(calibration_trial, jobs, "measuring the virtual robot for calibration"))
 
 
 def calibrate_on_virtual_robot(context: Context) -> Calibration:
-    """Measure, and fit what the controller believes."""
+    """Measure, and fit the controller's model to the measurements."""
     setup, measured = context.setup, measure(context)
-    fit = fit_statics(
-        setup.robot, still_windows(measured), progress=lambda sentence: context.progress(f"calibrating: {sentence}")
+    fit = fit_statics(setup.robot, still_windows(measured), progress=lambda stage: context.progress(f"calibrating: {stage}"))
+    calibrated = setup.with_model(
+        calibrated_robot(setup.robot, fit.parameters), calibrated_hardware(setup.hardware, fit.parameters)
     )
-    believed = setup.believing(calibrated_robot(setup.robot, fit.parameters), calibrated_hardware(setup.hardware, fit.parameters))
-    return Calibration(measured, fit, believed)
+    return Calibration(measured, fit, calibrated)
 
 
 def calibration_trial(job: tuple[Setup, tuple[float, float], int, float]) -> Measured:
-    """One pose: (setup, (inclination, roll) in deg, number of the trial, s of each state)."""
+    """Run one pose. job: (setup, (inclination, roll) in deg, number of the trial, duration of each state in s)."""
     setup, (inclination, roll), trial, duration = job
-    # Without pretension: where all cables are taut, their offsets can only be told from one another, not from the modulus and the elasticity.
+    # Without pretension: with all cables taut, a common offset cannot be distinguished from a change of modulus and elasticity.
     inverse = dataclasses.replace(setup.controller.inverse, pretension=0.0)
     setup = dataclasses.replace(setup, controller=dataclasses.replace(setup.controller, inverse=inverse))
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(inclination), np.radians(roll))))
@@ -75,7 +81,7 @@ def calibration_trial(job: tuple[Setup, tuple[float, float], int, float]) -> Mea
 
 
 def as_measured(trace: Trace, trial: int, random: np.random.Generator) -> Measured:
-    """What a camera and the graph's topics would have recorded of the run."""
+    """Return what a camera and the topics of the graph would record of the run."""
     rows = slice(0, len(trace.time), _DECIMATION)
     tip = trace.tip_position[rows]
     return Measured(
@@ -90,7 +96,7 @@ def as_measured(trace: Trace, trial: int, random: np.random.Generator) -> Measur
 
 
 def joined(trials: list[Measured]) -> Measured:
-    """All trials as one measurement."""
+    """Concatenate trials to one measurement."""
     columns = {
         name: np.concatenate([getattr(trial, name) for trial in trials])
         for name in ("trial", "time", "gravity", "displacement", "tip_position", "tip_direction")

@@ -1,4 +1,4 @@
-"""How a run on the virtual robot is carried out: the robot, where many alike computations go, and who hears of the progress."""
+"""Context of a run on the virtual robot: the robot, the sweep that runs independent computations, and the progress display."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -10,23 +10,23 @@ Made = TypeVar("Made")
 
 
 class Context:
-    """How an experiment is run.
+    """Context in which an experiment runs.
 
-    setup; sweep: where many alike computations go; progress(sentence): tells people what is being done; brief: shorter runs, for
-    a first look and for tests (the report says so).
+    setup: robot, controller and virtual robot; sweep: runs independent computations in parallel; progress(stage): shows the
+    user the current stage; brief: shorter runs, for a first look and for tests (the report notes it).
     """
 
-    def __init__(self, setup: Setup, sweep: Sweep, progress: Callable[[str], None] = lambda sentence: None, brief: bool = False):
+    def __init__(self, setup: Setup, sweep: Sweep, progress: Callable[[str], None] = lambda stage: None, brief: bool = False):
         self.setup, self.sweep, self.progress, self.brief = setup, sweep, progress, brief
         self._made: dict[Callable, Any] = {}
 
     def once(self, make: "Callable[[Context], Made]") -> "Made":
-        """What `make(context)` returns, made once for all experiments that ask for it."""
+        """Return `make(context)`, computed once and shared by all experiments of this context."""
         if make not in self._made:
             self._made[make] = make(self)
         return self._made[make]
 
-    def map(self, function: Callable, jobs: list, what: str) -> list:
-        """`sweep.map` that tells how far it is."""
-        self.progress(f"{what} (0 of {len(jobs)})")
-        return self.sweep.map(function, jobs, lambda done, total: self.progress(f"{what} ({done} of {total})"))
+    def map(self, function: Callable, jobs: list, stage: str) -> list:
+        """Return `sweep.map(function, jobs)`, showing the number of finished jobs next to the name of the stage."""
+        self.progress(f"{stage} (0 of {len(jobs)})")
+        return self.sweep.map(function, jobs, lambda done, total: self.progress(f"{stage} ({done} of {total})"))

@@ -1,4 +1,4 @@
-"""The virtual robot let go: straight and at rest at first, cables released, the base standing still."""
+"""Free fall of the virtual robot: straight and at rest at first, with released cables and a base at rest."""
 
 from collections.abc import Iterator
 
@@ -16,12 +16,15 @@ from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 SAMPLE = 0.010  # s
 _STEP = 0.002  # s
-_RELEASED = -0.03  # m
-_IMU_TIME = 1.5  # s of IMU samples from which gravity is known
+_RELEASED = -0.03  # m: paid out so far that the cables stay slack
+_IMU_TIME = 1.5  # s of IMU samples from which gravity is estimated
 
 
 def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
-    """(setup, inclination and roll in deg, duration s, number of the trial): the true course, and gravity as the IMU tells it."""
+    """Return the true tip motion of a fall and the gravity estimated from the IMU.
+
+    job: (setup, inclination and roll in deg, duration in s, number of the trial).
+    """
     setup, inclination, roll, duration, trial = job
     base = base_orientation(np.radians(inclination), np.radians(roll))
     tips, directions = zip(
@@ -33,7 +36,7 @@ def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
         source="virtual robot",
         trial=np.full(len(tip), trial),
         time=SAMPLE * np.arange(len(tip)),
-        gravity=np.tile(_felt_gravity(setup, base), (len(tip), 1)),
+        gravity=np.tile(_estimated_gravity(setup, base), (len(tip), 1)),
         displacement=np.full((len(tip), len(setup.nominal.cables)), np.nan),
         tip_position=tip + CAMERA_NOISE * random.standard_normal(tip.shape),
         tip_direction=np.array(directions) @ base,
@@ -41,14 +44,15 @@ def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
 
 
 def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Positions (n, 3) and orientations (n, 3, 3) of the rod's nodes in the world, every `SAMPLE` s from the moment at which it is let go;
-    `base` (3, 3): world from soft_base.
+    """Yield positions (n, 3) in m and orientations (n, 3, 3) of the rod's nodes in the world, every `SAMPLE` s.
+
+    base (3, 3): world from soft_base; duration in s.
     """
     model = build_rod(setup.nominal, setup.truth)
     rod = MovingRod(model, build_material(model, setup.truth), build_friction(setup.truth))
     none = np.zeros(model.tendons)
     rod.rest(RodShape(*model.straight(), tension=none, displacement=none, iterations=0), base, np.zeros(3))
-    # Copies: the rod moves its arrays on in place.
+    # Copies: the rod updates its arrays in place.
     yield rod.position.copy(), rod.orientation.copy()
     world_gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
     for step in range(1, round(duration / _STEP) + 1):
@@ -57,7 +61,8 @@ def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tup
             yield rod.position.copy(), rod.orientation.copy()
 
 
-def _felt_gravity(setup: Setup, base: np.ndarray) -> np.ndarray:
+def _estimated_gravity(setup: Setup, base: np.ndarray) -> np.ndarray:
+    """Return gravity (3,) in soft_base, m/s^2, as the orientation filter estimates it with the base at rest."""
     loop = ClosedLoop(setup, StaticMotion(base))
     loop.run(_IMU_TIME)
     return loop.trace.estimated_gravity[-50:].mean(axis=0)

@@ -1,28 +1,30 @@
-"""One case of compensation: the robot is released at a pose, then held to a target, and judged by its true shape."""
+"""One case of compensation: the robot is released at a pose, then compensated towards a target; its true shape is evaluated."""
 
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from gravcomp.closed_loop.loop import ClosedLoop, Trace
+from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
 from gravcomp.evaluation import metrics
 from gravcomp.inverse import Target, bend_target
 from gravcomp.inverse.target import arc_points
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-SETTLED = 0.5  # s at the end of a phase over which it is judged
+SETTLED = 0.5  # s at the end of a phase over which errors are averaged
 BAND = 0.5e-3  # m: converged when the tip stays within it
 GROUND = (
-    "Whole loop in the core at full speed against the virtual robot: CAN frames, bridge, position loops, IMU noise, orientation filter,"
-    " model and inverse problem as in the running graph; 'measured' means the virtual robot's true shape."
+    "The whole loop runs in the core, faster than real time, against the virtual robot: CAN frames, bridge, position loops,"
+    " IMU noise, orientation filter, model and inverse problem are those of the running graph. 'Measured' means the true shape of"
+    " the virtual robot."
 )
 
 
 @dataclass(frozen=True)
 class Case:
-    """inclination, roll, bend and plane in degrees; bend 0: straight. `options`: weights of `bend_target` beside the tip's."""
+    """Pose and target. Angles in degrees, bend 0: straight; options: further arguments of `bend_target`."""
 
     inclination: float
     roll: float = 0.0
@@ -34,13 +36,17 @@ class Case:
 
     @property
     def name(self) -> str:
+        """Description of pose and target, for tables and drawings."""
         pose = f"{self.inclination:g}°" + (f", rolled {self.roll:g}°" if self.roll else "")
         return pose + (f", bent {self.bend:g}° towards {self.plane:g}°" if self.bend else ", straight")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case. SI; `without` and `held` are the true shapes at the end of both phases; station (b,), target (b, 3)."""
+    """Outcome of a case, in SI units.
+
+    `without` and `held`: tip errors at the end of the released and of the compensated phase; backbones (b, 3) in soft_base.
+    """
 
     case: Case
     trace: Trace
@@ -57,13 +63,13 @@ class Outcome:
 
 
 def target_of(setup: Setup, case: Case) -> Target:
-    """The case's target with the controller's own weights."""
+    """Return the target of a case, with the weights of the controller."""
     options = {"tip_direction_weight": setup.controller.tip_direction_weight, **case.options}
     return bend_target(setup.robot.length, np.radians(case.bend), np.radians(case.plane), **options)
 
 
 def run_case(job: tuple[Setup, Case]) -> Outcome:
-    """Release, hold, judge."""
+    """Run one case: release, compensate, evaluate."""
     setup, case = job
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(case.inclination), np.radians(case.roll))))
     target = target_of(setup, case)
@@ -94,13 +100,22 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
     )
 
 
+def errors_to(trace: Trace, target: Target) -> metrics.TipErrors:
+    """Return the tip errors of each sample of a trace; the target must have a tip direction."""
+    assert target.tip_direction is not None
+    return metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction)
+
+
 def mean_errors(trace: Trace, target: Target) -> metrics.TipErrors:
-    """The mean tip errors over a trace, as floats."""
-    return metrics.means(metrics.tip_errors(trace.tip_position, trace.tip_direction, target.tip_position, target.tip_direction))
+    """Return the mean tip errors over a trace, as floats."""
+    return metrics.means(errors_to(trace, target))
 
 
 def pooled_recovery(outcomes: list[Outcome], *, at_rest: bool = True) -> float:
-    """r over all cases together: of the settled parts, released and held; or of everything from just before the targets came."""
+    """Return the recovery rate r over all cases together.
+
+    at_rest: of the settled parts of both phases; otherwise of everything from `SETTLED` s before the target is set.
+    """
     parts = []
     for o in outcomes:
         start = o.trace.time[o.trace.compensating][0]

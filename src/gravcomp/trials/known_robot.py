@@ -1,4 +1,4 @@
-"""Recovering what is known: virtual robots whose modulus, damping, cable offsets and cable elasticity are set, and fitted anew from their tips."""
+"""Check of the calibration: virtual robots with known parameters, and the parameters fitted to their tip positions."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from gravcomp.virtual.motion import base_orientation
 MODULI = (0.55e6, 0.75e6, 1.05e6)  # Pa
 DAMPING_TIME = 25e-3  # s
 OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
-# m: by which one cable after the other is wound in; two tensions tell an offset from an elongation.
+# m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (0.6e-3, 1.8e-3)
-_NOISE = 0.1e-3  # m: a picture's; ten are averaged
+_NOISE = 0.1e-3  # m: standard deviation of one image; ten are averaged
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """name and unit of a parameter, its true value, what was fitted, half width of the interval at 95 %."""
+    """A parameter with its true value, the fitted value and half the width of its 95 % interval."""
 
     name: str
     unit: str
@@ -36,14 +36,14 @@ class Recovered:
 
     @property
     def error(self) -> float:
-        """Relative."""
+        """Relative error of the fitted value."""
         return abs(self.fitted / self.true - 1.0)
 
 
 def recover(context: Context) -> list[Recovered]:
-    """Modulus, offsets and elasticity from resting tips, modulus and damping from free falls."""
+    """Fit modulus, offsets and elasticity to tips at rest, modulus and damping to free falls. Returns true and fitted values."""
     moduli = MODULI[:1] if context.brief else MODULI
-    fits = context.map(_fit_known, [(context.setup, modulus) for modulus in moduli], "recovering known robots")
+    fits = context.map(_fit_known, [(context.setup, modulus) for modulus in moduli], "fitting robots with known parameters")
     found = []
     for modulus, fit in zip(moduli, fits):
         estimate = fit.estimates[0]
@@ -60,7 +60,7 @@ def recover(context: Context) -> list[Recovered]:
         context.setup.robot,
         falls,
         mapper=context.sweep.map,
-        progress=lambda s: context.progress(f"known robot's fall: {s}"),
+        progress=lambda s: context.progress(f"fall of the known robot: {s}"),
         creep=False,
     )
     found.append(
@@ -73,7 +73,7 @@ def recover(context: Context) -> list[Recovered]:
 
 
 def known_setup(setup: Setup, modulus: float) -> Setup:
-    """A virtual robot of the model's own kind of material, without creep and friction, with the parameters above."""
+    """Return a virtual robot with the model's material law and this module's parameters, without creep and friction."""
     material, truth = setup.robot.segments[0].material, setup.truth
     body = dataclasses.replace(
         truth.body, youngs_modulus=modulus, poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(0.0,),
@@ -84,7 +84,7 @@ def known_setup(setup: Setup, modulus: float) -> Setup:
 
 
 def known_windows(setup: Setup) -> StillWindows:
-    """Resting tips of the known robot: released, and with each cable wound in while it lies horizontally at several rolls."""
+    """Return tips at rest of the known robot: released, and with each cable pulled in, in several poses."""
     rod, random = build_rod(setup.nominal, setup.truth), np.random.default_rng(setup.seed)
     count, rows = rod.tendons, []
     for inclination, roll in ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0)):
@@ -93,9 +93,9 @@ def known_windows(setup: Setup) -> StillWindows:
             np.where(np.arange(count) == c, pull, np.nan) for c in range(count) for pull in _PULLS
         ]
         for command in pulls:
-            # A released cable hangs loose.
-            wound = np.where(np.isnan(command), -0.03, command + OFFSETS)
-            shape = equilibrium(rod, gravity, displacement=wound)
+            # A released cable is slack.
+            displacement = np.where(np.isnan(command), -0.03, command + OFFSETS)
+            shape = equilibrium(rod, gravity, displacement=displacement)
             rows.append((gravity, command, shape.tip + _NOISE / np.sqrt(10.0) * random.standard_normal(3)))
     return StillWindows(*(np.array(column) for column in zip(*rows)))
 

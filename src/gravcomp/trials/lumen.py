@@ -1,34 +1,36 @@
-"""Reaching through a lumen: its centreline, the motion of a base that is pushed along it, and how far the robot stays from the wall.
+"""Reaching through a lumen: its centreline, the motion of the base along it, and the clearance between robot and wall.
 
-The lumen lies fixed in the world. Its centreline runs straight for `inlet` along z of its frame, then along an arc of `radius` in the plane at
-`plane` (about z from x). The base is pushed along the inlet's axis; with the tip at the arc length d along the centreline the robot shall
-lie on the centreline from d - L to d, and behind the inlet's mouth on the straight line before it.
+The lumen is fixed in the world. Its centreline is straight for `inlet` along z of its frame, then an arc of `radius` in the
+plane at `plane` (about z from x). The base is advanced along the axis of the inlet. With the tip at arc length d the target
+shape is the part of the centreline from d - L to d; before the mouth of the inlet (d < 0) the centreline continues straight.
 
-Bent cables shorten the robot. Who pushes the base can make up for it, as far as the model knows: `Feed` is that push beyond the way asked for.
+Cables that bend the robot also shorten it. The base can be advanced by this shortening as the model predicts it: `Feed`.
 
-There is no contact, neither in the model nor in the virtual robot: a negative clearance says by how much the robot would press into the wall.
+Contact is not modelled, neither in the model nor in the virtual robot: a negative clearance is the depth of penetration into
+the wall.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.closed_loop.loop import ClosedLoop, Trace
+from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
 from gravcomp.evaluation import metrics
 from gravcomp.inverse import Target
 from gravcomp.virtual.motion import BaseMotion, StaticMotion, SyntheticMotion, TremorMotion, base_orientation
 
-REST = 4.0  # s before the base is pushed
+REST = 4.0  # s before the base is advanced
 _TARGET_STEPS = 0.1  # s between two targets
-_FEED_GAIN = 0.3  # of what the model is short by, made up for until the next target
-# The tip leads; the body has weights, too, so that it follows the centreline.
+_FEED_GAIN = 0.3  # share of the predicted shortening that is compensated until the next target
+# Stations and weights of the body, in addition to the tip, so that the body follows the centreline.
 _STATIONS, _WEIGHTS = (0.25, 0.5, 0.75), (0.3, 0.3, 0.3)
 
 
 @dataclass(frozen=True)
 class Lumen:
-    """SI: inlet and radius (0: straight) in m, plane in rad, diameter in m."""
+    """A lumen. inlet, radius (0: straight) and diameter in m, plane in rad."""
 
     inlet: float
     radius: float
@@ -36,7 +38,7 @@ class Lumen:
     diameter: float
 
     def point(self, s: np.ndarray) -> np.ndarray:
-        """(k, 3) points of the centreline at arc lengths s (k,)."""
+        """Return points (k, 3) of the centreline at arc lengths s (k,), m."""
         s = np.asarray(s, float)
         beyond = np.maximum(s - self.inlet, 0.0)
         if not self.radius:
@@ -47,12 +49,12 @@ class Lumen:
         return np.stack([across * np.cos(self.plane), across * np.sin(self.plane), along], axis=-1)
 
     def direction(self, s: np.ndarray) -> np.ndarray:
-        """(k, 3) unit tangents."""
+        """Return unit tangents (k, 3) of the centreline at arc lengths s (k,)."""
         turn = np.maximum(np.asarray(s, float) - self.inlet, 0.0) / (self.radius or np.inf)
         return np.stack([np.sin(turn) * np.cos(self.plane), np.sin(turn) * np.sin(self.plane), np.cos(turn)], axis=-1)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """(...,) m: distance of points (..., 3) from the centreline."""
+        """Return the distance (...,) of points (..., 3) from the centreline, m."""
         from scipy.spatial import cKDTree
 
         fine = np.arange(-0.15, 0.35, 0.2e-3)
@@ -61,7 +63,7 @@ class Lumen:
 
 @dataclass(frozen=True)
 class Reach:
-    """One run. lumen; inclination and roll of the inlet in deg; first and last: arc length of the tip in m; duration s; hand: it trembles."""
+    """One run. inclination, roll: of the inlet, deg; first, last: arc length of the tip, m; duration in s; hand: with tremor."""
 
     name: str
     lumen: Lumen
@@ -74,37 +76,37 @@ class Reach:
 
     @property
     def orientation(self) -> np.ndarray:
-        """(3, 3): world from the lumen's frame."""
+        """Rotation (3, 3): world from the lumen's frame."""
         return base_orientation(np.radians(self.inclination), np.radians(self.roll))
 
-    def depth(self, time: np.ndarray) -> np.ndarray:
-        """Arc length of the tip asked for at a time."""
+    def depth(self, time: float | np.ndarray) -> np.ndarray:
+        """Return the arc length of the target tip at a time in s, m."""
         return self.first + (self.last - self.first) * _smooth(np.clip((np.asarray(time) - REST) / self.duration, 0.0, 1.0))
 
     def motion(self, length: float, seed: int, feed: "Feed") -> BaseMotion:
-        """How the base moves, in world axes with the lumen's mouth as origin."""
+        """Return the motion of the base, in world axes with the lumen's mouth as origin."""
         still = StaticMotion(self.orientation)
-        return _PushedMotion(self, length, TremorMotion(self.orientation, seed) if self.hand else still, feed)
+        return _AdvancedMotion(self, length, TremorMotion(self.orientation, seed) if self.hand else still, feed)
 
 
 class Feed:
-    """How far the base is pushed beyond the way asked for, over time; in m."""
+    """Additional advance of the base over time, m, which compensates the shortening of the robot."""
 
     def __init__(self) -> None:
         self._time, self._value = [0.0], [0.0]
 
     def at(self, time: float) -> float:
-        """Linear between the moments given, and as the last one says after it."""
+        """Return the feed at a time: linear between the given times, constant after the last."""
         return float(np.interp(time, self._time, self._value))
 
-    def add(self, time: float, short: float) -> None:
-        """Until `time`, push on by a part of what the model is `short` by."""
+    def add(self, time: float, shortening: float) -> None:
+        """Advance further until `time`, by a share of the shortening that the model predicts (m)."""
         self._time.append(time)
-        self._value.append(self._value[-1] + _FEED_GAIN * short)
+        self._value.append(self._value[-1] + _FEED_GAIN * shortening)
 
 
-class _PushedMotion(SyntheticMotion):
-    """A base that is pushed along the inlet while a hand moves it besides."""
+class _AdvancedMotion(SyntheticMotion):
+    """A base that is advanced along the inlet, in addition to the motion of the hand."""
 
     def __init__(self, reach: Reach, length: float, hand: BaseMotion, feed: Feed):
         self._reach, self._length, self._hand, self._feed = reach, length, hand, feed
@@ -117,26 +119,26 @@ class _PushedMotion(SyntheticMotion):
 
 @dataclass(frozen=True)
 class Reached:
-    """What came of a run, all in the lumen's frame; t samples. `clearance` and `deviation` in m, `camera` in rad, tip_error in soft_base."""
+    """Outcome of a run with t samples, in SI units and the lumen's frame; tip_error and lateral in soft_base."""
 
     reach: Reach
     time: np.ndarray  # (t,)
     depth: np.ndarray  # (t,)
     tip: np.ndarray  # (t, 3)
     body: np.ndarray  # (t, b, 3)
-    clearance: np.ndarray  # (t,) least distance from the wall inside the lumen
-    deviation: np.ndarray  # (t,) tip from the centreline
-    camera: np.ndarray  # (t,) tip's direction against the centreline's
-    tip_error: np.ndarray  # (t,) tip from what was asked for in soft_base
-    lateral: np.ndarray  # (t,) its part across the direction asked for
+    clearance: np.ndarray  # (t,) smallest distance to the wall inside the lumen
+    deviation: np.ndarray  # (t,) distance of the tip from the centreline
+    camera: np.ndarray  # (t,) angle between tip direction and centreline
+    tip_error: np.ndarray  # (t,) distance of the tip from its target
+    lateral: np.ndarray  # (t,) part of the tip error across the target direction
 
 
 WITHOUT, HELD, FED = "without", "with", "with, base fed"
-"""Ways to reach: without compensation; with; with, and the base pushed on by what the model is short by."""
+"""Ways to reach: without compensation; with it; with it and the base advanced by the predicted shortening."""
 
 
 def run_reach(job: tuple[Setup, Reach, str]) -> Reached:
-    """Reach through in one of the three ways."""
+    """Run one reach in one of the three ways."""
     setup, reach, way = job
     feed = Feed()
     motion = reach.motion(setup.robot.length, setup.seed, feed)
@@ -144,15 +146,18 @@ def run_reach(job: tuple[Setup, Reach, str]) -> Reached:
     while loop.time < REST + reach.duration - 1e-9:
         target = target_at(setup, reach, float(reach.depth(loop.time)), feed.at(loop.time))
         if way == FED:
-            feed.add(loop.time + _TARGET_STEPS, float((target.tip_position - loop.shape.tip_position) @ target.tip_direction))
+            assert loop.shape is not None and target.tip_direction is not None
+            shortening = float((target.tip_position - loop.shape.tip_position) @ target.tip_direction)
+            feed.add(loop.time + _TARGET_STEPS, shortening)
         loop.hold(target, weightless=way == WITHOUT)
         loop.run(_TARGET_STEPS)
-    return _judged(setup, reach, loop.trace.between(REST), motion, feed)
+    return _evaluated(setup, reach, loop.trace.between(REST), motion, feed)
 
 
 def target_at(setup: Setup, reach: Reach, depth: float, feed: float = 0.0) -> Target:
-    """The shape on the centreline with the tip at the arc length `depth`, in soft_base of a base that is held as it should be and fed by
-    `feed` (m).
+    """Return the target shape: on the centreline, with the tip at arc length `depth` (m), in soft_base without tremor.
+
+    feed: additional advance of the base, m.
     """
     length, lumen = setup.robot.length, reach.lumen
     base = depth - length + feed
@@ -167,7 +172,7 @@ def target_at(setup: Setup, reach: Reach, depth: float, feed: float = 0.0) -> Ta
     )
 
 
-def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion, feed: Feed) -> Reached:
+def _evaluated(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion, feed: Feed) -> Reached:
     lumen, robot = reach.lumen, setup.robot
     rows = slice(0, len(trace.time), 5)
     time, depth = trace.time[rows], reach.depth(trace.time[rows])
@@ -178,7 +183,7 @@ def _judged(setup: Setup, reach: Reach, trace: Trace, motion: BaseMotion, feed: 
     tip = body[:, -1]
     camera = np.einsum("tij,tj->ti", turn, trace.tip_direction[rows])
     room = 0.5 * (lumen.diameter - robot.segments[0].outer_diameter) - lumen.distance(body)
-    # Only what has entered the mouth can touch the wall.
+    # Only the part inside the lumen can touch the wall.
     clearance = np.where(body[:, :, 2] >= 0.0, room, np.inf).min(axis=1)
     targets = [target_at(setup, reach, float(d), feed.at(float(t))) for d, t in zip(depth, time)]
     wanted, along = (np.array(column) for column in zip(*((t.tip_position, t.tip_direction) for t in targets)))

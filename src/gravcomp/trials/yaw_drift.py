@@ -1,8 +1,8 @@
-"""The article's comparison: yaw over nine minutes with and without filter and heating, at rest and turning at 23 deg/s.
+"""The article's comparison: yaw drift over nine minutes with and without filter and heating, at rest and turning at 23 deg/s.
 
-The IMU is the virtual board (noise, bias, temperature coefficient, quantisation, heater and ambient), read through its CAN frames.
-It was stored at 20 degC and lies in a room of 28 degC, so that without heating it is still warming. After two minutes at rest, yaw
-is compared with the truth for nine minutes. Without the filter the raw rate is integrated.
+The IMU is the virtual board (noise, bias, temperature coefficient, quantisation, heater and ambient temperature), read through
+its CAN frames. It was stored at 20 degC and is in a room of 28 degC, so that it still warms up without heating. After two
+minutes at rest, yaw is compared with the ground truth for nine minutes. Without the filter the raw rate is integrated.
 """
 
 import math
@@ -28,19 +28,19 @@ REST, DURATION = 120.0, 540.0  # s
 
 @dataclass(frozen=True, slots=True)
 class BoardSample:
-    """One sample as a host on the bus decodes it, and the chip's true temperature."""
+    """One sample as decoded from the bus, and the true temperature of the chip."""
 
     stamp_ns: int
     gyro: tuple[float, float, float]  # rad/s
     accel: tuple[float, float, float]  # m/s^2
-    temperature: float  # degC, as the chip says
+    temperature: float  # degC, as reported by the chip
     true_temperature: float  # degC
 
 
 def board_samples(
     board: Board, heater: HeaterOptions | None, duration: float, rate_at: Callable[[float], float], seed: int
 ) -> Iterator[BoardSample]:
-    """Samples of a tilted virtual board that turns about the vertical with rate_at(t) rad/s; `heater` None: never heated."""
+    """Yield samples of a tilted virtual board that turns about the vertical at rate_at(t) rad/s; heater None: no heating."""
     virtual = VirtualBoard(board, np.random.default_rng(seed))
     control = HeaterControl(heater) if heater is not None else None
     up = np.array(quat.rotate(quat.conjugate(TILT), (0.0, 0.0, 1.0)))
@@ -62,16 +62,14 @@ def board_samples(
 
 
 def ablation(progress: Callable[[str], None], *, duration: float = DURATION, rest: float = REST, seed: int = 1) -> dict:
-    """For each motion and pipeline: `yaw_drift_deg` largest over the time, `yaw_drift_30s_deg` largest within 30 s."""
+    """Return the largest yaw drift per motion and pipeline: `yaw_drift_deg` over the run, `yaw_drift_30s_deg` within 30 s."""
     board = replace(Board(), thermal=ThermalPlantOptions(ambient=ROOM, start=COLD))
     figures: dict = {}
     for motion, rate in (("static", 0.0), ("rotating_23_deg_s", RATE)):
         for heated in (True, False):
             heating = "heating" if heated else "no_heating"
             progress(f"yaw over {duration / 60:.0f} min, {motion.replace('_', ' ')}, {heating.replace('_', ' ')}")
-            samples = board_samples(
-                board, HeaterOptions() if heated else None, rest + duration, lambda t, rate=rate: rate if t > rest else 0.0, seed
-            )
+            samples = board_samples(board, HeaterOptions() if heated else None, rest + duration, turning_after(rest, rate), seed)
             errors = yaw_errors(samples, rate, rest)
             for name, error in errors.items():
                 since = np.degrees(np.unwrap(error))
@@ -82,8 +80,13 @@ def ablation(progress: Callable[[str], None], *, duration: float = DURATION, res
     return figures
 
 
+def turning_after(rest: float, rate: float) -> Callable[[float], float]:
+    """Return the rate over time of a board that is at rest for `rest` s and then turns at `rate`."""
+    return lambda time: rate if time > rest else 0.0
+
+
 def yaw_errors(samples: Iterator[BoardSample], rate: float, rest: float) -> dict[str, np.ndarray]:
-    """Yaw minus true yaw after the rest, rad, of the filter and of the integrated raw rate."""
+    """Return yaw minus true yaw (rad) after `rest` s, for the filter and for the integrated raw rate."""
     estimator = GravityEstimator(EstimatorOptions())
     delay = estimator.options.filter.sensor.delay
     raw = TILT
@@ -95,7 +98,7 @@ def yaw_errors(samples: Iterator[BoardSample], rate: float, rest: float) -> dict
         time = sample.stamp_ns * 1e-9
         if time > rest and not isinstance(estimate, Problem):
             true = quat.exponential(0.0, 0.0, rate * (time - rest))
-            # The virtual board has no delay that would have to be made good.
+            # The filter compensates a delay of the sensor, which the virtual board does not have.
             ahead = quat.exponential(0.0, 0.0, -rate * delay)
             filtered.append(_yaw_between(quat.multiply(ahead, estimate.imu.orientation), true))
             integrated.append(_yaw_between(raw, true))
@@ -103,7 +106,7 @@ def yaw_errors(samples: Iterator[BoardSample], rate: float, rest: float) -> dict
 
 
 def _yaw_between(orientation: quat.Quaternion, true_turn: quat.Quaternion) -> float:
-    """The turn about the vertical between the orientation and the tilted sensor after its true turn, rad."""
+    """Return the rotation about the vertical (rad) from the true orientation of the tilted sensor to the estimated one."""
     w, _, _, z = quat.multiply(orientation, quat.conjugate(quat.multiply(true_turn, TILT)))
     return 2.0 * math.atan2(z, w)
 

@@ -47,7 +47,7 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.model import RobotModel
     from gravcomp.reduction import load
-    from gravcomp.training import build
+    from gravcomp.training.build import alone, build
 
     model = RobotModel(load_robot_file(robot).robot)
     reduction = None if force else load(model)
@@ -56,7 +56,13 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     columns = TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("training", total=1.0)
-        reduction, seconds = build(model, progress=lambda stage, share: progress.update(task, description=stage, completed=share))
+        with alone(model, lambda: progress.update(task, description="waiting for another build")):
+            reduction = None if force else load(model)
+            if reduction is not None:
+                return model, reduction, 0.0
+            reduction, seconds = build(
+                model, progress=lambda stage, share: progress.update(task, description=stage, completed=share)
+            )
     return model, reduction, seconds
 
 

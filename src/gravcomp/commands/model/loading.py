@@ -69,7 +69,8 @@ def _reached(
     from gravcomp.inverse import InverseController, Target
 
     weight = 0.01 if direction is not None else 0.0
-    wanted = Target(1e-3 * np.array(target), tip_direction=direction, tip_direction_weight=weight)
+    towards = None if direction is None else np.array(direction)
+    wanted = Target(1e-3 * np.array(target), tip_direction=towards, tip_direction_weight=weight)
     controller = InverseController(simulator.robot)
     shape = simulator.solve(gravity)
     before = shape.tip_position

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from gravcomp.mesh import Mesh
 
 # Corners of an element's faces, in VTK's node order.
-_FACES = {
+_FACES: dict[str, list[tuple[int, ...]]] = {
     "hex20": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
     "tet10": [(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
 }
