@@ -1,0 +1,88 @@
+"""Configuration of Sphinx for `./gravcomp docs`, which reads a copy of the repository."""
+
+import re
+from pathlib import Path
+from types import GenericAlias
+from typing import Any
+
+from gravcomp import __version__
+
+project = "gravcomp"
+copyright = "gravcomp maintainers"
+version = release = __version__
+
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser"]
+root_doc = "src/doc/api/index"
+include_patterns = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "gravcomp_*/README.md",
+    "src/README.md",
+    "src/doc/**",
+    "src/gravcomp/canbus/*.md",
+]
+templates_path = [str(Path(__file__).parent / "templates")]  # autosummary takes relative ones from the sources
+exclude_patterns = ["src/doc/api/templates", "**/test/**", ".*"]
+
+autosummary_generate = True
+# An object is described where it is defined, not again in the packages that export it.
+autodoc_default_options = {"members": True, "undoc-members": True, "ignore-module-all": True}
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+# In docstrings `name` is code.
+default_role = "code"
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+myst_fence_as_directive = []
+# Links to source files and folders lead nowhere in HTML; test/test_documents.py checks that their targets exist.
+# In annotations Sphinx cannot tell the built-in `type` from an attribute of that name.
+suppress_warnings = ["myst.xref_missing", "myst.header", "misc.highlighting_failure", "ref.python"]
+
+html_theme = "alabaster"
+html_title = f"gravcomp {release}"
+html_show_copyright = False
+
+_SECTION = re.compile(r"^\s*-{3,}\s*$")
+
+
+def plain_text(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Turn the prose of a docstring into reStructuredText: indented blocks become literal, other markup is escaped.
+
+    Docstrings with sections of numpydoc are left to numpydoc.
+    """
+    if any(_SECTION.match(line) for line in lines) or any(line.lstrip().startswith(">>>") for line in lines):
+        return
+    text, literal = [], False
+    for line in lines:
+        indented = line.startswith("  ") and bool(line.strip())
+        if indented and not literal:
+            text += ["", "::", ""]
+        elif literal and line.strip() and not indented:
+            text.append("")
+        literal = indented or (literal and not line.strip())
+        text.append(line if literal else _escaped(line))
+    lines[:] = text
+
+
+def _escaped(line: str) -> str:
+    """Escape what reStructuredText would read as markup, except in `code`."""
+    parts = line.split("`")
+    if len(parts) % 2 == 0:  # an unpaired backtick
+        return re.sub(r"([*|`_\\])", r"\\\1", line)
+    for index in range(0, len(parts), 2):
+        parts[index] = re.sub(r"([*|\\]|_(?=\W|$))", r"\\\1", parts[index])
+    return "`".join(parts)
+
+
+def skip_aliases(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out names of types as `dict[int, float]`, which Sphinx takes for classes and fails to describe."""
+    return True if isinstance(obj, GenericAlias) else None
+
+
+def setup(app: Any) -> None:
+    """Register the hooks; the conversion comes before numpydoc's."""
+    app.connect("autodoc-skip-member", skip_aliases)
+    app.connect("autodoc-process-docstring", plain_text, priority=400)
