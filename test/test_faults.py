@@ -1,4 +1,4 @@
-"""The running graph under faults: the bus is the judge. The whole campaign is `./gravcomp bench faults`."""
+"""The running graph under faults, observed on the bus. The whole campaign is `./gravcomp bench faults`."""
 
 import signal
 import time
@@ -6,7 +6,9 @@ import time
 import numpy as np
 import pytest
 
-from gravcomp.bench.faults import CASES, Campaign, Case
+from gravcomp.bench.campaign import Campaign
+from gravcomp.bench.fault_cases import CASES, send_signal
+from gravcomp.bench.hostile_frames import send_hostile_frames
 from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.motors.state import State
 
@@ -25,7 +27,7 @@ def driving(campaign):
     """Every test begins with a bridge that follows commands and ends with one that does so again."""
     assert campaign.make_active()
     yield
-    campaign.mend()
+    campaign.clear_faults()
     campaign.note_dead()
     assert campaign.make_active()
     assert campaign.crashes == [] and campaign.monitor.violations == 0
@@ -36,15 +38,13 @@ def driving(campaign):
 )
 def test_a_fault_leads_to_zero_current_or_holding(campaign, name):
     case = next(case for case in CASES if case.name == name)
-    assert campaign.time_to_safe(case) is not None
+    assert case.time_to_safe(campaign) is not None
 
 
 @pytest.mark.parametrize("executable", ["can_bridge", "virtual_robot", "inverse_controller"])
 def test_a_killed_process_may_be_started_again(campaign, executable):
-    case = Case(
-        executable, lambda c: c.graph.process(executable).send_signal(signal.SIGKILL), zero=executable != "inverse_controller"
-    )
-    assert campaign.time_to_safe(case) is not None
+    kill = send_signal(executable, signal.SIGKILL)
+    assert campaign.time_to_safe(kill, zero=executable != "inverse_controller") is not None
     campaign.graph.restart(executable)
     assert campaign.make_active()
 
@@ -65,6 +65,6 @@ def test_a_killed_bridge_comes_back_with_the_cables_zeros(campaign):
 
 
 def test_hostile_frames_and_messages_end_no_process(campaign):
-    campaign.hostile_frames(5000)
+    send_hostile_frames(campaign.monitor.link, campaign.random, 5000)
     campaign.probe.flood(500)
     assert campaign.graph.dead() == {}

@@ -1,4 +1,4 @@
-"""Figures told with their limits: on the terminal, and in the document that a command renews."""
+"""Figures with their limits: on the terminal, and in the document that a command updates."""
 
 import pytest
 
@@ -17,7 +17,8 @@ def test_every_benchmark_has_its_figures():
 
 def test_a_figure_is_found_below_its_key_and_a_list_counts():
     figures = limits.figures("faults", {"crashes": 2, "safe_ms": {"stop": 12.5}, "not_safe": ["stall", "bus-off"]})
-    assert {f.name: f.value for f in figures} == {"crashes": 2, "stop to zero current": 12.5, "faults without a safe answer": 2}
+    values = {"crashes": 2, "time from stop to zero current": 12.5, "faults without a safe response": 2}
+    assert {f.name: f.value for f in figures} == values
     assert [f.reached for f in figures] == [False, False, True]
 
 

@@ -1,1 +1,1 @@
-"""Benchmarks, one module each: `run(progress) -> dict` of figures."""
+"""Benchmarks, one module each with `run(progress)`, which returns the figures as a dict."""

@@ -1,7 +1,7 @@
-"""The engine: accuracy against CalculiX, cost of a closed-loop step, the article's baseline, scaling, dynamics.
+"""Model and inverse problem: accuracy against CalculiX, cost of a closed-loop step, the article's baseline, scaling, dynamics.
 
-A closed-loop step is the model (assembly, factorisation, cables, condensed compliance) and the inverse problem that keeps the
-straight tip while gravity turns at 10 deg/s, at 100 steps a second.
+A closed-loop step consists of the model (assembly, factorisation, cables, condensed compliance) and the inverse problem that
+keeps the tip straight while gravity turns at 10 deg/s, at 100 steps per second.
 """
 
 import dataclasses
@@ -14,6 +14,7 @@ from gravcomp.bench import engine_control
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
+from gravcomp.full_model.motion import Motion
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion
@@ -23,13 +24,13 @@ from gravcomp.simulation import RobotModel, Simulator
 Progress = Callable[[str], None]
 
 _GRAVITY = 9.81
-_RATE, _TURN = 100.0, np.deg2rad(10.0)  # steps a second, rad/s
-# The article's mesh has 4,788 linear tetrahedra; six to a cell of this grid make 4,752.
+_RATE, _TURN = 100.0, np.deg2rad(10.0)  # steps per second, rad/s
+# The article's mesh has 4,788 linear tetrahedra; this grid has 4,752, six per cell.
 _TET4 = {"around": 12, "along": 33, "radial": 2}
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """All figures, on every `every`-th of the rows, directions and steps; see the functions below."""
+    """Return all figures, computed on every `every`-th of the rows, directions and steps; see the functions below."""
     return {
         **calculix_error(progress, every),
         **full_step(progress),
@@ -43,7 +44,7 @@ def run(progress: Progress, *, every: int = 1) -> dict:
 
 
 def calculix_error(progress: Progress, every: int = 1) -> dict:
-    """`calculix_error_pct`: the worst tip error against every row of the table, in percent of the length."""
+    """Return `calculix_error_pct`: the worst tip error over the rows of the table, in percent of the length."""
     worst = 0.0
     rows = stored_rows()[::every]
     for number, row in enumerate(rows, 1):
@@ -55,20 +56,22 @@ def calculix_error(progress: Progress, every: int = 1) -> dict:
 
 
 def full_step(progress: Progress) -> dict:
-    """`full_step_ms`: one closed-loop step of the full model, median and p99."""
+    """Return `full_step_ms`: one closed-loop step of the full model, median and p99."""
     progress("full model, closed loop")
     return {"full_step_ms": _statistics(closed_loop(Simulator(_article(), reduced=False), steps=400))}
 
 
 def tet4_step(progress: Progress, every: int = 1) -> dict:
-    """`tet4_step_ms`, the same loop on the article's kind of mesh, `speedup_over_tet4` of the full model over it in the same run,
-    and the tips of both hanging horizontally, released: `tet4_sag_mm`, `full_sag_mm`.
+    """Return the figures of a mesh of linear tetrahedra, as in the article.
+
+    `tet4_step_ms`: one closed-loop step; `speedup_over_tet4`: of the full model, in the same run; `tet4_sag_mm`, `full_sag_mm`:
+    deflection of the tip of both, horizontal and released.
     """
     progress("linear tetrahedra, the article's kind of mesh")
     robot = _article()
     baseline = Simulator(RobotModel(robot, tube_mesh(robot, "tet4", **_TET4)), reduced=False)
     full = Simulator(robot, reduced=False)
-    sag = [s.solve([-_GRAVITY, 0.0, 0.0]).tip_position[0] for s in (baseline, full)]
+    sag = [s.solve(np.array([-_GRAVITY, 0.0, 0.0])).tip_position[0] for s in (baseline, full)]
     slow, fast = closed_loop(baseline, 60 // every, 50 // every), closed_loop(full, 200)
     return {
         "tet4_step_ms": _statistics(slow),
@@ -79,7 +82,7 @@ def tet4_step(progress: Progress, every: int = 1) -> dict:
 
 
 def scaling(progress: Progress, every: int = 1) -> dict:
-    """`scaling`: model step in ms over elements along the robot and over the number of cables, with the exponents."""
+    """Return `scaling`: ms of a model step over elements along the robot and over the number of cables, with exponents."""
     robot = _article()
     along = {}
     for count in (10, 20, 40, 80)[: max(2, 4 // every)]:
@@ -102,14 +105,16 @@ def scaling(progress: Progress, every: int = 1) -> dict:
 
 
 def dynamics(progress: Progress) -> dict:
-    """The robot let go straight and horizontal, 0.6 s, worst tip against the full model at steps of 0.5 ms: `dynamics_error_mm` of
-    the reduced model at 10 ms, `dynamics_full_error_mm` of the full one; `dynamics_step_ms` and `dynamics_full_step_ms`: one step.
+    """Return the figures of a free fall of 0.6 s, from the straight horizontal robot.
+
+    `dynamics_error_mm`, `dynamics_full_error_mm`: worst tip error of reduced and full model at steps of 10 ms, against the full
+    model at 0.5 ms; `dynamics_step_ms`, `dynamics_full_step_ms`: one step.
     """
     model = RobotModel(_article())
     progress("dynamics, reference")
     reference, _ = _fall(DynamicSolver(model), model, 0.5e-3)
     progress("dynamics, 10 ms")
-    figures = {}
+    figures: dict = {}
     for name, solver in (("dynamics", engine_control.reduced_motion(model, progress)), ("dynamics_full", DynamicSolver(model))):
         coarse, times = _fall(solver, model, 10e-3)
         error = np.linalg.norm(coarse - reference[19::20], axis=1).max()
@@ -118,7 +123,7 @@ def dynamics(progress: Progress) -> dict:
 
 
 def closed_loop(simulator: Simulator, steps: int, warm_up: int = 50) -> np.ndarray:
-    """(steps,) s that each closed-loop step takes, model and inverse problem, after `warm_up` steps more."""
+    """Return the time (steps,) in s of each closed-loop step, model and inverse problem, after `warm_up` further steps."""
     robot = simulator.robot
     controller = InverseController(robot)
     target = straight_target(robot.length)
@@ -136,7 +141,7 @@ def closed_loop(simulator: Simulator, steps: int, warm_up: int = 50) -> np.ndarr
 
 
 def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """Tip positions (k, 3) of the robot let go straight and horizontal, its cables released, and what each step takes (k,) in s."""
+    """Return tip positions (k, 3) in m of a free fall with released cables, and the time (k,) in s of each step."""
     gravity = np.array([-_GRAVITY, 0.0, 0.0])
     nodes = model.mesh.nodes
 
@@ -156,17 +161,18 @@ def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: fl
         times.append(time.perf_counter() - begin)
         if not motion.converged:
             raise ArithmeticError(f"a step of {1e3 * h:g} ms did not converge")
-        tips.append(
-            solver.model.tip(motion.q) if isinstance(motion, ReducedMotion) else model.effectors.sections(nodes + motion.u)[-1, 0]
-        )
+        if isinstance(solver, ReducedDynamicSolver) and isinstance(motion, ReducedMotion):
+            tips.append(solver.model.tip(motion.q))
+        elif isinstance(motion, Motion):
+            tips.append(model.effectors.sections(nodes + motion.u)[-1, 0])
     return np.array(tips), np.array(times)
 
 
 def _model_step(robot: Robot) -> float:
-    """Median ms of the model's step while gravity turns and every third cable is taut."""
+    """Return the median ms of a model step while gravity turns and every third cable is taut."""
     simulator = Simulator(robot, reduced=False)
     tension = np.where(np.arange(len(robot.cables)) % 3 == 0, 0.2 * 3 / len(robot.cables), 0.0)
-    simulator.solve([-_GRAVITY, 0.0, 0.0], tension=tension)
+    simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]), tension=tension)
     times = []
     for step in range(30):
         angle = _TURN * step / _RATE
@@ -176,7 +182,7 @@ def _model_step(robot: Robot) -> float:
 
 
 def _exponent(times: dict[int, float]) -> float:
-    """Slope of log time over log size."""
+    """Return the slope of log time over log size."""
     return round(float(np.polyfit(np.log(list(times)), np.log(list(times.values())), 1)[0]), 3)
 
 
@@ -185,7 +191,7 @@ def _statistics(times: np.ndarray) -> dict:
 
 
 def _reference_tube(row: Row) -> Robot:
-    """The tube that CalculiX computed, without cables."""
+    """Return the tube of the CalculiX computation, without cables."""
     article = _article()
     segments = tuple(
         dataclasses.replace(s, outer_diameter=REFERENCE["outer_diameter"], lumen_diameter=REFERENCE["inner_diameter"])

@@ -1,9 +1,7 @@
-"""The reduced model and the inverse problem: cost of a closed-loop step, error against the full model, what
-compensation leaves.
-"""
+"""Reduced model and inverse problem: cost of a closed-loop step, error against the full model, error after compensation."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -16,23 +14,25 @@ from gravcomp.training import build
 
 Progress = Callable[[str], None]
 
-_GRAVITY, _RATE = 9.81, 100.0  # m/s^2, steps a second
+_GRAVITY, _RATE = 9.81, 100.0  # m/s^2, steps per second
 _DIRECTIONS, _SETTLING = 200, 80
 # A weight of 1e-3 m^2 makes 0.1 rad of tilt count like 3 mm.
 _DIRECTION_WEIGHT = 1e-3
 
 
 def reduced_model(progress: Progress, every: int = 1) -> dict:
-    """`reduction_build_s` (0: was built before); `reduced_step_ms`: one closed-loop step, model and inverse problem,
-    and `inverse_us`: the inverse problem alone, both while gravity turns at random at 10 deg/s; `reduced_error_mm`:
-    worst tip distance from the full model under the same commands at 10 and 90 deg/s; `reduced_share`: of the steps
-    that the reduced model served.
+    """Return the figures of the reduced model in the closed loop.
+
+    `reduction_build_s`: time to build it (0: it existed); `reduced_step_ms`: one closed-loop step, and `inverse_us`: the
+    inverse problem, both while gravity turns about random axes at 10 deg/s; `reduced_error_mm`: worst tip error against the
+    full model with the same commands, at 10 and 90 deg/s; `reduced_share`: share of the steps computed with the reduced model.
     """
     robot = load_robot_file("article").robot
     model = RobotModel(robot)
     seconds = _build_if_needed(model, progress)
     target = straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
-    steps, solves, served, errors = [], [], [], {}
+    steps, solves, served = [], [], []
+    errors: dict[int, float] = {}
     for rate in (10, 90):
         for seed in range(0, 3, every):
             progress(f"reduced model at {rate} deg/s, path {seed + 1} of 3")
@@ -54,29 +54,34 @@ def reduced_model(progress: Progress, every: int = 1) -> dict:
 
 
 def reduced_motion(model: RobotModel, progress: Progress) -> ReducedDynamicSolver:
-    """The model's motion in reduced coordinates."""
+    """Return the dynamic solver of the reduced model."""
     _build_if_needed(model, progress)
-    reduced = load(model).reduced_model(model)
+    reduction = load(model)
+    assert reduction is not None  # it has just been built
+    reduced = reduction.reduced_model(model)
     mass = reduced.basis.T @ model.mass_matrix().multiply(reduced.basis)
     return ReducedDynamicSolver(reduced, mass, model.mesh.materials[0].damping_time, model.length)
 
 
 def compensation(progress: Progress, every: int = 1) -> dict:
-    """What the full model says of the displacements found, over random directions of gravity: `inverse_lateral_mm`
-    (position alone is kept), and with a weight on the tip's direction `inverse_tilt_deg` and
-    `inverse_lateral_with_direction_mm`; `inverse_shortening_mm`: the axial error left; `inverse_least_tension_n`:
-    largest, over directions, of the least tension in a segment: cables that pull against each other.
+    """Return the errors of the full model with the computed displacements, over random directions of gravity.
+
+    `inverse_lateral_mm`: without a weight on the tip direction; `inverse_tilt_deg`, `inverse_lateral_with_direction_mm`: with it;
+    `inverse_shortening_mm`: remaining axial error; `inverse_least_tension_n`: the smallest tension of a segment, largest over the
+    directions, which shows cables that pull against each other.
     """
     robot = load_robot_file("article").robot
     simulator, full = Simulator(robot), Simulator(robot, reduced=False)
-    lateral, lateral_tilted, tilt, shortening, least = [], [], [], [], []
+    lateral: list[float] = []
+    lateral_tilted: list[float] = []
+    tilt, shortening, least = [], [], []
     for number, gravity in list(enumerate(_directions(_DIRECTIONS)))[::every]:
         progress(f"compensation, direction {number + 1} of {_DIRECTIONS}")
         for weight in (0.0, _DIRECTION_WEIGHT):
             target = straight_target(robot.length, tip_direction_weight=weight)
             *_, (_, command) = closed_loop(simulator, [gravity] * _SETTLING, target)
             shape = full.step(gravity, command.displacement)
-            (lateral_tilted if weight else lateral).append(np.linalg.norm(shape.tip_position[:2]))
+            (lateral_tilted if weight else lateral).append(float(np.linalg.norm(shape.tip_position[:2])))
             if weight:
                 tilt.append(np.degrees(np.arctan2(np.linalg.norm(shape.tip_direction[:2]), shape.tip_direction[2])))
                 shortening.append(robot.length - shape.tip_position[2])
@@ -91,9 +96,10 @@ def compensation(progress: Progress, every: int = 1) -> dict:
 
 
 def extreme_targets(progress: Progress, every: int = 1) -> dict:
-    """Targets that no shape has, or that only a robot bent right round has, each for 6 s, then the straight one for 6 s more:
-    `extreme_step_ms`, the longest step of the model; `extreme_back_mm`: worst distance of the tip from where it was when the robot was
-    held straight from the start.
+    """Return the figures of unreachable targets and of very large bends, each for 6 s, followed by the straight target for 6 s.
+
+    `extreme_step_ms`: the longest step of the model; `extreme_back_mm`: worst final distance of the tip from its position in a
+    run with the straight target only.
     """
     robot = load_robot_file("article").robot
     simulator, straight = Simulator(robot), straight_target(robot.length, tip_direction_weight=_DIRECTION_WEIGHT)
@@ -112,8 +118,10 @@ def extreme_targets(progress: Progress, every: int = 1) -> dict:
     return {"extreme_step_ms": round(1e3 * longest, 1), "extreme_back_mm": round(1e3 * float(max(distances)), 3)}
 
 
-def closed_loop(simulator: Simulator, gravities, target: "Target | list[Target]"):
-    """Yields shape and command of each step of the loop, from the released robot; one target, or one a step."""
+def closed_loop(
+    simulator: Simulator, gravities: Iterable[np.ndarray], target: Target | list[Target]
+) -> Iterator[tuple[Shape, Command]]:
+    """Yield shape and command of each step, starting with the released robot; target: one, or one per step."""
     targets = itertools.repeat(target) if isinstance(target, Target) else target
     controller = InverseController(simulator.robot)
     simulator.reset()
@@ -133,7 +141,7 @@ def closed_loop(simulator: Simulator, gravities, target: "Target | list[Target]"
 
 
 def _build_if_needed(model: RobotModel, progress: Progress) -> float:
-    """s that it took to build the reduced model; 0 where there is one."""
+    """Build the reduced model if there is none; return the time in s, or 0."""
     if load(model) is not None:
         return 0.0
     progress("building the reduced model")
@@ -141,7 +149,7 @@ def _build_if_needed(model: RobotModel, progress: Progress) -> float:
 
 
 def random_path(rate: float, steps: int, seed: int) -> np.ndarray:
-    """Gravity (steps, 3) that turns at `rate` (rad/s) about an axis that changes every second."""
+    """Return gravity (steps, 3) in m/s^2 that turns at `rate` (rad/s) about a random axis, which changes every second."""
     rng = np.random.default_rng(seed)
     gravity = _GRAVITY * _unit(rng)
     path = []
@@ -156,7 +164,7 @@ def random_path(rate: float, steps: int, seed: int) -> np.ndarray:
 
 
 def _worst_error(robot: Robot, gravities: np.ndarray, loop: list[tuple[Shape, Command]]) -> float:
-    """Worst distance (m) of the loop's tips from those of the full model under the same displacements."""
+    """Return the worst distance (m) of the loop's tips from those of the full model with the same displacements."""
     full = Simulator(robot, reduced=False)
     displacement, worst = None, 0.0
     for gravity, (shape, command) in zip(gravities, loop):

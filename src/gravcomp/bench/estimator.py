@@ -1,7 +1,7 @@
-"""The sense of gravity: inclination on BROAD, against other filters, jitter, cost, temperature control and the article's ablation.
+"""Orientation estimate: inclination on BROAD, other filters, jitter, cost, temperature control and the article's ablation.
 
-BROAD's protocol: RMSE of the inclination over the moving part of each trial; 95.2 Hz is the mean of every three samples. One parameter set, the
-declared defaults, for everything. Without the recordings their figures are missing and `broad` says how to get them.
+BROAD's protocol is the RMSE of the inclination over the moving part of each trial; 95.2 Hz is the mean of every three samples.
+All figures use the default parameters. Without the recordings their figures are missing, and `broad` explains how to get them.
 """
 
 import math
@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gravcomp.bench.inclination_error import rmse_deg
 from gravcomp.bench.orientation_peers import run_peers
-from gravcomp.orientation import EstimatorOptions, FilterOptions, GravityEstimator, estimate_recording
-from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.orientation import EstimatorOptions, FilterOptions, GravityEstimate, GravityEstimator, estimate_recording
 from gravcomp.orientation.options import SensorOptions
 from gravcomp.orientation.prediction import PredictionOptions
 from gravcomp.recordings.imu import Recording, read_recording
@@ -30,7 +30,7 @@ CHUNK = 500  # samples
 
 
 def run(progress: Callable[[str], None], *, every: int = 1) -> dict:
-    """All figures of the estimator, on every `every`-th of the trials and of the minutes; see the keys' units in their names."""
+    """Return all figures of the estimator, on every `every`-th of the trials and of the minutes; the keys give the units."""
     figures: dict = {}
     files = broad_files()[::every]
     if files:
@@ -60,7 +60,7 @@ def _on_broad(low: dict[str, Recording], full: dict[str, Recording], progress: C
         for name, recording in recordings.items():
             progress(f"{name}, {key.removesuffix('_deg').replace('_', ' ')}")
             result = estimate_recording(recording, GravityEstimator(options))
-            trials[name][key] = _rmse_deg(result.orientation, recording)
+            trials[name][key] = rmse_deg(result.orientation, recording)
             if key == "95hz_deg":
                 jitter[name] = round(_jitter(result.gravity[_settled_rest(recording)]), 4)
     mean = {key: round(float(np.mean([t[key] for t in trials.values()])), 4) for key in variants}
@@ -80,23 +80,25 @@ def _on_broad(low: dict[str, Recording], full: dict[str, Recording], progress: C
 
 
 def _biased(recording: Recording) -> Recording:
-    """The recording with 1 deg/s of bias and a warm-up drift added to its rates."""
+    """Return the recording with 1 deg/s of bias and a warm-up drift added to its rates."""
     since = 1e-9 * (recording.stamp_ns - recording.stamp_ns[0])
     drift = (1.0 - np.exp(-since / WARM_UP_TIME))[:, None] * WARM_UP
     return replace(recording, gyro=recording.gyro + BIAS + drift)
 
 
 def _prediction(recordings: dict[str, Recording], progress: Callable[[str], None]) -> dict:
-    """What gravity given a horizon ahead gains against gravity given as it is, judged by the truth at that later time."""
-    errors = {"without_deg": [], "with_deg": []}
+    """Return the error of gravity with and without prediction, against the ground truth at the later time."""
+    errors: dict[str, list[float]] = {"without_deg": [], "with_deg": []}
+    horizon = 0.0
     for name, recording in recordings.items():
         progress(f"{name}, prediction")
         steps = round(HORIZON * recording.rate)
         horizon = steps / recording.rate
         options = EstimatorOptions(prediction=PredictionOptions(horizon=horizon))
         result = estimate_recording(recording, GravityEstimator(options))
+        assert recording.orientation is not None and recording.movement is not None  # every trial of BROAD has both
         later = recording.orientation[steps:]
-        # Without the turn about the vertical an orientation is its direction of gravity.
+        # Gravity depends on the orientation without its rotation about the vertical.
         for key, gravity in (("with_deg", result.gravity), ("without_deg", _gravity_of(result.orientation))):
             angle = _angle(gravity[:-steps], _gravity_of(later))
             counted = recording.movement[steps:] & np.isfinite(angle)
@@ -105,7 +107,7 @@ def _prediction(recordings: dict[str, Recording], progress: Callable[[str], None
 
 
 def _gravity_of(orientation: np.ndarray) -> np.ndarray:
-    """Direction of gravity in the sensor's frame, (n, 3)."""
+    """Return the direction of gravity (n, 3) in the sensor's frame."""
     w, x, y, z = orientation.T
     return -np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
 
@@ -114,31 +116,30 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
-def _rmse_deg(orientation: np.ndarray, recording: Recording) -> float:
-    return round(float(np.degrees(inclination_rmse(orientation, recording.orientation, recording.movement))), 4)
-
-
 def _settled_rest(recording: Recording) -> np.ndarray:
-    """From 10 s on until 2 s before the first motion, (n,) bool."""
+    """Return the samples from 10 s on until 2 s before the first motion, (n,) bool."""
+    assert recording.movement is not None  # every trial of BROAD has it
     first_motion = int(np.argmax(recording.movement))
     index = np.arange(len(recording))
     return (index > 10.0 * recording.rate) & (index < first_motion - 2.0 * recording.rate)
 
 
 def _jitter(gravity: np.ndarray) -> float:
-    """RMS angle of the directions about their mean, degrees."""
+    """Return the RMS angle of the directions to their mean, deg."""
     return float(np.degrees(np.sqrt(np.mean(_angle(gravity, np.broadcast_to(gravity.mean(axis=0), gravity.shape)) ** 2))))
 
 
 def _virtual_jitter() -> float:
     estimator, gravity = GravityEstimator(), []
     for sample in board_samples(Board(), None, 40.0, lambda t: 0.0, seed=1):
-        gravity.append(estimator.update(sample.stamp_ns, sample.gyro, sample.accel).gravity)
+        estimate = estimator.update(sample.stamp_ns, sample.gyro, sample.accel)
+        assert isinstance(estimate, GravityEstimate)  # the virtual board's samples are valid
+        gravity.append(estimate.gravity)
     return round(_jitter(np.array(gravity[1000:])), 4)
 
 
 def _cost() -> float:
-    """Median over chunks of the processor time a sample takes, us, at 100 Hz, in motion."""
+    """Return the CPU time of a sample in us at 100 Hz in motion, median over chunks."""
     random = np.random.default_rng(1)
     count = 20 * CHUNK
     phase = 2.0 * math.pi * np.arange(count)[:, None] / 100.0 * np.array([0.3, 0.4, 0.5])
@@ -154,7 +155,7 @@ def _cost() -> float:
 
 
 def _thermal() -> dict:
-    """The virtual board heated from its ambient of 20 degC by 15 degC."""
+    """Return the figures of heating the virtual board from 20 degC by 15 degC."""
     options = HeaterOptions(margin=0.5)
     samples = list(board_samples(Board(), options, 300.0, lambda t: 0.0, seed=1))
     target = Board().thermal.ambient + options.rise

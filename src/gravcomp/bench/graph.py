@@ -1,7 +1,7 @@
-"""The running graph: delay from IMU frame to current frame, and what each process costs.
+"""The running graph: delay from IMU frame to current frame, CPU load and memory of each process.
 
-The delay is read from the bus (see gravcomp.evaluation.bus_delay): from the last frame of an IMU sample to the first current
-frame that it caused, through bridge, estimator, simulator and controller, with six motors feeding back at 500 Hz.
+The delay is measured on the bus (see gravcomp.evaluation.bus_delay), from the last frame of an IMU sample to the first current
+frame that it caused, through bridge, estimator, simulator and controller, with six motors at 500 Hz feedback.
 """
 
 import time
@@ -15,18 +15,19 @@ from gravcomp.evaluation.bus_delay import delays_of
 from gravcomp.launcher.virtual_graph import NODES, RunningGraph
 
 _WARM_UP, _LISTEN, _COST = 5.0, 10.0, 15.0  # s
-_LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as the demo's
+_LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as in the demo
 
 
 def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST) -> dict:
-    """`delay_ms` {median, p99, samples}, `bridge_cpu` (share of a core), `cpu` and `memory_mb` by process; `two_robots_hz`: commands
-    followed a second by each of two robots beside one another.
+    """Return `delay_ms` {median, p99, samples}, `bridge_cpu`, `cpu` and `memory_mb` by process, and `two_robots_hz`.
+
+    CPU loads are shares of a core; `two_robots_hz`: followed commands per second of each of two robots that run at the same time.
     """
     with RunningGraph() as graph:
         progress("starting the graph")
         graph.wait_for_commands()
         time.sleep(_WARM_UP)
-        progress(f"processor shares over {cost:.0f} s")
+        progress(f"CPU load over {cost:.0f} s")
         shares = _shares(graph, cost)
         progress(f"delays over {listen:.0f} s")
         delays = 1e3 * np.array(_delays(graph, listen))
@@ -69,7 +70,7 @@ def _delays(graph: RunningGraph, duration: float) -> list[float]:
 
 
 def _two_robots(duration: float) -> list[float]:
-    """Commands followed a second (Hz) by each of two robots in one graph, in namespaces and on buses of their own."""
+    """Return the followed commands per second of two robots at the same time, each with its own namespace and bus."""
     with RunningGraph(_LIGHT) as left, RunningGraph(_LIGHT) as right:
         graphs = (left, right)
         for graph in graphs:

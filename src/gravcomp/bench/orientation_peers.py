@@ -1,6 +1,7 @@
-"""Other six-axis filters on the same recordings, where their packages are installed: VQF (`vqf`), Madgwick and a textbook quaternion EKF (`ahrs`).
+"""Other six-axis filters on the same recordings, if their packages are installed.
 
-VQF with its default parameters; Madgwick with the gain its author gives for six axes; the EKF of `ahrs` with its defaults.
+VQF (`vqf`) with its default parameters; Madgwick (`ahrs`) with its author's gain for six axes; a textbook quaternion EKF (`ahrs`)
+with its defaults.
 """
 
 import importlib.util
@@ -8,12 +9,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.bench.inclination_error import rmse_deg
 from gravcomp.recordings.imu import Recording
 
 
 def run_peers(recordings: dict[str, Recording], progress: Callable[[str], None]) -> dict:
-    """Per filter the mean and each trial's inclination RMSE in degrees, or that it is not installed."""
+    """Return the inclination RMSE (deg) of each filter, mean and by trial, or a note that it is not installed."""
     figures: dict = {}
     for name, (package, run) in PEERS.items():
         if importlib.util.find_spec(package) is None:
@@ -22,8 +23,7 @@ def run_peers(recordings: dict[str, Recording], progress: Callable[[str], None])
         trials = {}
         for trial, recording in recordings.items():
             progress(f"{trial}, {name}")
-            rmse = inclination_rmse(run(recording), recording.orientation, recording.movement)
-            trials[trial] = round(float(np.degrees(rmse)), 4)
+            trials[trial] = rmse_deg(run(recording), recording)
         figures[name] = {"mean": round(float(np.mean(list(trials.values()))), 4), "trials": trials}
     return figures
 
@@ -45,7 +45,7 @@ def _madgwick(recording: Recording) -> np.ndarray:
 def _ekf(recording: Recording) -> np.ndarray:
     from ahrs.filters import EKF
 
-    # Its 'NED' is the frame in which a specific force that points up is at rest.
+    # In its frame 'NED' the specific force at rest points up.
     return EKF(gyr=recording.gyro, acc=recording.accel, frequency=recording.rate, frame="NED").Q
 
 

@@ -1,6 +1,7 @@
-"""The live page in a real browser, headless: how soon it is drawn, how often it is renewed, and what it costs the loop.
+"""The live page in a headless browser: time until it is drawn, update rate, and its effect on the delay of the loop.
 
-Without a graphics chip the browser draws with the processor that the loop runs on; that is a property of this machine and told with it.
+Without a graphics chip the browser draws on the CPU that also runs the loop, so the figures depend on the machine; `graphics`
+states which graphics were used.
 """
 
 import time
@@ -13,14 +14,17 @@ from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.view.browser import Browser, find_chromium
 from gravcomp.view.graphics import chosen
 
-_LIGHT = {"virtual_robot": {"feedback_rate": 125, "motion": "tremor", "truth_rate": 50.0}}  # as the demo's
+_LIGHT = {"virtual_robot": {"feedback_rate": 125, "motion": "tremor", "truth_rate": 50.0}}  # as in the demo
 _SETTLE = 5.0  # s
 _FRAMES = "window.gravcompFrames = 0; (function count() { window.gravcompFrames++; requestAnimationFrame(count) })()"
 
 
 def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
-    """`drawn_s`: from the start of all nodes until the page is drawn in a browser that is open already; `updates_hz`: what the page is sent a second; `animation_hz`: what the
-    browser draws at most; `delay_ms` of the loop, median and p99, `without` a viewer, `served` but looked at by nobody, `looked_at`.
+    """Return the figures of the page.
+
+    `drawn_s`: from the start of all nodes until an open browser has drawn the page; `updates_hz`: updates sent to the page;
+    `animation_hz`: frames drawn by the browser; `delay_ms` of the loop, median and p99: `without` a viewer, `served` without an
+    open page, `looked_at` with one.
     """
     if find_chromium() is None:
         return {"page": "no Chromium on this machine: apt-get install chromium"}
@@ -32,11 +36,11 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
     with Browser() as browser:
         begin = time.monotonic()
         with RunningGraph(_LIGHT, viewer=True) as graph:
-            progress("the page's start")
+            progress("start of the page")
             served = time.monotonic() - begin
             browser.open(graph.page)
             drawn = time.monotonic() - begin
-            progress("the page looked at")
+            progress("the page open")
             graph.wait_for_commands()
             time.sleep(_SETTLE)
             browser.page.evaluate(_FRAMES)
@@ -45,7 +49,7 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
             frames = browser.page.evaluate("window.gravcompFrames") - frames
             elapsed = time.monotonic() - since
             updates = (browser.received - received) / elapsed
-            progress("the page served, looked at by nobody")
+            progress("the page not open")
             browser.page.goto("about:blank")
             delays["served"] = _delays(graph, listen)
             graph.check()

@@ -1,29 +1,30 @@
-"""A long run of the graph: no command may get lost, no process may grow.
+"""A long run of the graph: no command must be lost, and no process must grow.
 
-Lost commands are those that the controller published and whose CommandTrace never came on the bus: overtaken in the
-middleware, or refused. Memory growth is the median of the resident set over the last tenth of the run minus that over the first
-tenth after the warm-up.
+A command is lost when the controller published it and its CommandTrace did not appear on the bus, because the middleware
+dropped it or the bridge refused it. Memory growth is the median resident set of the last tenth of the run minus that of the
+first tenth after the warm-up.
 """
 
 import statistics
 import time
 from collections.abc import Callable
 
-from gravcomp.bench.probe import CurrentMonitor, Probe
+from gravcomp.bench.current_monitor import CurrentMonitor
+from gravcomp.bench.probe import Probe
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
 from gravcomp.launcher.virtual_graph import NODES, START_TIMEOUT, RunningGraph
 
 _WARM_UP = 60.0  # s, at most a fifth of the run
-_SAMPLE = 2.0  # s between looks at the memory
-_SETTLE = 1.0  # s for what is on its way
+_SAMPLE = 2.0  # s between two samples of the memory
+_SETTLE = 1.0  # s for the last commands to arrive
 
 
 def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
-    """`lost_commands`, `memory_growth_mb` by process (worst: `worst_growth_mb`), violations of the current limit."""
+    """Return `lost_commands`, `memory_growth_mb` by process, `worst_growth_mb`, `limit_violations` and further figures."""
     file = load_robot_file("article")
     limit = parse_hardware(file.section("hardware"), source=file.source).drive.current_limit
-    parameters = {"virtual_robot": {"motion": "tremor"}, "inverse_controller": {"enabled": False}}
+    parameters: dict[str, dict] = {"virtual_robot": {"motion": "tremor"}, "inverse_controller": {"enabled": False}}
     with RunningGraph(parameters) as graph:
         progress("starting the graph")
         probe, monitor = Probe(graph), CurrentMonitor(graph, limit)
@@ -52,7 +53,7 @@ def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
 
 
 def _enable(probe: Probe) -> None:
-    """Wait until the controller takes the order; on a new machine it compiles first."""
+    """Enable the controller, and wait until it answers; on a new machine it compiles first."""
     end = time.monotonic() + START_TIMEOUT
     while True:
         try:
@@ -63,7 +64,7 @@ def _enable(probe: Probe) -> None:
 
 
 def _watch(graph: RunningGraph, duration: float, progress: Callable[[str], None]) -> dict[str, list[tuple[float, float]]]:
-    """(s, MB) by process."""
+    """Return the memory of each process as (s, MB)."""
     processes = {name: graph.process(name) for name in NODES}
     samples: dict[str, list] = {name: [] for name in NODES}
     begin = time.monotonic()
