@@ -5,6 +5,8 @@ of the winches, or the measured ones. Before the first message about the cables 
 model moves from one stamp to the next, starting at rest in the first equilibrium.
 """
 
+import os
+import subprocess
 import sys
 from collections.abc import Sequence
 
@@ -13,12 +15,15 @@ from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.time import Time
+from rclpy.timer import Timer
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
+from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
+from gravcomp.simulation.late_reduction import LateReduction
 from gravcomp_fem.conversion import deformation_message, pose_message
 from gravcomp_fem.markers import markers_of
 from gravcomp_fem.transforms import TransformPublisher
@@ -31,6 +36,7 @@ _GRAVITY_LIMIT = 100.0  # m/s^2
 _LONGEST_GAP = 0.1  # s
 # Commands respect the cables' speed limit; the model follows a command at up to this multiple of it.
 _SPEED_MARGIN = 2.0
+_BUILDER_DELAY = 10.0  # s; a node that runs for a shorter time builds no reduced model
 
 
 class FemSimulator(ManagedNode):
@@ -49,6 +55,11 @@ class FemSimulator(ManagedNode):
         for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
             self._simulator.step(np.zeros(3), cables)
         within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
+        self._late_reduction = LateReduction(self._simulator)
+        self._builder: subprocess.Popen | None = None
+        self._builder_timer: Timer | None = None
+        if self._late_reduction.missing and model_builder.MARK not in os.environ:
+            self._builder_timer = self.create_timer(_BUILDER_DELAY, self._start_builder)
         self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
         self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
@@ -74,10 +85,26 @@ class FemSimulator(ManagedNode):
         self._cable_topic.destroy()
 
     def cleanup(self) -> None:
-        """Destroy the publishers."""
+        """Destroy the publishers and end the build of the reduced model."""
+        self._late_reduction.stop()
+        self._cancel_builder_timer()
+        if self._builder is not None:
+            self._builder.terminate()
+            self._builder.wait()
         for publisher in (self._deformation, self._tip, self._markers):
             self.destroy_publisher(publisher)
         self._transforms.destroy()
+
+    def _start_builder(self) -> None:
+        """Build the reduced model in a process of low priority, when no launcher does."""
+        self._cancel_builder_timer()
+        if self._late_reduction.missing:
+            self._builder = model_builder.start_builder(self.robot_file.source)
+
+    def _cancel_builder_timer(self) -> None:
+        if self._builder_timer is not None:
+            self.destroy_timer(self._builder_timer)
+            self._builder_timer = None
 
     def _read_cables(self) -> None:
         """Read the displacements since the last sample; the newest valid ones are used."""
@@ -117,6 +144,7 @@ class FemSimulator(ManagedNode):
         last, self._last_stamp = self._last_stamp, stamp
         interval = None if last is None or not 0.0 < stamp - last <= _LONGEST_GAP else stamp - last
         self._move_cables(interval or _LONGEST_GAP)
+        self._late_reduction.exchange()
         shape = self._shape(gravity, interval)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # otherwise the next step would start at an invalid shape

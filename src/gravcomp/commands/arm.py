@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.launcher.domain import private_domain
     from gravcomp.launcher.robot_graph import RobotGraph
 
-    prepare(args.robot, virtual=True)
+    builder = prepare(args.robot, virtual=True)
     xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         urdf, result = Path(scratch) / "arm.urdf", Path(scratch) / "result.json"
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
-        with Graph([*specs, player], logs, domain) as processes:
+        with builder, Graph([*specs, player], logs, {**domain, **builder.environment}) as processes:
             if args.viewer:
                 show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
             processes.start()

@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(
             f"--screenshots looks back over the play: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
         )
-    prepare(args.robot, virtual=True)
+    builder = prepare(args.robot, virtual=True)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
-        with Graph(specs, logs, domain) as processes:
+        with builder, Graph(specs, logs, {**domain, **builder.environment}) as processes:
             if not args.headless:
                 address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
             processes.start()

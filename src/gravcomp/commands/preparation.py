@@ -1,4 +1,4 @@
-"""Prepare a robot before its nodes start: check its file, compile what the nodes run, and start the build of the reduced model."""
+"""Prepare a robot before its nodes start: check its file, compile what they run, build its reduced model in the background."""
 
 import subprocess
 import sys
@@ -11,8 +11,8 @@ from gravcomp.launcher.robot_graph import check_robot_file
 def prepare(robot: str, virtual: bool) -> ModelBuilder:
     """Check the robot's file and compile what its nodes run, where that is not done yet. Raises ConfigError.
 
-    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager: within it a process of low priority
-    builds the model if it is missing, and the nodes use it as soon as it is there.
+    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager. Within its context a process of
+    low priority builds the model if it is missing, and the nodes use it as soon as it is stored.
     """
     check_robot_file(robot)
     _compile(virtual)

@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         recording = read_recording(bag, args.topic or None)
     except RecordingError as error:
         raise ConfigError(str(error)) from error
-    prepare(args.robot, virtual=False)
+    builder = prepare(args.robot, virtual=False)
     graph = RobotGraph(args.robot, namespace=args.namespace)
     specs = [
         graph.node("gravcomp_estimation", "imu_estimator", use_sim_time=True, **(_lossless(args.namespace) if args.out else {})),
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
         wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
-    with Graph([*specs, replay], Path(args.logs) if args.logs else None) as processes:
+    with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment) as processes:
         if viewer:
             show_page(processes, viewer[0], args.no_open)
         processes.start()

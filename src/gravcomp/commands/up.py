@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.namespace and not args.namespace.startswith("/"):
         raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
-    prepare(args.robot, args.virtual)
+    builder = prepare(args.robot, args.virtual)
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
         # Several virtual robots on one machine would hear each other's motors on the file's bus.
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     specs = graph.loop()
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
-    with Graph(specs, Path(args.logs) if args.logs else None) as processes:
+    with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment) as processes:
         if args.viewer:
             show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
         processes.start()

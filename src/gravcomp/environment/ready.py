@@ -7,14 +7,19 @@ import json
 import os
 import pwd
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Iterator
 
 from gravcomp.environment import packages, system_packages, workspace
+from gravcomp.environment.end_with_parent import end_with_parent
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import choose_interpreter
 from gravcomp.environment.middleware import middleware
+
+COMPILED_PARTS = ("virtual_robot", "controller", "model")
+"""Parts of gravcomp.launcher.compilation, the longest first."""
 
 SEARCH_PATHS = ("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PATH")
 
@@ -80,12 +85,27 @@ def _make(root: Path) -> dict:
         if not (tools and stamp.exists() and stamp.read_text() == packages_key):
             inner = packages.build(root, python)
             stamp.write_text(packages_key)
+        _start_compiling(root, inner)
         paths = workspace.build(root, python, inner)
         state = {"key": _key(root, python.ros), "ros": python.ros, "python": str(inner), "paths": paths}
         partial = root / ".workspace" / "ready.json.partial"
         partial.write_text(json.dumps(state, indent=1))
         partial.replace(partial.with_suffix(""))
         return state
+
+
+def _start_compiling(root: Path, inner: Path) -> None:
+    """Compile the functions of the nodes next to the build of the workspace; a command that starts nodes waits for the rest.
+
+    The processes end with this one, also after it has become the command.
+    """
+    search = ":".join(filter(None, [str(root / "src"), os.environ.get("PYTHONPATH")]))
+    for part in COMPILED_PARTS:
+        subprocess.Popen(
+            [str(inner), "-m", "gravcomp.launcher.compilation", part],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env=dict(os.environ, PYTHONPATH=search), preexec_fn=end_with_parent,
+        )  # fmt: skip
 
 
 def _key(root: Path, ros: str) -> str:

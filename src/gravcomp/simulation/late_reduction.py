@@ -1,10 +1,11 @@
 """Pick up a reduced model that is built while the simulator already runs on the full model.
 
-A thread looks for the stored model once a second, loads it and compiles what it needs; the simulator's own thread only exchanges it
-between two steps.
+A thread looks for the stored model once a second, loads it and compiles what it needs; the simulator's own thread only
+exchanges it between two steps.
 """
 
 import threading
+from typing import Any
 
 from gravcomp.reduction.store import path_of, why_not
 from gravcomp.simulation.dynamic_simulator import DynamicSimulator
@@ -22,7 +23,7 @@ class LateReduction:
     def __init__(self, simulator: Simulator | DynamicSimulator, period: float = _PERIOD):
         self._simulator = simulator
         self._period = period
-        self._loaded = None
+        self._loaded: Any = None  # what `load_reduced` of the simulator returns
         self._ended = threading.Event()
         statics = simulator.statics if isinstance(simulator, DynamicSimulator) else simulator
         self._path = path_of(statics.model)

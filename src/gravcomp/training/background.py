@@ -1,7 +1,7 @@
 """Build a robot's reduced model in the background, at low priority: `python -m gravcomp.training.background ROBOT`.
 
-One process for each cache entry builds it; others wait for its lock and then find the entry. A killed process leaves the samples that
-it has computed, and the next one goes on from there.
+One process for each cache entry builds it; others wait for its lock and then find the entry. A killed process leaves the
+samples that it has computed, and the next one goes on from there.
 """
 
 import os

@@ -1,0 +1,102 @@
+"""Compile what the nodes run, once for a machine, in one process for each part: Numba takes about a minute on an empty cache.
+
+    python -m gravcomp.launcher.compilation PART ...
+
+The set-up starts these processes next to the build of the workspace; a command that starts nodes waits for them. A lock keeps two
+processes from compiling the same part, and a mark in the folder of the compiled functions tells that a part is complete.
+"""
+
+import fcntl
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from gravcomp.compiled_functions import compiled_folder, configure_numba
+from gravcomp.environment.end_with_parent import end_with_parent
+
+LOOP = ("model", "controller")
+"""Parts of the nodes of the loop."""
+
+VIRTUAL = ("virtual_robot",)
+"""Parts of the virtual robot."""
+
+
+def missing(parts: Iterable[str]) -> list[str]:
+    """Return those of the parts that are not compiled yet."""
+    folder = compiled_folder()
+    return [part for part in parts if not _mark(folder, part).exists()]
+
+
+def start(parts: Iterable[str]) -> list[subprocess.Popen]:
+    """Start one process for each part. They end with the thread that calls this."""
+    return [
+        subprocess.Popen(
+            [sys.executable, "-m", "gravcomp.launcher.compilation", part],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=end_with_parent,
+        )
+        for part in parts
+    ]  # fmt: skip
+
+
+def compile_part(part: str) -> None:
+    """Compile one part, unless it is compiled; wait when another process compiles it."""
+    folder = compiled_folder()
+    mark = _mark(folder, part)
+    with open(folder / f"{part}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not mark.exists():
+            _WORK[part]()
+            mark.touch()
+
+
+def _mark(folder: Path, part: str) -> Path:
+    return folder / f"{part}.complete"
+
+
+def _model() -> None:
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.simulation import Simulator
+
+    robot = load_robot_file("article").robot
+    simulator, released = Simulator(robot, reduced=False), np.zeros(len(robot.cables))
+    for gravity, cables in ((np.zeros(3), None), (np.zeros(3), released), (np.array([0.0, 0.0, -9.81]), released)):
+        simulator.step(gravity, cables)
+
+
+def _controller() -> None:
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.inverse import warm_up
+    from gravcomp.inverse.limits import within_limits
+
+    robot = load_robot_file("article").robot
+    warm_up(robot)
+    cables = np.zeros(len(robot.cables))
+    within_limits(cables, cables, robot.limits, 0.0)
+
+
+def _virtual_robot() -> None:
+    from gravcomp.virtual.warm_up import warm_up
+
+    warm_up()
+
+
+_WORK = {"model": _model, "controller": _controller, "virtual_robot": _virtual_robot}
+
+
+def main(parts: list[str]) -> int:
+    """Compile the parts; returns 0."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    configure_numba()
+    for part in parts:
+        compile_part(part)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,104 @@
+"""A simulator that starts on the full model changes over to the reduced model when that is built."""
+
+import dataclasses
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Elements, load_robot_file
+from gravcomp.description.robot import Robot
+from gravcomp.reduction import load, path_of
+from gravcomp.simulation import DynamicSimulator, RobotModel, Simulator
+from gravcomp.simulation.late_reduction import LateReduction
+from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training.samples import samples
+
+SHORT = BuildOptions(
+    modes=30, strains=30, training=TrainingOptions(paths=24, steps=30), test=TrainingOptions(paths=2, steps=10, seed=9)
+)
+GRAVITY = 9.81 * np.array([0.0, np.sin(0.4), np.cos(0.4)])
+
+
+@pytest.fixture
+def robot(tmp_path, monkeypatch) -> Robot:
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
+
+
+def exchanged(late: LateReduction, patience: float = 60.0) -> bool:
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        if late.exchange():
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.mark.parametrize("kind", [Simulator, DynamicSimulator])
+def test_the_tip_does_not_jump_when_the_reduced_model_takes_over(robot, kind):
+    simulator = kind(robot)
+    late = LateReduction(simulator, period=0.02)
+    wound = np.zeros(len(robot.cables))
+    for share in np.linspace(0.0, 1.0, 20):
+        before = simulator.step(share * GRAVITY, wound)
+    assert before.model == "full" and late.missing
+    if kind is DynamicSimulator:
+        before = simulator.settle(GRAVITY, wound)
+    build(RobotModel(robot), SHORT)
+    assert exchanged(late)
+    tips, models = [before.tip_position], []
+    for _ in range(3):
+        shape = simulator.step(GRAVITY, wound)
+        tips.append(shape.tip_position)
+        models.append(shape.model)
+    assert models[-1] == "reduced"
+    assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() < 1e-4  # 0.1 mm of 100
+    late.stop()
+
+
+def test_there_is_nothing_to_wait_for_where_the_reduced_model_serves_or_cannot(robot):
+    hyper = robot.with_material(law="neo_hookean")
+    assert not LateReduction(Simulator(hyper)).missing
+
+
+def test_an_interrupted_training_goes_on_and_finds_the_same_samples(robot, tmp_path):
+    model, options = RobotModel(robot), TrainingOptions(paths=4, steps=3)
+    whole = samples(model, options)
+
+    class Interrupted(Exception):
+        pass
+
+    def interrupt(share: float) -> None:
+        if share == 0.5:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        samples(model, options, interrupt, tmp_path / "kept")
+    done = sorted((tmp_path / "kept").iterdir())
+    assert len(done) == 2
+    stamps = [path.stat().st_mtime_ns for path in done]
+    again = samples(model, options, kept=tmp_path / "kept")
+    assert [path.stat().st_mtime_ns for path in done] == stamps
+    assert len(again) == len(whole)
+    for one, other in zip(whole, again):
+        np.testing.assert_array_equal(one.unknowns, other.unknowns)
+
+
+def test_a_second_builder_finds_the_model_of_the_first(robot, tmp_path):
+    shipped = Path(load_robot_file("article").source).read_text()
+    coarse = re.sub(r"(?m)^  elements: .*$", "  elements: {around: 4, along: 4}", shipped)
+    (tmp_path / "robot.yaml").write_text(coarse)
+    assert load_robot_file(str(tmp_path / "robot.yaml")).robot == robot
+    build(RobotModel(robot), SHORT)
+    stamp = path_of(RobotModel(robot)).stat().st_mtime_ns
+    command = [sys.executable, "-m", "gravcomp.training.background", str(tmp_path / "robot.yaml")]
+    done = subprocess.run(command, env=dict(os.environ), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and not done.stderr
+    assert path_of(RobotModel(robot)).stat().st_mtime_ns == stamp
+    assert load(RobotModel(robot)) is not None
