@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from gravcomp.virtual.se3 import advance, motion_exp, rotation_to_quaternion
+from gravcomp.virtual.se3 import advance, copy_pose, motion_exp, rotation_to_quaternion
 
 
 @njit(cache=True, error_model="numpy")
@@ -29,7 +29,7 @@ def backbone_poses(
         e = min(max(np.searchsorted(node_station, station[s], side="right") - 1, 0), length.shape[0] - 1)
         part = (station[s] - node_station[e]) / (node_station[e + 1] - node_station[e])
         motion_exp(part * length[e] * strain[e], turn, shift)
-        here[:], place[:] = orientation[e], position[e]
+        copy_pose(orientation[e], position[e], here, place)
         advance(here, place, turn, shift, work)
         for i in range(3):
             out_position[s, i] = 0.0

@@ -15,7 +15,7 @@ from numba import njit
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.rod import RodModel, strains, tendon_lengths
-from gravcomp.virtual.se3 import advance, motion_exp
+from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
 
 _MOST_ITERATIONS = 200
 _MOST_HALVINGS = 12
@@ -163,8 +163,9 @@ def _settle(
         # until the increment descends.
         addition = 0.0
         for _ in range(_MOST_ADDITIONS):
-            factors[:] = band
             for k in range(6 * n):
+                for i in range(23):
+                    factors[k, i] = band[k, i]
                 factors[k, 11] += addition * band[k, 11]
             increment = newton_step(factors, residual, gradient, pull, active)
             largest, slope = 0.0, 0.0
@@ -182,8 +183,7 @@ def _settle(
         start_orientation, start_position, start_energy = orientation.copy(), position.copy(), energy
         for _ in range(_MOST_HALVINGS):
             for k in range(n):
-                orientation[k + 1] = start_orientation[k + 1]
-                position[k + 1] = start_position[k + 1]
+                copy_pose(start_orientation[k + 1], start_position[k + 1], orientation[k + 1], position[k + 1])
                 motion_exp(factor * increment[6 * k : 6 * k + 6], turn, shift)
                 advance(orientation[k + 1], position[k + 1], turn, shift, work)
             strains(orientation, position, length, strain)

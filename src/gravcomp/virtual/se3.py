@@ -125,6 +125,15 @@ def advance(orientation: np.ndarray, position: np.ndarray, turn: np.ndarray, shi
 
 
 @njit(cache=True, error_model="numpy")
+def copy_pose(orientation: np.ndarray, position: np.ndarray, to_orientation: np.ndarray, to_position: np.ndarray) -> None:
+    """Copy a pose (orientation (3, 3), position (3,)); element by element, because slices take Numba seconds to compile."""
+    for i in range(3):
+        to_position[i] = position[i]
+        for j in range(3):
+            to_orientation[i, j] = orientation[i, j]
+
+
+@njit(cache=True, error_model="numpy")
 def inverse_jacobians(xi: np.ndarray, left: np.ndarray, right: np.ndarray) -> None:
     """Write the inverse left and right Jacobians of SE(3) at the twist xi (6,) to left and right (6, 6)."""
     ad = np.zeros((6, 6))

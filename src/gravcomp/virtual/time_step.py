@@ -16,7 +16,7 @@ from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
 from gravcomp.virtual.rod import strains, tendon_lengths
-from gravcomp.virtual.se3 import advance, motion_exp
+from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
 
 _SPECTRAL_RADIUS = 0.5  # numerical damping of frequencies that the time step cannot resolve; 1: none
@@ -94,8 +94,7 @@ def time_step(
             velocity_rate[k, i] = 0.0
     start_orientation, start_position = orientation.copy(), position.copy()
     start_branch_strain, start_slip_strain = branch_strain.copy(), slip_strain.copy()
-    orientation[0] = base_orientation
-    position[0] = base_position
+    copy_pose(base_orientation, base_position, orientation[0], position[0])
 
     path_before = path.copy()
     direction, active, work = np.zeros((m, n, 3)), np.empty(m), np.empty((3, 3))
@@ -106,8 +105,7 @@ def time_step(
     for iteration in range(MOST_ITERATIONS):
         for k in range(1, n + 1):
             motion_exp(total_increment[k], turn, shift)
-            orientation[k] = start_orientation[k]
-            position[k] = start_position[k]
+            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
             advance(orientation[k], position[k], turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(new_strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
@@ -163,11 +161,19 @@ def time_step(
     update_sliding(sliding, path_before, path, wound_before, wound, presliding)
     for c in range(m):
         shortened[c] = tendon_rest[c] - np.sum(path[c])
-    strain[:] = new_strain
+    for e in range(n):
+        for i in range(6):
+            strain[e, i] = new_strain[e, i]
     possible = _is_possible(orientation, position, strain, velocity, length)
     if not possible:
-        orientation[:], position[:] = start_orientation, start_position
-        branch_strain[:], slip_strain[:] = start_branch_strain, start_slip_strain
+        for k in range(n + 1):
+            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
+        for e in range(n):
+            for i in range(2):
+                slip_strain[e, i] = start_slip_strain[e, i]
+            for j in range(branch_time.shape[0]):
+                for i in range(6):
+                    branch_strain[j, e, i] = start_branch_strain[j, e, i]
     return possible, iterations
 
 
