@@ -1,4 +1,4 @@
-"""Bags for tests, written without an installed ROS."""
+"""Bags for tests, written without ROS."""
 
 from pathlib import Path
 
@@ -11,17 +11,20 @@ OWN = ("CableState", "CableCommand", "ControllerStatus", "ShapeTarget")
 
 
 class TopicBag:
-    """A bag being written: `with TopicBag(path) as bag: bag.vector("/gravity", time, (x, y, z))`, time in s as stamp and as reception.
+    """A bag that is written by `with TopicBag(path) as bag: bag.vector("/gravity", time, (x, y, z))`.
 
-    `late` (s): by how much the reception is later than the stamp.
+    time: stamp and time of reception in s; `late`: delay of the reception after the stamp, s.
     """
 
     def __init__(self, path: Path):
         self._store = get_typestore(Stores.ROS2_JAZZY)
         for name in OWN:
             self._store.register(get_types_from_msg((MESSAGES / f"{name}.msg").read_text(), f"gravcomp_msgs/msg/{name}"))
-        self._types = {kind.rsplit("/", 1)[1]: made for kind, made in self._store.types.items()
-                       if kind.startswith(("geometry_msgs/", "std_msgs/", "builtin", "gravcomp", "sensor_msgs/"))}  # fmt: skip
+        self._types = {
+            kind.rsplit("/", 1)[1]: made
+            for kind, made in self._store.types.items()
+            if kind.startswith(("geometry_msgs/", "std_msgs/", "builtin", "gravcomp", "sensor_msgs/"))
+        }
         self._bag = Writer(path, version=9)
         self._topics: dict = {}
 
@@ -43,8 +46,19 @@ class TopicBag:
 
     def state(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
         none = np.zeros(0)
-        self._write(topic, "gravcomp_msgs/msg/CableState", time, late, state=3, message="", command=none, displacement=np.asarray(displacement, float),
-                    velocity=none, current=none, tension=none)  # fmt: skip
+        self._write(
+            topic,
+            "gravcomp_msgs/msg/CableState",
+            time,
+            late,
+            state=3,
+            message="",
+            command=none,
+            displacement=np.asarray(displacement, float),
+            velocity=none,
+            current=none,
+            tension=none,
+        )
 
     def command(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
         self._write(
@@ -67,14 +81,35 @@ class TopicBag:
 
     def bend(self, topic: str, time: float, angle: float, plane: float) -> None:
         point, vector, none = self._types["Point"](0.0, 0.0, 0.0), self._types["Vector3"](0.0, 0.0, 0.0), np.zeros(0)
-        self._write(topic, "gravcomp_msgs/msg/ShapeTarget", time, tip_position=point, tip_position_weight=1.0, tip_direction=vector, tip_direction_weight=0.0,
-                    backbone_station=none, backbone_position=[], backbone_weight=none, bend=True, bend_angle=angle, bend_plane=plane)  # fmt: skip
+        self._write(
+            topic,
+            "gravcomp_msgs/msg/ShapeTarget",
+            time,
+            tip_position=point,
+            tip_position_weight=1.0,
+            tip_direction=vector,
+            tip_direction_weight=0.0,
+            backbone_station=none,
+            backbone_position=[],
+            backbone_weight=none,
+            bend=True,
+            bend_angle=angle,
+            bend_plane=plane,
+        )
 
     def imu(self, topic: str, time: float, gyro, accel) -> None:
         vector, none = self._types["Vector3"], np.zeros(9)
-        self._write(topic, "sensor_msgs/msg/Imu", time, orientation=self._types["Quaternion"](0.0, 0.0, 0.0, 1.0), orientation_covariance=none,
-                    angular_velocity=vector(*map(float, gyro)), angular_velocity_covariance=none,
-                    linear_acceleration=vector(*map(float, accel)), linear_acceleration_covariance=none)  # fmt: skip
+        self._write(
+            topic,
+            "sensor_msgs/msg/Imu",
+            time,
+            orientation=self._types["Quaternion"](0.0, 0.0, 0.0, 1.0),
+            orientation_covariance=none,
+            angular_velocity=vector(*map(float, gyro)),
+            angular_velocity_covariance=none,
+            linear_acceleration=vector(*map(float, accel)),
+            linear_acceleration_covariance=none,
+        )
 
     def _write(self, topic: str, kind: str, time: float, late: float = 0.0, **fields) -> None:
         if topic not in self._topics:

@@ -1,4 +1,4 @@
-"""Bags: what is written can be read by rosbags and by us, whole or cut off anywhere."""
+"""Bags can be read by rosbags and by gravcomp, complete or cut off anywhere."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ def store():
 
 @pytest.fixture(scope="module")
 def definitions(store):
-    """Definitions without an installed ROS: as a bag would bring them along."""
+    """Definitions without an installed ROS, as from a bag."""
     known = Definitions([])
     known.add_text(IMU, store.generate_msgdef(IMU, ros_version=2)[0])
     return known
@@ -74,14 +74,14 @@ def test_a_bag_is_mcap_of_version_9_with_the_offered_qos_and_the_hash_of_the_typ
         assert bag.message_count == 300
 
 
-def test_a_bag_is_not_written_over(tmp_path, store, definitions):
+def test_a_bag_is_not_overwritten(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions, count=1)
     with pytest.raises(BagError, match="exists; a bag is not overwritten"):
         BagWriter(path)
 
 
 def test_a_type_that_is_not_installed_is_named(tmp_path):
-    with pytest.raises(BagError, match="no share/nowhere_msgs/msg/Thing.msg"):
+    with pytest.raises(BagError, match=r"no share/nowhere_msgs/msg/Thing\.msg"):
         Definitions([tmp_path]).of("nowhere_msgs/msg/Thing")
 
 
@@ -98,14 +98,14 @@ def test_definitions_come_from_the_installed_files(tmp_path, store):
     assert "MSG: b_msgs/Inner" in definition and digest.startswith("RIHS01_")
 
 
-def test_a_whole_bag_is_taken_as_it_is(tmp_path, store, definitions):
+def test_a_complete_bag_is_used_as_it_is(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions)
     bag = readable(path)
     assert (bag.path, bag.problem, bag.messages) == (path, "", 300)
 
 
-def test_a_recorder_that_was_killed_loses_what_was_not_flushed_and_no_more(tmp_path):
-    """A process of its own, killed without warning between two flushes."""
+def test_a_recorder_that_was_killed_loses_only_what_was_not_flushed(tmp_path):
+    """A separate process, killed between two flushes."""
     script = textwrap.dedent(f"""
         import os, signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
@@ -125,19 +125,19 @@ def test_a_recorder_that_was_killed_loses_what_was_not_flushed_and_no_more(tmp_p
 
 
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.7, 0.999])
-def test_a_bag_that_was_cut_off_is_read_up_to_the_last_whole_chunk(tmp_path, store, definitions, part):
+def test_a_bag_that_was_cut_off_is_read_up_to_the_last_complete_chunk(tmp_path, store, definitions, part):
     path = write(tmp_path / "bag", store, definitions, chunk=20)
     file = path / "bag.mcap"
     whole = file.read_bytes()
     file.write_bytes(whole[: int(part * len(whole))])
     bag = readable(path)
     assert bag.problem
-    # The index at the end takes its share, so nearly all messages are there before the file is.
+    # The index at the end takes part of the file, so more messages than `part` are readable.
     assert 300 * part - 20 <= bag.messages <= 300 and bag.messages % 20 == 0
     assert len(read_recording(path)) == bag.messages
 
 
-def test_a_bag_with_rubbish_in_the_middle_is_read_up_to_it(tmp_path, store, definitions):
+def test_a_bag_with_damage_in_the_middle_is_read_up_to_it(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions, chunk=20)
     file = path / "bag.mcap"
     whole = bytearray(file.read_bytes())
@@ -147,7 +147,7 @@ def test_a_bag_with_rubbish_in_the_middle_is_read_up_to_it(tmp_path, store, defi
     assert 0 < readable(path).messages < 300
 
 
-def test_the_recording_itself_is_not_touched(tmp_path, store, definitions):
+def test_the_recording_itself_is_not_changed(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions)
     (path / "metadata.yaml").unlink()
     before = sorted((p.name, p.stat().st_mtime_ns) for p in path.iterdir())
@@ -159,15 +159,15 @@ def test_the_recording_itself_is_not_touched(tmp_path, store, definitions):
     ("content", "sentence"),
     [(b"", "nothing in it can be read"), (b"not a bag at all" * 100, "nothing in it can be read")],
 )
-def test_what_is_no_bag_is_refused_in_a_sentence(tmp_path, content, sentence):
+def test_a_file_that_is_no_bag_is_refused_with_the_reason(tmp_path, content, sentence):
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "bag.mcap").write_bytes(content)
     with pytest.raises(BagError, match=sentence):
         readable(tmp_path / "bag")
 
 
-def test_missing_and_empty_folders_are_told_apart(tmp_path):
+def test_missing_and_empty_folders_have_different_errors(tmp_path):
     with pytest.raises(BagError, match="does not exist"):
         readable(tmp_path / "nowhere")
-    with pytest.raises(BagError, match="no .mcap and no .db3 file"):
+    with pytest.raises(BagError, match=r"no \.mcap and no \.db3 file"):
         readable(tmp_path)

@@ -1,6 +1,6 @@
-"""On real recordings with optical truth: no trial worse than VQF, and a bias that drifts while warming hardly matters.
+"""On real recordings with optical ground truth no trial is worse than with VQF.
 
-The figures of VQF 2.1 with its defaults at 95.2 Hz, measured by the same protocol.
+The errors of VQF 2.1 are those with its defaults at 95.2 Hz, by the same protocol.
 """
 
 import math
@@ -26,11 +26,11 @@ FILES = {f.stem: f for f in broad_files()}
 @pytest.mark.parametrize("trial", VQF_DEG)
 def test_no_trial_is_worse_than_vqf(trial):
     if trial not in FILES:
-        pytest.skip(f"the BROAD trial {trial} is not here. {WHERE}")
+        pytest.skip(f"the BROAD trial {trial} is missing. {WHERE}")
     recording = read_recording(FILES[trial]).averaged(3)
     result = estimate_recording(recording)
     assert math.degrees(inclination_rmse(result.orientation, recording.orientation, recording.movement)) <= VQF_DEG[trial]
-    # The reported standard deviation is of the size of the error: 63 % of errors lie within for a direction in a plane.
+    # The reported standard deviation agrees with the error: 63 % of the errors of a direction in a plane are below it.
     error = inclination_error(result.orientation, recording.orientation)
     counted = recording.movement & np.isfinite(error)
     assert 0.4 < np.mean(error[counted] < result.inclination_std[counted]) < 0.95

@@ -1,4 +1,4 @@
-"""Calibration from resting poses finds what was put in, and says when the poses do not show it."""
+"""Calibration from poses at rest finds the values of simulated errors, and reports what the poses do not determine."""
 
 import math
 
@@ -27,7 +27,7 @@ def test_six_poses_give_scale_and_offset():
     assert fit.residual_after < 0.1 * fit.residual_before
 
 
-def test_few_poses_correct_what_they_show_and_say_how_little_they_know():
+def test_few_poses_correct_what_they_determine_and_report_their_uncertainty():
     fit = fit_accelerometer(poses_of(SIX[2:3]))
     assert fit.residual_after < 0.1 * fit.residual_before
     assert fit.scale[:2] == pytest.approx([1.0, 1.0], abs=1e-6)
@@ -41,12 +41,12 @@ def test_the_mount_is_found_from_two_poses():
     assert fit_mount(9.81 * up @ mount, up) == pytest.approx(rpy, abs=1e-9)
 
 
-def test_poses_along_one_line_do_not_tell_the_mount():
+def test_poses_along_one_line_do_not_determine_the_mount():
     with pytest.raises(CalibrationError, match="one more pose"):
         fit_mount(np.array([[0, 0, 9.81], [0, 0, -9.81]]), np.array([[0, 0, 1.0], [0, 0, -1.0]]))
 
 
-def test_rests_are_found_in_a_recording_and_the_same_pose_is_taken_once():
+def test_rests_are_found_in_a_recording_and_the_same_pose_counts_once():
     random = np.random.default_rng(2)
     gyro, accel = [], []
     for direction in (SIX[2], SIX[0], SIX[2]):
@@ -71,7 +71,7 @@ def test_a_recording_without_rest_is_refused():
         resting_poses(recording)
 
 
-def test_half_a_turn_is_still_a_mount():
+def test_a_mount_may_be_half_a_turn():
     up = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
     flipped = up @ quat.matrix(quat.from_roll_pitch_yaw(math.pi, 0.0, 0.0))
     roll, pitch, yaw = fit_mount(flipped, up)

@@ -70,7 +70,7 @@ def test_stamps_have_the_boards_spacing_under_jittery_reception(stream):
     assert min(late[500:]) >= 0.001 and max(late[500:]) < 0.0025
 
 
-def test_repeated_and_reordered_samples_come_once(stream):
+def test_repeated_and_reordered_samples_count_once(stream):
     frames = [sample(k) for k in range(10)]
     order = [0, 1, 1, 3, 2, 4, 5, 4, 6]
     got = [s.sequence for i in order for s in feed(stream, frames[i], 1.0 + 0.01 * i)]

@@ -1,4 +1,4 @@
-"""The orientation filter: what it must get right in still and in motion, and what it must say of bad samples."""
+"""The orientation filter: its errors at rest and in motion, and what it reports of invalid samples."""
 
 import math
 
@@ -27,15 +27,15 @@ def at_rest(filter_, count, *, gyro=(0.0, 0.0, 0.0), accel=UP, start=0, step=STE
 
 
 def swinging(duration, rate, *, bias=(0.0, 0.0, 0.0), amplitude=0.5, seed=2):
-    """A sensor that swings about two axes without moving: stamps, gyro, accel and true orientation at each stamp."""
+    """A sensor that swings about its axes without moving: stamp, gyro, accel and true orientation of each sample."""
     random = np.random.default_rng(seed)
-    fine = 4
+    fine = max(1, min(4, 400 // rate))  # steps of the ground truth for each sample
     q, samples = quat.IDENTITY, []
     for k in range(round(duration * rate)):
         turn = np.zeros(3)
         for j in range(fine):
             t = (k + (j + 0.5) / fine) / rate
-            # Still at first, so that the bias can be learned.
+            # At rest at first, so that the bias can be learned.
             w = amplitude * np.array([math.sin(2.0 * t), 0.7 * math.cos(1.3 * t), 0.3 * math.sin(0.9 * t)]) * (t > 5.0)
             turn += w / (rate * fine)
             q = quat.normalised(quat.multiply(q, quat.exponential(*(w / (rate * fine)))))
@@ -56,11 +56,11 @@ def test_starts_with_the_inclination_of_the_first_sample_and_yaw_zero():
     assert estimate.gravity == pytest.approx(quat.rotate(quat.conjugate(tilted), (0, 0, -9.81)))
 
 
-def test_learns_the_bias_at_rest_and_says_that_it_rests():
+def test_learns_the_bias_at_rest_and_reports_the_rest():
     bias = (1.5 * DEG, -0.8 * DEG, 0.5 * DEG)
     estimate = at_rest(OrientationFilter(), 1500, gyro=bias)
     assert estimate.rest
-    # 0.02 deg/s: three standard deviations of what the filter itself says is left.
+    # Three standard deviations by the filter itself, 0.02 deg/s.
     assert estimate.bias == pytest.approx(bias, abs=3.0 * math.sqrt(estimate.covariance[4, 4]))
     assert math.sqrt(estimate.covariance[4, 4]) < 0.05 * DEG
 
@@ -76,7 +76,7 @@ def test_one_parameter_set_serves_every_rate(rate):
     assert np.degrees(np.sqrt(np.mean(error**2))) < 0.15
 
 
-def test_acceleration_that_comes_back_is_not_taken_for_tilt():
+def test_oscillating_acceleration_is_not_taken_for_tilt():
     filter_ = OrientationFilter(options_without_delay())
     at_rest(filter_, 300)
     worst, random = 0.0, np.random.default_rng(7)
@@ -118,11 +118,12 @@ def test_its_own_standard_deviation_is_the_size_of_its_error():
         if stamp > 10e9:
             error = inclination_error(np.array([estimate.orientation]), np.array([true]))[0]
             ratio.append(error / estimate.inclination_std)
-    # The simulated sensor has no scale error, which the filter allows for: its error may be smaller than said, not larger.
+    # The filter allows for a scale error, which the simulated sensor does not have: the error may be smaller than reported, not
+    # larger.
     assert np.sqrt(np.mean(np.square(ratio))) < 1.2
 
 
-def test_an_accelerometer_that_says_9_3_at_rest_is_made_good_and_reported():
+def test_an_accelerometer_that_measures_9_3_at_rest_is_compensated_and_reported():
     filter_ = OrientationFilter(options_without_delay())
     estimate = at_rest(filter_, 600, accel=(0, 0, 9.3))
     assert estimate.accel_norm_at_rest == pytest.approx(9.3, abs=0.01)
@@ -135,7 +136,7 @@ def test_an_accelerometer_that_says_9_3_at_rest_is_made_good_and_reported():
 
 
 @pytest.mark.parametrize(
-    "gyro, accel, problem",
+    ("gyro", "accel", "problem"),
     [
         ((math.nan, 0, 0), UP, Problem.NOT_FINITE),
         ((0, 0, 0), (0, math.inf, 0), Problem.NOT_FINITE),
@@ -143,7 +144,7 @@ def test_an_accelerometer_that_says_9_3_at_rest_is_made_good_and_reported():
         ((0, 0, 0), (0, 0, 5000.0), Problem.OUT_OF_RANGE),
     ],
 )
-def test_samples_that_mean_nothing_are_rejected_and_counted(gyro, accel, problem):
+def test_invalid_samples_are_rejected_and_counted(gyro, accel, problem):
     filter_ = OrientationFilter()
     before = at_rest(filter_, 100)
     assert filter_.update(100 * STEP, gyro, accel) is problem
@@ -165,7 +166,7 @@ def test_repeated_and_reordered_stamps_are_rejected_and_change_nothing():
     assert result.orientation == expected.orientation
 
 
-def test_a_clock_that_went_back_for_good_starts_a_new_stream():
+def test_a_clock_that_was_set_back_starts_a_new_stream():
     filter_ = OrientationFilter()
     at_rest(filter_, 100, start=10**18)
     problems = []
@@ -176,7 +177,7 @@ def test_a_clock_that_went_back_for_good_starts_a_new_stream():
     assert problems[9:] == [Problem.CLOCK_RESTARTED, Problem.NONE, Problem.NONE]
 
 
-def test_missing_samples_are_bridged_with_the_rates_around_them():
+def test_missing_samples_are_replaced_by_the_rates_around_them():
     filter_ = OrientationFilter(options_without_delay())
     at_rest(filter_, 300)
     rate, angle, random = 0.5, 0.0, np.random.default_rng(8)
@@ -188,11 +189,11 @@ def test_missing_samples_are_bridged_with_the_rates_around_them():
         estimate = filter_.update((300 + k) * STEP, noisy((rate, 0, 0), random, 0.1 * DEG), accel)
         if k == 120:
             assert estimate.problem is Problem.NONE
-            bridged = inclination_error(np.array([estimate.orientation]), np.array([quat.exponential(angle, 0, 0)]))[0]
-            assert math.degrees(bridged) < 0.5
+            replaced = inclination_error(np.array([estimate.orientation]), np.array([quat.exponential(angle, 0, 0)]))[0]
+            assert math.degrees(replaced) < 0.5
 
 
-def test_a_long_gap_starts_the_inclination_anew_and_keeps_yaw_and_bias():
+def test_a_long_gap_restarts_the_inclination_and_keeps_yaw_and_bias():
     filter_ = OrientationFilter(options_without_delay())
     at_rest(filter_, 1000, gyro=(0, 0, 0.5 * DEG))
     for k in range(100):  # turn by 90 deg of yaw
@@ -205,7 +206,7 @@ def test_a_long_gap_starts_the_inclination_anew_and_keeps_yaw_and_bias():
     assert after.gravity == pytest.approx((-tilted[0], -tilted[1], -tilted[2]), rel=1e-6)
 
 
-def test_a_stuck_gyroscope_is_reported_and_the_accelerometer_goes_on_alone():
+def test_a_stuck_gyroscope_is_reported_and_the_accelerometer_is_used_alone():
     filter_ = OrientationFilter()
     at_rest(filter_, 300)
     random = np.random.default_rng(5)
@@ -225,7 +226,7 @@ def test_a_stuck_sensor_is_reported_and_its_uncertainty_grows():
     assert estimate.inclination_std > 10.0 * before.inclination_std
 
 
-def test_a_simulated_sensor_without_noise_is_believed():
+def test_a_simulated_sensor_without_noise_is_used():
     filter_ = OrientationFilter(options_without_delay())
     angle = 0.0
     for k in range(500):
@@ -259,7 +260,7 @@ def test_bias_estimation_can_be_switched_and_reset_while_running():
     assert at_rest(filter_, 800, gyro=bias, start=701 * STEP).bias[0] == pytest.approx(1.0 * DEG, abs=0.05 * DEG)
 
 
-def test_the_sensors_delay_is_made_good_with_the_rate():
+def test_the_sensors_delay_is_compensated_with_the_rate():
     late = OrientationFilter(options_without_delay())
     punctual = OrientationFilter(FilterOptions(sensor=SensorOptions(delay=0.01)))
     for k in range(100):
@@ -268,12 +269,13 @@ def test_the_sensors_delay_is_made_good_with_the_rate():
     assert quat.yaw_of(b) - quat.yaw_of(a) == pytest.approx(0.01, rel=1e-3)
 
 
-def test_translations_do_not_drive_the_bias_about_the_vertical_away():
+def test_translations_do_not_make_the_bias_about_the_vertical_drift():
     filter_ = OrientationFilter(options_without_delay())
     random, pitch = np.random.default_rng(9), 0.0
     for k in range(4000):
         time = k * 0.01
-        # Swung by an arm from the first sample on: tilt and acceleration go together, as the filter's white noise would not.
+        # Swung by an arm from the first sample on: tilt and acceleration are correlated, unlike the white noise of the filter's
+        # model.
         before, pitch = pitch, 0.3 * math.sin(4.0 * time)
         push = 3.0 * math.sin(4.0 * time)
         q = quat.exponential(0.0, pitch, 0.0)
@@ -283,11 +285,11 @@ def test_translations_do_not_drive_the_bias_about_the_vertical_away():
     assert abs(estimate.bias[2]) < 0.5 * DEG
 
 
-def test_an_inclination_that_a_rest_contradicts_starts_anew():
-    """What wrong stamps leave: the filter is sure of itself and wrong, and its bias with it. The next rest ends that."""
+def test_an_inclination_that_a_rest_contradicts_is_restarted():
+    """After wrong stamps inclination and bias are wrong and their covariances small; the next rest corrects both."""
     filter_, random = OrientationFilter(), np.random.default_rng(3)
     at_rest(filter_, 1000)
-    rate, stamp, said = math.radians(20.0), 1000 * STEP, []
+    rate, stamp, problems = math.radians(20.0), 1000 * STEP, []
 
     def sample(gyro, turned, step):
         nonlocal stamp
@@ -301,9 +303,9 @@ def test_an_inclination_that_a_rest_contradicts_starts_anew():
     for k in range(100):
         estimate = sample((rate, 0.0, 0.0), rate * 0.01 * k, 2 * STEP)  # the stamps advance twice as fast as time
     assert abs(tilt(estimate) - rate) > 10.0 * DEG
-    for k in range(600):
+    for _ in range(600):
         estimate = sample((0.0, 0.0, 0.0), rate, STEP)
-        said.append(estimate.problem)
-    assert said.count(Problem.CONTRADICTED) == 1
+        problems.append(estimate.problem)
+    assert problems.count(Problem.CONTRADICTED) == 1
     assert tilt(estimate) == pytest.approx(rate, abs=0.3 * DEG)
     assert math.hypot(*estimate.bias) < 0.3 * DEG

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from bag_of_topics import TopicBag
 
+from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import predict_course
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.inverse import ControllerCode, bend_target

@@ -1,4 +1,4 @@
-"""Recordings: BROAD's layout and rosbag2 folders are read; whatever cannot be used is refused with what was found and what is needed."""
+"""Recordings in BROAD's layout and in rosbag2 folders; others are refused with what was found and what is needed."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_truth_is_optional(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "changes, words",
+    ("changes", "words"),
     [
         ({"gyr": None}, "lacks gyr"),
         ({"gyr": np.zeros((10, 4))}, r"gyr has the shape \(10, 4\); \(N, 3\)"),
@@ -83,11 +83,11 @@ def test_a_rosbag_gives_samples_temperature_and_truth_by_their_stamps(tmp_path, 
     assert recording.gyro[3].tolist() == [3.0, 0.0, 0.0]
     assert recording.accel[3].tolist() == [0.0, 0.0, 9.81]
     assert recording.temperature.tolist() == [30.0]
-    # Every second sample has its truth; the others lie beyond half a period from it.
+    # Every second sample has a truth; that of the others is more than half a period away.
     assert np.isfinite(recording.orientation[:, 0]).tolist() == [True, False, True, False, True]
 
 
-def test_a_bag_with_several_imus_wants_a_name(tmp_path):
+def test_a_bag_with_several_imus_needs_the_name_of_a_topic(tmp_path):
     bag = write_bag(tmp_path / "bag", "mcap", topics=("/a/imu/data", "/b/imu/data"))
     with pytest.raises(RecordingError, match="/a/imu/data, /b/imu/data; name one"):
         read_recording(bag)
@@ -114,7 +114,7 @@ def write_bag(path, storage, topics=("/robot/imu/data_raw",)):
         def write(connection, kind, k, **fields):
             stamp = 10**18 + k * 10_000_000
             head = header(stamp=time_(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="imu_link")
-            # The time of arrival differs from the stamp, and must not matter.
+            # The time of reception differs from the stamp and must have no effect.
             writer.write(connection, stamp + 3_000_000, store.serialize_cdr(types[kind](header=head, **fields), kind))
 
         temperature = writer.add_connection("/robot/imu/temperature", "sensor_msgs/msg/Temperature", typestore=store)

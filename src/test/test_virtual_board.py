@@ -70,7 +70,7 @@ def test_a_recorded_sample_keeps_its_own_errors():
     np.testing.assert_allclose(rate, [[0.1, 0.0, 0.0]] * 3, atol=gyroscope_scale(0))
 
 
-def test_sequence_and_time_run_on_and_begin_anew_after_a_restart():
+def test_sequence_and_time_continue_and_start_again_after_a_restart():
     b = board(**PERFECT)
     _, _, times = samples(b, 300)
     assert [t.sequence for t in times] == [i % 256 for i in range(300)]
@@ -92,7 +92,7 @@ def test_temperature_is_renewed_every_1_28_seconds_in_eighths_of_a_degree():
     assert readings[-1] == pytest.approx(b.temperature, abs=1.0)
 
 
-def test_the_heater_goes_off_without_commands_and_above_65_degrees():
+def test_the_heater_is_off_without_commands_and_above_65_degrees():
     b = board()
     b.command_heater(0.5)
     samples(b, 10)

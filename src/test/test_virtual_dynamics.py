@@ -65,7 +65,7 @@ def test_the_time_step_creates_no_energy():
     assert x[1500:].max() > 0.8 * x[:500].max(), "an elastic rod keeps swinging"
 
 
-def test_rest_stays_rest():
+def test_a_rod_at_rest_stays_at_rest():
     rod = moving_rod()
     shape = at_rest(rod)
     np.testing.assert_allclose(run(rod, 0.2), np.tile(shape.tip, (100, 1)), atol=1e-6)
@@ -92,7 +92,7 @@ def test_a_slowly_turning_base_is_followed_through_equilibria():
 
 
 def test_a_spinning_base_flings_the_robot_outward():
-    # Along the robot's axis nothing is flung; across it the centrifugal force m w^2 r pulls the robot straight and longer.
+    # About an axis across the robot the centrifugal force m w^2 r pulls the robot straight and makes it longer.
     rod = moving_rod(**(ELASTIC | {"damping_time": 0.05}))
     at_rest(rod, np.zeros(3))
     spin = 15.0
@@ -148,7 +148,7 @@ def test_tension_follows_the_capstan_equation_while_sliding():
     assert share[last] == pytest.approx(expected, rel=0.01)
 
 
-def test_a_broken_cable_carries_nothing():
+def test_a_broken_cable_has_no_tension():
     rod = moving_rod()
     at_rest(rod, np.zeros(3))
     pulled = np.array([1e-3, *RELEASED[1:]])

@@ -24,7 +24,7 @@ def run(motors, seconds, shortened=0.0):
     motors.step(round(seconds / TICK), np.full(6, shortened), SPRING)
 
 
-def test_the_last_current_is_kept_for_ever():
+def test_the_last_current_is_kept():
     motors = bank(slack=10.0)
     motors.commanded[:] = 0.5
     run(motors, 1.0)
@@ -51,7 +51,7 @@ def test_cable_force_and_current_balance_at_the_capstan():
     p = Motors()
     friction = p.friction_torque * 36 / p.capstan_radius
     wanted = (0.4 * p.torque_constant / p.capstan_radius - friction) / (1 + p.load_friction)
-    # Winding in, friction keeps part of the torque; an overshoot can only leave more tension than that.
+    # While winding in, friction takes part of the torque; after an overshoot the tension is larger.
     assert wanted * 0.99 < tension < (0.4 * p.torque_constant / p.capstan_radius + friction) / (1 - p.load_friction)
 
 
@@ -81,7 +81,7 @@ def test_backlash_shows_only_when_the_cable_is_slack():
     assert wound - taut.wound[0] == pytest.approx(turned * Motors().capstan_radius, abs=1e-9)
 
 
-def test_feedback_counts_the_rotor_wraps_at_8192_and_has_the_motors_own_sense():
+def test_feedback_counts_the_rotor_wraps_at_8192_and_has_the_direction_of_the_motor():
     motors = bank(slack=10.0, directions=(1, -1, 1, 1, 1, 1))
     start = [motors.feedback()[i]["angle"] for i in range(2)]
     motors.commanded[0], motors.commanded[1] = 0.3, -0.3
@@ -110,7 +110,7 @@ def test_currents_beyond_ten_amperes_and_speeds_beyond_the_motors_are_not_reache
     assert abs(motors.feedback()[0]["current"]) < 10.0
 
 
-def test_a_stalled_rotor_stands_and_an_encoder_jumps():
+def test_a_stalled_rotor_does_not_turn_and_an_encoder_jumps():
     motors = bank(slack=10.0)
     motors.commanded[:] = 0.5
     motors.stalled[2] = True

@@ -1,4 +1,4 @@
-"""The virtual robot on a bus at the pace of the clock."""
+"""The virtual robot on a bus, in real time."""
 
 import threading
 
@@ -13,7 +13,7 @@ from gravcomp.virtual.realtime import RealtimeRobot
 
 
 class Truths:
-    """What the robot told last, and waiting for what it shall tell."""
+    """The last ground truth of the robot, with a wait for the next one that fulfils a condition."""
 
     def __init__(self):
         self.last = None
@@ -43,16 +43,16 @@ def running(request):
 def test_frames_go_out_and_commands_come_in(running):
     live, bus, truths = running
     truths.wait()
-    # The status comes every 100 ms, among some 320 other frames.
+    # The status is sent every 100 ms, among about 320 other frames.
     seen = {decode(bus.recv(5.0)).name for _ in range(700)}
     assert seen >= {"MotorFeedback1", "MotorFeedback6", "ImuAccelerometer", "ImuGyroscope", "ImuTime", "BoardStatus"}
     bus.send(encode("MotorCommand1to4", current_1=0.25, current_2=0.0, current_3=0.0, current_4=0.0))
     bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=b"noise"))
     truths.wait(lambda truth: truth.current[0] == 0.25)
-    assert live.error is None and live.robot.refused == 0, "frames for others do not get past the filter"
+    assert live.error is None and live.robot.refused == 0, "frames for other receivers do not pass the filter"
 
 
-def test_after_stop_nothing_is_sent_and_a_new_start_goes_on(running):
+def test_after_stop_nothing_is_sent_and_a_new_start_continues(running):
     live, bus, truths = running
     truths.wait()
     live.stop()
@@ -77,6 +77,6 @@ def test_an_error_in_the_thread_is_kept_for_the_node(running):
     assert str(live.error) == "broken on purpose"
 
 
-def test_a_bus_that_does_not_exist_is_refused_in_words():
+def test_a_bus_that_does_not_exist_is_refused_by_name():
     with pytest.raises(BusError, match="nosuch"):
         RealtimeRobot(virtual_robot(), CanInterface("nosuch", "0"), lambda truth: None, 100.0).start()

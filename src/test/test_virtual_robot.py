@@ -1,4 +1,4 @@
-"""The virtual robot behind its frames: rates, repeatability, faults."""
+"""The virtual robot behind its CAN frames: rates, repeatability, faults."""
 
 import dataclasses
 
@@ -90,7 +90,7 @@ def test_truth_is_consistent():
     np.testing.assert_allclose(lengths, 0.01, rtol=0.02)
 
 
-def test_the_imu_of_a_still_base_measures_gravity_upward():
+def test_the_imu_of_a_base_at_rest_measures_gravity_upward():
     still = dataclasses.replace(
         Board(), accelerometer_noise=0.0, accelerometer_bias=0.0, accelerometer_scale=0.0, accelerometer_drift=0.0
     )
@@ -101,7 +101,7 @@ def test_the_imu_of_a_still_base_measures_gravity_upward():
     np.testing.assert_allclose(sample[:3], up, atol=1.0)
 
 
-def test_a_base_that_is_taken_over_turns_on_from_where_it_is():
+def test_a_base_that_is_steered_starts_from_its_last_pose():
     robot = virtual_robot(motion=tilting(hold=0.0, rate=1.0))
     robot.step(0.5)
     wanted, gravity = base_orientation(-0.5), [robot.truth.gravity]
@@ -114,8 +114,8 @@ def test_a_base_that_is_taken_over_turns_on_from_where_it_is():
     np.testing.assert_allclose(gravity[-1], wanted.T @ [0.0, 0.0, -9.81], atol=0.01)
 
 
-def test_skipped_time_is_lost_samples_and_nothing_else():
-    """Rates times the board's time give the base's turn, the skipped time taken as turning on; the rod keeps its shape."""
+def test_skipped_time_loses_samples_and_nothing_else():
+    """Rate times the time of the board is the rotation of the base, the skipped time included; the rod keeps its shape."""
     rate = np.radians(60.0)
     still = dataclasses.replace(Board(), gyroscope_noise=0.0, gyroscope_bias=0.0, gyroscope_drift=0.0, mount_error=0.0)
     motion = RotationMotion(base_orientation(0.0), np.array([0.0, 1.0, 0.0]), rate, hold=0.0)
@@ -130,12 +130,12 @@ def test_skipped_time_is_lost_samples_and_nothing_else():
     first, last = ([f.values for f in frames if f.name == "ImuTime"][k] for frames, k in ((after, 0), (before, -1)))
     assert first.sequence - last.sequence == 12
     assert first.time - last.time == pytest.approx(120_000, rel=1e-3)
-    gyro = [f.values for f in after if f.name == "ImuGyroscope"][0]
+    gyro = next(f.values for f in after if f.name == "ImuGyroscope")
     assert np.linalg.norm(gyro[:3]) * gyroscope_scale(still.gyroscope_range) == pytest.approx(rate, rel=0.01)
     assert robot.unresolved == 0
 
 
-def test_a_steered_base_turns_on_at_its_pace_through_skipped_time():
+def test_a_steered_base_keeps_its_angular_velocity_in_skipped_time():
     robot = virtual_robot()
     wanted = base_orientation(0.0)
     for k in range(100):  # steered at 60 deg/s, every 10 ms
@@ -163,7 +163,7 @@ def test_every_kind_of_fault_can_be_injected_and_cleared():
     assert len(robot.step(0.1)) == len(virtual_robot().step(0.1))
 
 
-def test_faults_of_frames_do_what_they_say():
+def test_faults_of_frames_change_the_frames():
     def frames_with(fault, seconds=0.2):
         robot = virtual_robot()
         clean = virtual_robot().step(seconds)
@@ -210,17 +210,17 @@ def test_hostile_frames_are_counted_and_change_nothing():
     assert robot.refused == 1 and (robot.truth.current == 0.0).all()
 
 
-def test_unknown_faults_cables_and_motors_are_refused_in_words():
+def test_unknown_faults_cables_and_motors_are_refused_with_the_allowed_ones():
     with pytest.raises(ConfigError, match="kind is 'explode'; allowed: one of drop"):
         Fault.parse({"kind": "explode"}, "virtual/fault")
-    with pytest.raises(ConfigError, match="s9c9.*allowed: s1c1"):
+    with pytest.raises(ConfigError, match=r"s9c9.*allowed: s1c1"):
         virtual_robot().inject(Fault("stall", cable="s9c9"))
     robot, hardware = article()
     with pytest.raises(ConfigError, match="motors for the cables s1c1"):
         VirtualRobot(VirtualRobotParameters(), robot, dataclasses.replace(hardware, motors=hardware.motors[:3]))
 
 
-def test_the_shipped_section_differs_from_what_the_controller_believes():
+def test_the_shipped_section_differs_from_the_controllers_model():
     file = load_robot_file("article")
     parameters = from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")
     assert parameters.body.youngs_modulus != file.robot.segments[0].material.youngs_modulus

@@ -108,7 +108,7 @@ def test_tangent_and_tendon_gradient_agree_with_finite_differences():
         numeric[:, k] = (sides[0][0] - sides[1][0]) / (2 * step)
         lengths[k] = (sides[0][4] - sides[1][4]) / (2 * step)
     np.testing.assert_allclose(gradient, lengths, atol=1e-6)
-    # The turning of the stress is kept to first order in the strain: the tangent is good to 1 %, the residual exact.
+    # The rotation of the stress is of first order in the strain: the tangent is accurate to 1 %, the residual exact.
     scale = np.sqrt(np.abs(np.diag(numeric)))
     assert np.max(np.abs(tangent - numeric) / np.outer(scale, scale)) < 0.01
 
@@ -150,7 +150,7 @@ def test_displacement_and_the_tension_it_makes_give_the_same_shape():
     assert (by_displacement.tension[[1, 2, 4, 5]] == 0.0).all()
 
 
-def test_cables_paid_out_carry_nothing_and_change_nothing():
+def test_cables_paid_out_have_no_tension_and_no_effect():
     model = rod()
     free, slack = equilibrium(model, horizontal()), equilibrium(model, horizontal(), displacement=np.full(6, -8e-3))
     assert (slack.tension == 0.0).all()
@@ -164,7 +164,7 @@ def test_cables_held_at_the_straight_length_hold_the_robot_up():
     assert held.tension.max() > 0.1
 
 
-def test_every_gravity_and_displacement_has_an_equilibrium_that_is_found():
+def test_an_equilibrium_is_found_for_every_gravity_and_displacement():
     model, random = rod(), np.random.default_rng(0)
     for _ in range(200):
         gravity = random.standard_normal(3)
@@ -182,7 +182,7 @@ def test_element_ends_meet_segments_caps_and_cables():
     np.testing.assert_allclose(model.tendon_length, [0.05] * 3 + [0.13] * 3)
 
 
-def test_robots_that_no_rod_can_be_are_refused():
+def test_robots_that_a_rod_cannot_represent_are_refused():
     robot, _ = article()
     with pytest.raises(ConfigError, match="body from a file"):
         build_rod(dataclasses.replace(robot, segments=(), cables=(), body=MeshBody("a.stl", 0.1)), VirtualRobotParameters())
