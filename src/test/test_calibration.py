@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
+from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
 from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
-from gravcomp.calibration.motion import predict_course
 from gravcomp.calibration.statics import StaticParameters, StaticPredictor
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
@@ -58,12 +58,12 @@ def test_derivatives_of_tips_are_those_of_finite_differences(robot):
 def test_a_known_robot_is_recovered_within_two_per_cent(setup):
     fit = fit_statics(setup.robot, known_windows(known_setup(setup, 0.6e6)))
     assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)
-    # The model is softer around a cable's end than the rod, which the offsets have to make good.
+    # The model is softer around a cable's end than the rod; the offsets compensate for that.
     assert np.sqrt(np.mean((fit.parameters.offset - OFFSETS) ** 2)) < 0.5 * np.sqrt(np.mean(OFFSETS**2))
     assert fit.rms_after < 0.1 * fit.rms_before
 
 
-def test_without_taut_cables_only_the_modulus_is_fitted_and_that_is_said(setup):
+def test_without_taut_cables_only_the_modulus_is_fitted_with_a_warning(setup):
     windows = known_windows(known_setup(setup, 0.6e6))
     released = np.isnan(windows.displacement).all(axis=1)
     windows = StillWindows(windows.gravity[released], np.full((released.sum(), 6), -0.01), windows.tip_position[released])
@@ -73,7 +73,7 @@ def test_without_taut_cables_only_the_modulus_is_fitted_and_that_is_said(setup):
     assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)
 
 
-def test_an_upright_robot_cannot_tell_its_modulus(robot):
+def test_an_upright_robot_does_not_show_its_modulus(robot):
     windows = StillWindows(np.array([[0.0, 0.0, 9.81]]), np.full((1, 6), np.nan), np.array([[0.0, 0.0, 0.1]]))
     with pytest.raises(MeasurementError, match="hardly bends"):
         fit_statics(robot, windows)
@@ -93,7 +93,7 @@ def test_only_the_last_still_window_of_a_stretch_counts():
     assert len(windows.tip_position) == 1
     np.testing.assert_allclose(windows.tip_position[0], [0.0, 0.0, 0.1])
     moving = course().rows(slice(0, 20))
-    with pytest.raises(MeasurementError, match="never stands still"):
+    with pytest.raises(MeasurementError, match="never at rest"):
         still_windows(moving)
 
 
@@ -110,7 +110,7 @@ def test_csv_is_read_as_it_was_written(tmp_path, robot):
     [
         (lambda text: text.replace("tip_x_mm", "tip_x"), "column 'tip_x_mm' is missing"),
         (lambda text: text.replace("100.0000", "ten", 1), r"line 2: tip_z_mm is 'ten'"),
-        (lambda text: text.splitlines()[0], "holds 0 samples"),
+        (lambda text: text.splitlines()[0], "has 0 samples"),
         (lambda text: text.replace("100.0000", "nan", 1), "not finite"),
     ],
 )

@@ -1,8 +1,9 @@
-"""What a calibration found, put into the robot's and the motors' descriptions, and into the robot's YAML with its comments kept."""
+"""Calibrated values in the descriptions of robot and motors, and in the robot file, whose comments are kept."""
 
 import dataclasses
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.calibration.statics import StaticParameters
 from gravcomp.config import ConfigError
@@ -10,11 +11,14 @@ from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
 from gravcomp.orientation.calibration import RestCalibration
 
-_STIFFEST = 1e6  # N: cables stiffer than that stay inextensible
+if TYPE_CHECKING:
+    from ruamel.yaml import YAML
+
+_STIFFEST = 1e6  # N: a stiffer cable is described as inextensible
 
 
 def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: float | None = None) -> Robot:
-    """The robot with modulus, cable elasticity and, where given, damping time (s) as fitted."""
+    """Return the robot with the fitted modulus, cable elasticity and, if given, damping time in s."""
     cables = tuple(
         dataclasses.replace(cable, axial_stiffness=_stiffness(robot.cable_end(cable) - cable.start, float(compliance)))
         for cable, compliance in zip(robot.cables, parameters.compliance)
@@ -24,7 +28,7 @@ def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: f
 
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
-    """The motors with capstan radius and cables' offsets as fitted, on top of what was known."""
+    """Return the motors with the fitted capstan radius and cable offsets, relative to those of `hardware`."""
     motors = tuple(
         dataclasses.replace(motor, offset=float(parameters.winding * motor.offset + offset))
         for motor, offset in zip(hardware.motors, parameters.offset)
@@ -34,9 +38,9 @@ def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Har
 
 
 def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardware: Hardware) -> None:
-    """Write the robot's file `source` to `target` with the calibrated values of `robot` and `hardware`; comments and order stay.
+    """Write the robot's file `source` to `target` with the calibrated values of `robot` and `hardware`.
 
-    Raises ConfigError when it cannot be written.
+    Comments and order are kept. Raises ConfigError if it cannot be written.
     """
     document = _document(source)
     for entry, segment in zip(document["robot"]["segments"], robot.segments):
@@ -58,9 +62,9 @@ def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardw
 
 
 def write_imu_calibration(source: str | Path, target: str | Path, found: RestCalibration, bias_model: Path | None = None) -> None:
-    """Write the robot's file `source` to `target` with the IMU's calibration, its mount where it was fitted, and where its bias model is kept.
+    """Write the robot's file `source` to `target` with the IMU's calibration, the mount if fitted, and the bias model's path.
 
-    Comments and order stay. Raises ConfigError when it cannot be written.
+    Comments and order are kept. Raises ConfigError if it cannot be written.
     """
     document = _document(source)
     estimator = _section(_section(document, "nodes"), "imu_estimator")
@@ -76,17 +80,19 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
 
 
 def _section(mapping: dict, key: str) -> dict:
-    """The mapping under the key, made where the file has none or an empty one."""
+    """Return the mapping under the key; create it if it is missing or empty."""
     if mapping.get(key) is None:
         mapping[key] = {}
     return mapping[key]
 
 
 def _document(source: str | Path) -> dict:
+    """Return the parsed YAML with its comments."""
     return _yaml().load(Path(source).read_text(encoding="utf-8"))
 
 
 def _write(document: dict, target: str | Path) -> None:
+    """Write a parsed YAML. Raises ConfigError."""
     try:
         with Path(target).open("w", encoding="utf-8") as file:
             _yaml().dump(document, file)
@@ -94,7 +100,8 @@ def _write(document: dict, target: str | Path) -> None:
         raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
 
 
-def _yaml():
+def _yaml() -> "YAML":
+    """Return a reader and writer that keeps comments."""
     from ruamel.yaml import YAML
 
     yaml = YAML()
@@ -103,4 +110,5 @@ def _yaml():
 
 
 def _stiffness(length: float, compliance: float) -> float | None:
+    """Return the axial stiffness in N of a cable of a length in m and a compliance in m/N; None: inextensible."""
     return length / compliance if compliance > length / _STIFFEST else None

@@ -1,4 +1,4 @@
-"""Measured tips from a rosbag2 folder: `gravity`, `cable/state` and the tip's poses, brought to the tip's times."""
+"""Measured tips from a rosbag2 folder: poses of the tip, with `gravity` and `cable/state` interpolated to their times."""
 
 from pathlib import Path
 
@@ -9,14 +9,14 @@ from gravcomp.recordings.bags import BagError
 from gravcomp.recordings.bags.streams import CABLE_STATE, POSE, VECTOR, Wanted, read_streams
 
 TIP_TOPICS = ("measured/tip", "truth/tip")
-"""Of a tracker; of the virtual robot."""
+"""Topics of a tracker and of the virtual robot."""
 
-_LONGEST_GAP = 1.0  # s without tips: a new trial begins
-_RATE = 50.0  # Hz that are kept
+_LONGEST_GAP = 1.0  # s: a new trial begins after a longer time without tips
+_RATE = 50.0  # Hz: rate of the samples that are kept
 
 
 def read_bag(path: Path, cables: tuple[str, ...], tip_topic: str | None = None) -> Measured:
-    """The bag's measurement. Raises MeasurementError."""
+    """Return the measurement in a bag. Raises MeasurementError."""
     wanted = {
         "gravity": Wanted(VECTOR, ("gravity",)),
         "state": Wanted(CABLE_STATE, ("cable/state",)),
@@ -27,6 +27,7 @@ def read_bag(path: Path, cables: tuple[str, ...], tip_topic: str | None = None) 
     except BagError as error:
         raise MeasurementError(str(error)) from error
     gravity, state, tip = (streams[key] for key in wanted)
+    assert gravity is not None and state is not None and tip is not None  # none of them is optional
     if state.values.shape[1] != len(cables):
         raise MeasurementError(f"{path}: '{state.topic}' has {state.values.shape[1]} cables; the robot has {len(cables)}")
     order = np.argsort(tip.stamp, kind="stable")
@@ -48,12 +49,12 @@ def read_bag(path: Path, cables: tuple[str, ...], tip_topic: str | None = None) 
 
 
 def thinned(time: np.ndarray, rate: float) -> np.ndarray:
-    """(k,) bool: which of the increasing times (k,) to keep for at most `rate` a second."""
+    """Return (k,) which of the increasing times (k,) to keep for at most `rate` samples per second."""
     return np.concatenate([[True], np.diff(np.floor(time * rate)) > 0])
 
 
 def direction_of_poses(poses: np.ndarray) -> np.ndarray:
-    """(k, 3) the z axes of poses (k, 7), position and orientation x y z w."""
+    """Return the z axes (k, 3) of poses (k, 7), position and orientation x y z w."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_quat(poses[:, 3:]).as_matrix()[:, :, 2]

@@ -1,11 +1,11 @@
 """Measured courses of the tip in files.
 
-A CSV file has a header and one row a sample:
+A CSV file has a header and one row per sample:
 
     trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty: released),
     tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z
 
-`trial` may be missing when there is one. A bag has `gravity`, `cable/state` and the tip as geometry_msgs/PoseStamped.
+`trial` may be missing if there is only one. A bag has `gravity`, `cable/state` and the tip as geometry_msgs/PoseStamped.
 """
 
 import csv
@@ -29,7 +29,7 @@ def read_measured(path: str | Path, cables: tuple[str, ...], tip_topic: str | No
 
 
 def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
-    """Write what `read_measured` reads."""
+    """Write a CSV file that `read_measured` reads."""
     gravity, tip = ["gravity_x", "gravity_y", "gravity_z"], ["tip_x_mm", "tip_y_mm", "tip_z_mm"]
     direction = ["direction_x", "direction_y", "direction_z"] if measured.tip_direction is not None else []
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -38,12 +38,13 @@ def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
         for row in range(len(measured.time)):
             wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in measured.displacement[row]]
             values = [f"{x:.5f}" for x in measured.gravity[row]] + wound + [f"{1e3 * x:.4f}" for x in measured.tip_position[row]]
-            if direction:
+            if measured.tip_direction is not None:
                 values += [f"{x:.6f}" for x in measured.tip_direction[row]]
             writer.writerow([int(measured.trial[row]), f"{measured.time[row]:.4f}", *values])
 
 
 def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
+    """Return the measurement in a CSV file. Raises MeasurementError."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)

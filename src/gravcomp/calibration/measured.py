@@ -1,4 +1,4 @@
-"""Measured courses of the tip, and the windows in them at which the robot stands still."""
+"""Measured courses of the tip, and the windows in them in which the robot is at rest."""
 
 import math
 from dataclasses import dataclass
@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 STILL_TIME = 0.5  # s: length of a window
-STILL_TIP = 0.6e-3  # m: the tip stays within, in a window
-STILL_CABLE = 0.05e-3  # m
-STILL_GRAVITY = math.radians(0.5)  # rad
+STILL_TIP = 0.6e-3  # m: largest motion of the tip in a window
+STILL_CABLE = 0.05e-3  # m: of a cable
+STILL_GRAVITY = math.radians(0.5)  # rad: of the gravity direction
 
 
 class MeasurementError(ValueError):
-    """Data that cannot be used; the text says what was found, and what is needed."""
+    """Measured data that cannot be used; the text says what was found and what is needed."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Samples in the order of time within each trial; t samples, m cables. SI, soft_base."""
+    """t samples of m cables and the tip, ordered by time within each trial. SI, `soft_base`."""
 
     source: str
     trial: np.ndarray  # (t,) int
@@ -32,14 +32,14 @@ class Measured:
             if not np.isfinite(getattr(self, name)).all():
                 raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
         if len(self.time) < 2:
-            raise MeasurementError(f"{self.source}: holds {len(self.time)} samples; at least 2 are needed")
+            raise MeasurementError(f"{self.source}: has {len(self.time)} samples; at least 2 are needed")
 
     def trials(self) -> list["Measured"]:
-        """One a trial."""
+        """Return one measurement per trial."""
         return [self.rows(self.trial == number) for number in dict.fromkeys(self.trial.tolist())]
 
     def rows(self, which: np.ndarray) -> "Measured":
-        """The samples chosen by a mask or by indices."""
+        """Return the samples selected by a mask or by indices."""
         direction = None if self.tip_direction is None else self.tip_direction[which]
         return Measured(
             self.source, self.trial[which], self.time[which], self.gravity[which], self.displacement[which],
@@ -49,7 +49,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class StillWindows:
-    """Means over the windows at which nothing moves, one row a window; k windows."""
+    """Means over k windows in which nothing moves, one row per window."""
 
     gravity: np.ndarray  # (k, 3)
     displacement: np.ndarray  # (k, m), NaN: released
@@ -57,23 +57,23 @@ class StillWindows:
 
 
 def still_windows(measured: Measured) -> StillWindows:
-    """The last window of every stretch of each trial during which gravity, cables and tip stand still.
+    """Return the last window of every period of rest of each trial; at rest, gravity, cables and tip do not move.
 
-    Raises MeasurementError when there is none.
+    Raises MeasurementError if there is none.
     """
     found = []
     for trial in measured.trials():
         found += _windows_of(trial)
     if not found:
         raise MeasurementError(
-            f"{measured.source}: the robot never stands still for {STILL_TIME:g} s (tip within {1e3 * STILL_TIP:g} mm,"
+            f"{measured.source}: the robot is never at rest for {STILL_TIME:g} s (tip within {1e3 * STILL_TIP:g} mm,"
             f" cables within {1e3 * STILL_CABLE:g} mm); let it settle in a few poses"
         )
     return StillWindows(*(np.array(column) for column in zip(*found)))
 
 
 def _windows_of(trial: Measured) -> list[tuple]:
-    """The last still window before each movement, and before the trial's end."""
+    """Return the last window at rest before each movement, and before the end of the trial."""
     count = max(2, round(STILL_TIME / max(np.median(np.diff(trial.time)), 1e-6)))
     windows, last = [], None
     for start in range(0, len(trial.time) - count + 1, max(1, count // 2)):
@@ -87,6 +87,7 @@ def _windows_of(trial: Measured) -> list[tuple]:
 
 
 def _is_still(window: Measured) -> bool:
+    """Return whether nothing moves in the window."""
     spread = np.ptp(window.tip_position, axis=0).max() <= STILL_TIP
     released = np.isnan(window.displacement)
     same = (released.all(axis=0) | ~released.any(axis=0)).all()

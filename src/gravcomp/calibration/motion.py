@@ -1,44 +1,41 @@
-"""Predicted motion of the tip over whole courses, and the fit of modulus, damping and creep to them.
+"""Fit of modulus, damping and creep to measured courses of the tip.
 
     min over x = (log E, log beta, log rho, log T) of  sum_k |tip(t_k; x) - measured_k|^2
 
-with the lasting modulus E, Kelvin's and Voigt's damping time beta, and rho and T of the branch that creeps (see `simulation.viscosity`). Without
-that branch one modulus would have to be right both for the swing, in which a soft material is stiffer, and for the rest after it.
+with the lasting modulus E, the Kelvin-Voigt damping time beta, and rho and T of the creep branch (see `full_model.viscosity`).
+Without that branch one modulus would have to be right both for the swing, in which a soft material is stiffer, and for the rest
+after it.
 
-Intervals are at 95 %, from the Jacobian at the solution. Residuals of neighbouring samples are alike, so their number counts only as much as their
-correlation rho from sample to sample leaves: the variance is multiplied by (1 + rho) / (1 - rho).
+Intervals are at 95 %, from the Jacobian at the solution. The residuals of neighbouring samples are correlated, so the variance
+is multiplied by (1 + rho) / (1 - rho), where rho is the correlation from sample to sample.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
-from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
 
-STRAIGHT = 2e-3  # m: a course whose tip begins nearer than that to the straight robot's begins straight
-COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
-"""Of predicted courses: steps of 5 ms follow a fall within a tenth of a millimetre."""
 _MODULUS_RANGE, _DAMPING_RANGE = (0.05, 20.0), (0.02, 50.0)  # times the values at the start
-_CREEP_RANGES = (
-    (0.002, 2.0),
-    (0.03, 5.0),
-)  # of rho, and of T in s: slower creep is at rest for these courses, faster one is damping
+# Of rho, and of T in s: in these courses slower creep does not show, and faster creep acts like damping.
+_CREEP_RANGES = ((0.002, 2.0), (0.03, 5.0))
 _CREEP_START = 0.08, 0.4
-# s: a model that swings out of phase is best overdamped, a wrong minimum; so short a beginning holds no swing to be out of phase with.
-_FIRST_LOOK = 0.3
+# s: length of the beginnings that are fitted first. If the model swings out of phase, the fit ends in a wrong minimum with too
+# much damping; such a short beginning contains no full swing.
+_BEGINNING = 0.3
 _DIFFERENCE = 0.02  # step of x for the derivatives
 
 
 @dataclass(frozen=True)
 class MotionFit:
-    """The fitted robot, and its values in SI with the half widths of their intervals; evaluations: of all courses, shorter ones counted
-    by their length.
+    """The fitted robot and its values in SI.
 
-    A value that was not fitted has the interval NaN. rms_before, rms_after: of the tip's distance, m; damping_seen: False where the courses
-    hold too little motion to tell the damping.
+    *_interval: half width of the interval at 95 %, NaN if the value was not fitted; evaluations: number of predictions of all
+    courses, shorter ones counted by their length; rms_before and rms_after: tip error in m; predicted: tips (t, 3) of each
+    course; damping_seen: False if the courses contain too little motion to determine the damping.
     """
 
     robot: Robot
@@ -57,42 +54,16 @@ class MotionFit:
     damping_seen: bool
 
 
-def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Tip positions (t, 3) in m and directions (t, 3) at the course's times. Raises RuntimeError where the motion cannot be followed."""
-    straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
-    rows = [
-        straight if shape is None else (shape.tip_position, shape.tip_direction)
-        for shape in predict_shapes(robot, course, options)
-    ]
-    tips, directions = zip(*rows)
-    return np.array(tips), np.array(directions)
-
-
-def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> Iterator[Shape | None]:
-    """The shapes at the course's times, None for a beginning at the straight robot. Raises RuntimeError as `predict_course`."""
-    simulator = DynamicSimulator(robot, options)
-    if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT:
-        yield simulator.settle(course.gravity[0], course.displacement[0])
-    else:
-        simulator.let_go(course.gravity[0])
-        yield None
-    for gravity, displacement, duration in zip(course.gravity[1:], course.displacement[1:], np.diff(course.time)):
-        shape = simulator.step(gravity, displacement, duration=duration)
-        if shape.status == ShapeStatus.NOT_CONVERGED:
-            raise RuntimeError(f"the motion cannot be followed: {shape.message}")
-        yield shape
-
-
 def fit_motion(
     robot: Robot,
     courses: list[Measured],
     *,
-    mapper: Callable[[Callable, list], list] = lambda function, jobs: [function(job) for job in jobs],
+    mapper: Callable[[Callable, list], list] = lambda function, jobs: list(map(function, jobs)),
     progress: Callable[[str], None] = lambda sentence: None,
     modulus: bool = True,
     creep: bool = True,
 ) -> MotionFit:
-    """Fit to the courses; `mapper` computes them side by side. modulus, creep: False leaves these as the robot has them."""
+    """Fit to the courses. mapper: as `map`, may compute courses in parallel; modulus, creep: False keeps the robot's values."""
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
@@ -102,25 +73,23 @@ def fit_motion(
     if modulus:
         starts["youngs_modulus"] = material.youngs_modulus
         ranges["youngs_modulus"] = material.youngs_modulus * np.array(_MODULUS_RANGE)
-    first = _Parameters(robot, starts, ranges)
+    beginning = _Parameters(robot, starts, ranges)
     if creep:
         starts = starts | dict(zip(("creep_ratio", "creep_time"), _CREEP_START))
-        ranges = ranges | dict(zip(("creep_ratio", "creep_time"), _CREEP_RANGES))
+        ranges = ranges | dict(zip(("creep_ratio", "creep_time"), np.array(_CREEP_RANGES)))
     all_of_them = _Parameters(robot, starts, ranges)
-    beginnings = [course.rows(course.time <= course.time[0] + _FIRST_LOOK) for course in courses]
-    look, whole = (
-        _Courses(beginnings, first.robot_at, mapper, progress),
-        _Courses(courses, all_of_them.robot_at, mapper, progress),
-    )
+    beginnings = [course.rows(course.time <= course.time[0] + _BEGINNING) for course in courses]
+    short = _Courses(beginnings, beginning.robot_at, mapper, progress)
+    whole = _Courses(courses, all_of_them.robot_at, mapper, progress)
     options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}
-    x = least_squares(look.residuals, first.start, jac=look.jacobian, bounds=first.bounds, **options).x
-    # What creeps later is part of the stiffness of the beginning.
+    x = least_squares(short.residuals, beginning.start, jac=short.jacobian, bounds=beginning.bounds, **options).x
+    # In the beginning, the stiffness of the creep branch adds to the lasting one.
     x = np.concatenate([x, all_of_them.start[len(x) :]])
     if creep and modulus:
         x[1] -= np.log1p(_CREEP_START[0])
     solution = least_squares(whole.residuals, x, jac=whole.jacobian, bounds=all_of_them.bounds, **options)
     x = solution.x
-    simulated = [sum(len(course.time) for course in look.courses) * look.count for look in (look, whole)]
+    simulated = [sum(len(course.time) for course in part.courses) * part.count for part in (short, whole)]
     error = solution.fun.reshape(-1, 3)
     freedom = max(1, error.size - len(x))
     rho = float(np.clip((error[1:] * error[:-1]).sum() / max((error**2).sum(), 1e-30), 0.0, 0.99))
@@ -149,11 +118,12 @@ def fit_motion(
 
 
 def _rms(error: np.ndarray) -> float:
+    """Return the root mean square length of errors (t, 3)."""
     return float(np.sqrt((error**2).sum(axis=1).mean()))
 
 
 class _Parameters:
-    """Fields of the robot's material as logarithms x, in the order of `names`."""
+    """Logarithms x of fields of the robot's material, in the order of `names`."""
 
     def __init__(self, robot: Robot, starts: dict[str, float], ranges: dict[str, np.ndarray]):
         self._robot, self.names = robot, list(starts)
@@ -161,12 +131,12 @@ class _Parameters:
         self.bounds = tuple(np.log([ranges[name] for name in starts]).T)
 
     def robot_at(self, x: np.ndarray) -> Robot:
-        """The robot with these values."""
+        """Return the robot with the values at x."""
         return self._robot.with_material(**{name: float(value) for name, value in zip(self.names, np.exp(x))})
 
 
 class _Courses:
-    """Courses and their predictions at the points x that were asked for; lengths in mm for the solver."""
+    """Residuals of the courses as functions of x, with a cache of predictions. count: number of predictions."""
 
     def __init__(self, courses: list[Measured], robot_at: Callable, mapper: Callable, progress: Callable):
         self.courses, self.count = courses, 0
@@ -175,26 +145,29 @@ class _Courses:
         self._tips: dict[tuple, list[np.ndarray]] = {}
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        # The point's own derivatives will be asked for next; computed together they go side by side.
+        """Return the tip errors in mm, as one vector."""
+        # The solver needs the derivatives at x next: computed together, all predictions run in parallel.
         self._predict([x, *(x + step for step in _DIFFERENCE * np.eye(len(x)))])
         error = self.error(x)
         self._progress(f"evaluation {self.count}: {1e3 * np.sqrt((error**2).sum(axis=1).mean()):.3f} mm RMS")
         return 1e3 * error.ravel()
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Return the derivative of the residuals by x, by forward differences."""
         here = self.error(x)
         return np.column_stack([1e3 * (self.error(x + s) - here).ravel() / _DIFFERENCE for s in _DIFFERENCE * np.eye(len(x))])
 
     def error(self, x: np.ndarray) -> np.ndarray:
-        """(t, 3) m: modelled minus measured tips."""
+        """Return modelled minus measured tips (t, 3) in m."""
         return np.concatenate(self.tips(x)) - self.measured
 
     def tips(self, x: np.ndarray) -> list[np.ndarray]:
-        """(t, 3) a course."""
+        """Return the predicted tips (t, 3) of each course in m."""
         self._predict([x])
         return self._tips[tuple(x)]
 
     def _predict(self, points: list[np.ndarray]) -> None:
+        """Predict the courses at those points that are not in the cache."""
         new = [x for x in points if tuple(x) not in self._tips]
         tips = self._mapper(_tip_course, [(self._robot_at(x), course) for x in new for course in self.courses]) if new else []
         for index, x in enumerate(new):
@@ -203,4 +176,5 @@ class _Courses:
 
 
 def _tip_course(job: tuple[Robot, Measured]) -> np.ndarray:
+    """Return the predicted tips (t, 3) of a course. A function of the module, so that it can be sent to another process."""
     return predict_course(*job)[0]

@@ -1,4 +1,4 @@
-"""The page of a calibration: fitted parameters with their intervals, warnings, and the tips before and after."""
+"""Report of a calibration: fitted parameters with their intervals, warnings, and the tips before and after."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gravcomp.report.result import Figure, Plot, Result, Table
 def calibration_result(
     source: str, written: str, statics: StaticFit, motion: MotionFit | None, courses: list[Measured], initial_damping: float
 ) -> Result:
-    """The result for `report.write_report`. courses: those that `motion` was fitted to; initial_damping in s."""
+    """Return the result for `report.write_report`. courses: those of the fit `motion`; initial_damping in s."""
     rows = [
         (e.name, f"{e.initial:.4g} {e.unit}", f"{e.value:.5g} {e.unit}", f"± {e.interval:.2g} {e.unit}", e.seen)
         for e in statics.estimates
@@ -32,9 +32,14 @@ def calibration_result(
     warnings = list(statics.warnings)
     if motion is not None:
         rows.append(
-            ("damping time", f"{1e3 * initial_damping:.4g} ms", f"{1e3 * motion.damping_time:.4g} ms", f"± {1e3 * motion.damping_interval:.2g} ms",
-             motion.damping_seen)
-        )  # fmt: skip
+            (
+                "damping time",
+                f"{1e3 * initial_damping:.4g} ms",
+                f"{1e3 * motion.damping_time:.4g} ms",
+                f"± {1e3 * motion.damping_interval:.2g} ms",
+                motion.damping_seen,
+            )
+        )
         if np.isfinite(motion.creep_ratio_interval):
             creep = (
                 ("creep ratio", motion.creep_ratio, motion.creep_ratio_interval, ""),
@@ -45,15 +50,15 @@ def calibration_result(
                 for name, value, interval, unit in creep
             ]
             if motion.creep_ratio_interval > motion.creep_ratio:
-                warnings.append("creep: these data cannot tell it from none; leave --creep out")
+                warnings.append("creep: these data do not show any; leave --creep out")
         if not motion.damping_seen:
-            warnings.append("damping time: these data hold too little motion to tell it")
+            warnings.append("damping time: these data contain too little motion to determine it")
         figures += [
             Figure("tip error in motion before, RMS", 1e3 * motion.rms_before, "mm"),
             Figure("tip error in motion after, RMS", 1e3 * motion.rms_after, "mm"),
         ]
         parts.append(
-            Plot("Motion", _motion(courses, motion), "The trial with the most motion: measured, and modelled after the fit.")
+            Plot("Motion", _motion(courses, motion), "The trial with the most motion, measured and modelled after the fit.")
         )
     return Result(
         name="calibration",
@@ -64,7 +69,7 @@ def calibration_result(
         parts=[Table("Parameters", ("parameter", "before", "after", "interval", "seen in the data"), rows), *parts],
         notes=[
             *warnings,
-            "The density is taken as given: gravity bends the robot by density over modulus, so the data cannot tell both.",
+            "The density is taken as given: gravity bends the robot by density over modulus, so the data cannot determine both.",
         ],
         data={
             "parameters": [vars(e) for e in statics.estimates],
@@ -75,6 +80,7 @@ def calibration_result(
 
 
 def _tips(fit: StaticFit) -> str:
+    """Return the drawing of the resting tips as SVG."""
     rest = np.array([0.0, 0.0, fit.windows.tip_position[:, 2].max()])
     measured = 1e3 * (fit.windows.tip_position - rest)
     with Drawing(1, 3, width=10.5, height=3.5) as drawing:
@@ -90,6 +96,7 @@ def _tips(fit: StaticFit) -> str:
 
 
 def _motion(courses: list[Measured], fit: MotionFit) -> str:
+    """Return the drawing of the course with the most motion as SVG."""
     index = max(range(len(courses)), key=lambda k: np.ptp(courses[k].tip_position, axis=0).max())
     course, predicted = courses[index], fit.predicted[index]
     axis = int(np.argmax(np.ptp(course.tip_position, axis=0)))

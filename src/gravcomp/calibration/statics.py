@@ -1,12 +1,13 @@
 """Predicted resting tips and their exact derivatives by modulus, cable offsets, cable compliance and winding ratio.
 
-One model serves all moduli, because without inertia only the ratios count: with s = E_0 / E, the robot of modulus E under gravity g has the
-shape of the robot of modulus E_0 under s g, with tensions lambda = lambda_0 / s and, for a cable of compliance c, the elongation
-c lambda = (c / s) lambda_0. A cable that the motor displaces by u pulls the path in by w u + o - c lambda, o being its offset and w the winding
-ratio of all motors: capstans are not exactly as large as believed, and cables not exactly as far from the axis.
+One model is enough for all moduli, because without inertia only ratios matter: with s = E_0 / E, the robot of modulus E under
+gravity g has the shape of the robot of modulus E_0 under s g, with tensions lambda = lambda_0 / s and, for a cable of
+compliance c, the elongation c lambda = (c / s) lambda_0. A cable that the motor displaces by u pulls the path in by w u + o - c
+lambda, where o is its offset and w the winding ratio of all motors: it accounts for the real radius of the capstans and the
+real distance of the cables from the axis.
 
-Derivatives come from the linear answer of each shape (taut cables a): dtip/do = W_ea W_aa^-1, dtip/dc = -dtip/do lambda, dtip/dw = dtip/do u;
-that by the modulus from the shape at a slightly other one.
+Derivatives follow from the linear response of each shape (taut cables a): dtip/do = W_ea W_aa^-1, dtip/dc = -dtip/do lambda,
+dtip/dw = dtip/do u. The derivative by the modulus is a difference quotient.
 """
 
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ _MODULUS_STEP = 1e-3
 
 @dataclass(frozen=True)
 class StaticParameters:
-    """youngs_modulus in Pa; offset (m,) in m; compliance (m,) in m/N, one value a cable; winding: ratio w."""
+    """Parameters of the static fit: youngs_modulus in Pa; offset (m,) in m; compliance (m,) in m/N; winding: ratio w."""
 
     youngs_modulus: float
     offset: np.ndarray
@@ -32,8 +33,10 @@ class StaticParameters:
 
 @dataclass(frozen=True)
 class StaticPrediction:
-    """tip (k, 3) m; its derivatives by_modulus (k, 3) m/Pa, by_offset (k, 3, m), by_compliance (k, 3, m) N, by_winding (k, 3) m; tension
-    (k, m) N.
+    """Predictions for k windows.
+
+    tip (k, 3) in m; its derivatives by_modulus (k, 3) in m/Pa, by_offset (k, 3, m), by_compliance (k, 3, m) in N, by_winding
+    (k, 3) in m; tension (k, m) in N.
     """
 
     tip: np.ndarray
@@ -45,19 +48,20 @@ class StaticPrediction:
 
 
 class StaticPredictor:
-    """Tips of a robot at rest in given windows."""
+    """Predicts the tips of a robot at rest in given windows."""
 
     def __init__(self, robot: Robot, windows: StillWindows):
         self.windows = windows
-        self._modulus = robot.segments[0].material.youngs_modulus if robot.segments else robot.body.material.youngs_modulus
         self._simulator = Simulator(robot, reduced=False)
+        self._modulus = self._simulator.model.mesh.materials[0].youngs_modulus
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
-        """All windows' tips. Raises RuntimeError where there is no equilibrium."""
+        """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
         rows = [self._window(k, parameters) for k in range(len(self.windows.tip_position))]
         return StaticPrediction(*(np.array(column) for column in zip(*rows)))
 
     def _window(self, k: int, parameters: StaticParameters) -> tuple:
+        """Return window k's entries of a StaticPrediction."""
         shape = self._solve(k, parameters, parameters.youngs_modulus)
         ahead = self._solve(k, parameters, parameters.youngs_modulus * (1.0 + _MODULUS_STEP))
         by_modulus = (ahead.tip_position - shape.tip_position) / (_MODULUS_STEP * parameters.youngs_modulus)
@@ -73,6 +77,7 @@ class StaticPredictor:
         return shape.tip_position, by_modulus, by_offset, -by_offset * tension, by_winding, tension
 
     def _solve(self, k: int, parameters: StaticParameters, modulus: float) -> Shape:
+        """Return the shape in window k at a modulus in Pa."""
         similarity = self._modulus / modulus
         self._simulator.model.tendons.axial_compliance = parameters.compliance / similarity
         displacement = parameters.winding * self.windows.displacement[k] + parameters.offset

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from gravcomp.calibration.course import predict_course, predict_shapes
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import fit_motion, predict_course, predict_shapes
+from gravcomp.calibration.motion import fit_motion
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.evaluation.metrics import angle_between

@@ -7,8 +7,9 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.calibration.course import COURSE_OPTIONS, predict_course
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import COURSE_OPTIONS, fit_motion, predict_course
+from gravcomp.calibration.motion import fit_motion
 from gravcomp.description import Robot
 from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table

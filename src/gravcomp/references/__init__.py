@@ -1,1 +1,1 @@
-"""References to compare with: beam theories, and CalculiX as a general finite-element program."""
+"""Reference solutions: beam theories, and CalculiX as a general finite-element program."""

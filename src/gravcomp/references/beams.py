@@ -1,7 +1,7 @@
 """Two theories of a beam that bends under its own weight, for comparison.
 
-Euler and Bernoulli, small deflections: the tip goes down by w L^4 / (8 E I), w = rho A g cos(inclination).
-Elastica, any deflection, no stretch and no shear: with the angle theta(s) of the axis above the horizontal,
+Euler-Bernoulli, small deflections: the tip sags by w L^4 / (8 E I), w = rho A g cos(inclination). Elastica, any deflection, no
+stretch and no shear; SciPy's `solve_bvp` solves it: with the angle theta(s) of the axis above the horizontal,
 
     E I theta'' = rho A g (L - s) cos(theta),    theta(0) = inclination,    theta'(L) = 0.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Tube:
-    """SI: length, outer and inner diameter, Young's modulus, density."""
+    """A tube: length, outer and inner diameter, Young's modulus, density; SI."""
 
     length: float
     outer_diameter: float
@@ -33,20 +33,19 @@ class Tube:
 
 
 def euler_bernoulli(tube: Tube, inclination: float, gravity: float = 9.81) -> np.ndarray:
-    """(3,) m: displacement of the tip in soft_base, where gravity is g (-cos, 0, -sin) of the inclination (rad)."""
+    """Return the displacement (3,) of the tip in m, in soft_base, where gravity is g (-cos, 0, -sin) of the inclination (rad)."""
     sag = tube.weight(gravity) * math.cos(inclination) * tube.length**4 / (8 * tube.bending_stiffness)
     return np.array([-sag, 0.0, 0.0])
 
 
 def elastica(tube: Tube, inclination: float, gravity: float = 9.81) -> np.ndarray:
-    """(3,) m: displacement of the tip, as above. Raises RuntimeError when the boundary-value problem is not solved."""
+    """Return the displacement as `euler_bernoulli`. Raises RuntimeError if the boundary-value problem is not solved."""
     from scipy.integrate import solve_bvp
 
     length, ratio = tube.length, tube.weight(gravity) * tube.length**3 / tube.bending_stiffness
     station = np.linspace(0.0, 1.0, 51)
     guess = np.vstack([np.full_like(station, inclination), np.zeros_like(station)])
-    solution = None
-    for part in (0.25, 0.5, 0.75, 1.0):  # the weight comes bit by bit, so that the solver stays on the hanging branch
+    for part in (0.25, 0.5, 0.75, 1.0):  # the weight is applied in parts, so that the solver stays on the hanging branch
         solution = solve_bvp(
             lambda s, y, part=part: np.vstack([y[1], part * ratio * (1 - s) * np.cos(y[0])]),
             lambda a, b: np.array([a[0] - inclination, b[1]]),
@@ -56,8 +55,9 @@ def elastica(tube: Tube, inclination: float, gravity: float = 9.81) -> np.ndarra
         )
         if solution.status != 0:
             raise RuntimeError(f"elastica at {math.degrees(inclination):g} deg: {solution.message}")
-        guess = solution.sol(station)
+        curve = solution.sol
+        guess = curve(station)
     fine = np.linspace(0.0, 1.0, 2001)
-    turn = solution.sol(fine)[0] - inclination
+    turn = curve(fine)[0] - inclination
     across, along = np.trapezoid(np.sin(turn), fine) * length, np.trapezoid(np.cos(turn), fine) * length
     return np.array([across, 0.0, along - length])

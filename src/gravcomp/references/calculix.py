@@ -1,7 +1,8 @@
-"""CalculiX as the general finite-element program: run where it is installed, otherwise its stored results.
+"""CalculiX, a general finite-element program: run if it is installed, otherwise its stored results.
 
-`calculix_h20r.csv` holds CalculiX 2.20 (C3D20R, 1 x 10 x 24 graded toward the clamp, large displacements) for the hollow cylinder of 100 mm, 9 mm
-outside, 3 mm inside, 1150 kg/m^3; `REFERENCE` names that tube. Gravity is g (-cos, 0, -sin) of the inclination.
+`calculix_h20r.csv` has the results of CalculiX 2.20 (C3D20R, 1 x 10 x 24 graded toward the clamp, large displacements) for the
+hollow cylinder of 100 mm, 9 mm outside, 3 mm inside, 1150 kg/m^3; `REFERENCE` names that tube. Gravity is g (-cos, 0, -sin) of
+the inclination.
 """
 
 import csv
@@ -23,7 +24,7 @@ REFERENCE = {"length": 0.1, "outer_diameter": 9e-3, "inner_diameter": 3e-3, "den
 
 @dataclass(frozen=True)
 class Row:
-    """One solved case: law 'svk' or 'nh', modulus Pa, Poisson's ratio, inclination rad, displacement (3,) m of the end face."""
+    """A solved case: law 'svk' or 'nh', modulus Pa, Poisson's ratio, inclination rad, displacement (3,) m of the end face."""
 
     law: str
     youngs_modulus: float
@@ -33,7 +34,7 @@ class Row:
 
 
 def stored_rows() -> list[Row]:
-    """The stored table."""
+    """Return the stored table."""
     text = (resources.files("gravcomp.references") / "calculix_h20r.csv").read_text()
     return [
         Row(
@@ -48,12 +49,12 @@ def stored_rows() -> list[Row]:
 
 
 def installed() -> str | None:
-    """Path of the solver, or None."""
+    """Return the path of the solver; None if it is not installed."""
     return shutil.which("ccx")
 
 
 def solve(mesh: Mesh, inclination: float) -> np.ndarray:
-    """(3,) m: mean displacement of the end face of a mesh of 'hex20' in one material, computed now. Raises RuntimeError."""
+    """Return the mean displacement (3,) in m of the end face of a 'hex20' mesh of one material. Raises RuntimeError."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "tube.inp").write_text(deck(mesh, inclination), encoding="ascii")
         try:
@@ -67,7 +68,7 @@ def solve(mesh: Mesh, inclination: float) -> np.ndarray:
 
 
 def deck(mesh: Mesh, inclination: float) -> str:
-    """The input file. VTK's order of the nodes of a 20-node hexahedron is that of C3D20R."""
+    """Return the input file. The nodes of a 20-node hexahedron have the same order in VTK and C3D20R."""
     material = mesh.materials[0]
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{i}, {x:.9e}, {y:.9e}, {z:.9e}" for i, (x, y, z) in enumerate(mesh.nodes, start=1)]
@@ -98,7 +99,7 @@ def deck(mesh: Mesh, inclination: float) -> str:
 
 
 def last_displacements(output: str) -> np.ndarray:
-    """(n, 3) m: the displacements of the last increment in a .dat file. Raises RuntimeError when there are none."""
+    """Return the displacements (n, 3) in m of the last increment in a .dat file. Raises RuntimeError if there are none."""
     block = output.rpartition("displacements")[2]
     rows = [line.split() for line in block.splitlines()]
     values = [[float(x) for x in row[1:]] for row in rows if len(row) == 4 and row[0].isdigit()]

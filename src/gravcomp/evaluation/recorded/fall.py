@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gravcomp.calibration.course import STRAIGHT, predict_course
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import STRAIGHT, predict_course
 from gravcomp.config import ConfigError
 from gravcomp.evaluation.metrics import angle_between, inclination_deg
 from gravcomp.evaluation.recorded.falls import FALLEN, PAID_OUT, WITHIN, as_measured, falls

@@ -6,8 +6,8 @@ straight line that begins at t_0.
 
 import numpy as np
 
+from gravcomp.calibration.course import STRAIGHT
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import STRAIGHT
 from gravcomp.evaluation.recorded.course import RELEASED, Course
 
 FALLEN, WITHIN = 8e-3, 0.5

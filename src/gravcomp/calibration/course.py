@@ -1,0 +1,42 @@
+"""Predicted motion of the tip over a measured course: gravity and cables as measured, tip from the model."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gravcomp.calibration.measured import Measured
+from gravcomp.description import Robot
+from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
+
+STRAIGHT = 2e-3  # m: a course starts straight if its first tip is nearer than this to the straight robot's
+COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
+"""Options of predicted courses: the error of a fall with steps of 5 ms is a tenth of a millimetre."""
+
+
+def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> tuple[np.ndarray, np.ndarray]:
+    """Return tip positions (t, 3) in m and directions (t, 3) at the course's times.
+
+    Raises RuntimeError if a time step does not converge.
+    """
+    straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
+    rows = [
+        straight if shape is None else (shape.tip_position, shape.tip_direction)
+        for shape in predict_shapes(robot, course, options)
+    ]
+    tips, directions = zip(*rows)
+    return np.array(tips), np.array(directions)
+
+
+def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> Iterator[Shape | None]:
+    """Yield the shapes at the course's times, None for the start at the straight robot; raises as `predict_course`."""
+    simulator = DynamicSimulator(robot, options)
+    if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT:
+        yield simulator.settle(course.gravity[0], course.displacement[0])
+    else:
+        simulator.let_go(course.gravity[0])
+        yield None
+    for gravity, displacement, duration in zip(course.gravity[1:], course.displacement[1:], np.diff(course.time)):
+        shape = simulator.step(gravity, displacement, duration=duration)
+        if shape.status == ShapeStatus.NOT_CONVERGED:
+            raise RuntimeError(f"the motion cannot be computed: {shape.message}")
+        yield shape
