@@ -4,6 +4,7 @@ from array import array
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseArray
+from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
 from gravcomp.inverse import Target, TargetError, bend_target
@@ -127,11 +128,10 @@ def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> 
     norm = np.linalg.norm(q)
     if not abs(norm - 1.0) < 1e-2:
         raise TargetError(f"the target's orientation has the norm {norm:g}; a unit quaternion is needed")
-    x, y, z, w = q / norm
     return Target(
         tip_position=np.array([pose.position.x, pose.position.y, pose.position.z]),
         tip_position_weight=position_weight,
-        tip_direction=np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]),
+        tip_direction=Rotation.from_quat(q).apply((0.0, 0.0, 1.0)),
         tip_direction_weight=direction_weight,
     )
 

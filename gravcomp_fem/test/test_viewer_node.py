@@ -32,7 +32,7 @@ class Stand:
         self.viewer = Viewer()
         self.other = rclpy.create_node("other", use_global_arguments=False)
         self.heard: dict[str, list] = {}
-        self.told: list[tuple] = []
+        self.notified: list[tuple] = []
         if whole:
             for kind, topic in (
                 (ShapeTarget, "target/shape"),
@@ -49,11 +49,11 @@ class Stand:
             self.executor.add_node(node)
         self.viewer.start()
         # There is no browser: keep the notifications here.
-        self.viewer.sender.notify = lambda title, sentence, good=False: self.told.append((title, sentence, good))
+        self.viewer.sender.notify = lambda title, sentence, good=False: self.notified.append((title, sentence, good))
 
     def _serve(self, name, value, answer):
         self.heard.setdefault(name, []).append(value)
-        answer.success, answer.message = True, "done as asked"
+        answer.success, answer.message = True, "done as requested"
         return answer
 
     def ask(self, request) -> None:
@@ -77,7 +77,7 @@ class Stand:
 def stand(tmp_path):
     stand = Stand(tmp_path)
     publishers = (stand.viewer.sender.shape_target, stand.viewer.sender.base, stand.viewer.sender.fault)
-    stand.until(lambda: all(p.get_subscription_count() for p in publishers), "nobody listens to the viewer")
+    stand.until(lambda: all(p.get_subscription_count() for p in publishers), "the viewer has no subscribers")
     stand.until(
         lambda: all(c.service_is_ready() for n, c in stand.viewer.sender.services.items() if n != "can_bridge/release"),
         "no services",
@@ -94,7 +94,7 @@ def test_a_bend_becomes_a_target(stand):
     assert message.header.frame_id == "soft_base" and message.tip_position_weight == 1.0
 
 
-def test_who_only_listens_is_no_virtual_robot(stand):
+def test_a_recorder_alone_is_not_taken_for_a_virtual_robot(stand):
     """A recorder subscribes to every topic; on hardware the page must not offer to tilt the base because of it."""
     assert stand.viewer.sender.base.get_subscription_count() > 0
     assert not stand.viewer.observer.snapshot().virtual
@@ -112,7 +112,7 @@ def test_the_last_of_many_tilts_turns_the_base(stand):
         return q is not None and np.allclose(rotation_from_quaternion(q.x, q.y, q.z, q.w), wanted, atol=1e-9)
 
     stand.until(arrived, "the last tilt has not come")
-    # A dragged slider floods nobody: one message a frame.
+    # A dragged slider gives one message per frame.
     assert len(stand.heard["virtual/base_orientation"]) < 60
 
 
@@ -128,9 +128,9 @@ def test_the_last_of_many_tilts_turns_the_base(stand):
 )
 def test_compensation_and_motors_are_asked_for_and_the_answer_is_told(stand, request_, service, value):
     stand.ask(request_)
-    stand.until(lambda: stand.told, "no answer")
+    stand.until(lambda: stand.notified, "no answer")
     assert stand.heard == {service: [value]}
-    assert stand.told == [(service, "done as asked", True)]
+    assert stand.notified == [(service, "done as requested", True)]
 
 
 def test_a_fault_goes_to_the_virtual_robot_in_its_words(stand):
@@ -148,19 +148,19 @@ def test_the_button_records_a_bag(stand, tmp_path):
     end = time.monotonic() + 2.0
     stand.until(lambda: time.monotonic() > end, "")
     stand.ask(Record(False))
-    stand.until(lambda: any(title == "Recorded" for title, *_ in stand.told), "the recorder does not end")
+    stand.until(lambda: any(title == "Recorded" for title, *_ in stand.notified), "the recorder does not end")
     (bag,) = tmp_path.glob("gravcomp_*")
     assert describe(bag)["topics"].get("/diagnostics", 0) > 0
 
 
-def test_what_is_not_there_is_said(tmp_path):
+def test_a_missing_node_is_reported(tmp_path):
     stand = Stand(tmp_path, whole=False)
     try:
         stand.ask(Compensate("compensate"))
-        stand.until(lambda: stand.told, "nothing is said")
-        title, sentence, good = stand.told[0]
+        stand.until(lambda: stand.notified, "no notification")
+        title, sentence, good = stand.notified[0]
         assert title == "inverse_controller/enable" and "not running" in sentence and not good
-        # No virtual robot listens: its controls stay hidden.
-        stand.until(lambda: not stand.viewer._page._controls._base.visible, "the base's controls are shown")
+        # There is no virtual robot: its controls stay hidden.
+        stand.until(lambda: not stand.viewer._page._controls._virtual.visible, "the base's controls are shown")
     finally:
         stand.close()

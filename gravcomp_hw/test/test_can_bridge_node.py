@@ -134,37 +134,47 @@ def bench(request):
     bench.close()
 
 
-def test_samples_states_and_services_are_those_of_the_table(bench):
-    bench.follow()
-    bench.until(lambda: len(bench.heard) == 4, "a topic is missing")
-    imu, state, joints = (bench.heard[t] for t in ("imu/data_raw", "cable/state", "joint_states"))
-    assert imu.header.frame_id == "imu_link" and imu.orientation_covariance[0] == -1.0
-    assert imu.linear_acceleration.z == pytest.approx(9.80665, rel=1e-6)
-    assert bench.heard["imu/temperature"].temperature == 40.0
-    assert list(joints.name) == ["s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3"] and len(state.displacement) == 6
-    assert all(t >= 0 for t in state.tension)
-
-    answer = bench.call("stop")
-    assert answer.success and "resume" in answer.message
-    bench.until(lambda: bench.state() == CableState.STOPPED, "not stopped", bench.drive)
-    bench.until(
-        lambda: set(bench.board.currents.values()) == {ZERO}, "current is left"
-    )  # the board's thread may yet have to read it
-    assert bench.call("resume").success
-    bench.follow()
+@pytest.fixture(scope="class")
+def running():
+    bench = Bench()
+    yield bench
+    bench.close()
 
 
-def test_the_heater_follows_its_topic(bench):
-    bench.until(lambda: 0.25 in bench.board.duties, "no heater command", lambda: bench.heater.publish(Float32(data=0.25)))
-    bench.until(lambda: bench.board.duties[-1] == 0.0, "the heater stays on without commands")
+class TestRunning:
+    """One process for the tests that leave it running and following commands."""
 
+    def test_samples_states_and_services_are_those_of_the_table(self, running):
+        running.follow()
+        running.until(lambda: len(running.heard) == 4, "a topic is missing")
+        imu, state, joints = (running.heard[t] for t in ("imu/data_raw", "cable/state", "joint_states"))
+        assert imu.header.frame_id == "imu_link" and imu.orientation_covariance[0] == -1.0
+        assert imu.linear_acceleration.z == pytest.approx(9.80665, rel=1e-6)
+        assert running.heard["imu/temperature"].temperature == 40.0
+        assert list(joints.name) == ["s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3"] and len(state.displacement) == 6
+        assert all(t >= 0 for t in state.tension)
 
-def test_a_hostile_command_holds_and_does_not_end_the_node(bench):
-    bench.follow()
-    bad = CableCommand(displacement=[float("nan")] * 6)
-    bench.until(lambda: bench.state() == CableState.HOLDING, "not holding", lambda: bench.commands.publish(bad))
-    assert "not a number" in bench.heard["cable/state"].message
-    bench.follow()
+        answer = running.call("stop")
+        assert answer.success and "resume" in answer.message
+        running.until(lambda: running.state() == CableState.STOPPED, "not stopped", running.drive)
+        running.until(
+            lambda: set(running.board.currents.values()) == {ZERO}, "current is left"
+        )  # the board's thread may yet have to read it
+        assert running.call("resume").success
+        running.follow()
+
+    def test_the_heater_follows_its_topic(self, running):
+        running.until(
+            lambda: 0.25 in running.board.duties, "no heater command", lambda: running.heater.publish(Float32(data=0.25))
+        )
+        running.until(lambda: running.board.duties[-1] == 0.0, "the heater stays on without commands")
+
+    def test_a_hostile_command_holds_and_does_not_end_the_node(self, running):
+        running.follow()
+        bad = CableCommand(displacement=[float("nan")] * 6)
+        running.until(lambda: running.state() == CableState.HOLDING, "not holding", lambda: running.commands.publish(bad))
+        assert "not a number" in running.heard["cable/state"].message
+        running.follow()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,4 +1,4 @@
-"""The node virtual_robot: truth topics, base orientation, faults, refusals."""
+"""The node virtual_robot: topics of the ground truth, orientation of the base, faults, refusals."""
 
 import os
 import time
