@@ -12,8 +12,10 @@ copyright = "gravcomp maintainers"
 version = release = __version__
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser"]
-root_doc = "src/doc/api/index"
+root_doc = "index"  # a copy of index.md in this folder
 include_patterns = [
+    "index.md",
+    "modules/**",
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -23,7 +25,7 @@ include_patterns = [
     "src/gravcomp/canbus/*.md",
 ]
 templates_path = [str(Path(__file__).parent / "templates")]  # autosummary takes relative ones from the sources
-exclude_patterns = ["src/doc/api/templates", "**/test/**", ".*"]
+exclude_patterns = ["src/doc/api/**", "**/test/**", ".*"]
 
 autosummary_generate = True
 # An object is described where it is defined, not again in the packages that export it.
@@ -51,12 +53,16 @@ _SECTION = re.compile(r"^\s*-{3,}\s*$")
 def plain_text(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Turn the prose of a docstring into reStructuredText: indented blocks become literal, other markup is escaped.
 
-    Docstrings with sections of numpydoc are left to numpydoc.
+    Docstrings with sections of numpydoc are left to numpydoc, examples for doctest to Sphinx.
     """
-    if any(_SECTION.match(line) for line in lines) or any(line.lstrip().startswith(">>>") for line in lines):
+    if any(_SECTION.match(line) for line in lines):
         return
-    text, literal = [], False
+    text, literal, example = [], False, False
     for line in lines:
+        example = line.startswith(">>>") or (example and bool(line.strip()))
+        if example:
+            text.append(line)
+            continue
         indented = line.startswith("  ") and bool(line.strip())
         if indented and not literal:
             text += ["", "::", ""]

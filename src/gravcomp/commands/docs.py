@@ -51,6 +51,7 @@ def build(root: Path, out: Path) -> tuple[bool, str]:
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         source = Path(scratch) / "source"
         shutil.copytree(root, source, ignore=shutil.ignore_patterns(*_LEFT_OUT), symlinks=True)
+        shutil.copy(source / CONFIGURATION / "index.md", source)
         done = subprocess.run(
             [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", f"{scratch}/doctrees", "-c",
              str(source / CONFIGURATION), str(source), str(out)],
