@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from bag_of_topics import TopicBag
 
-from gravcomp.calibration.files import write_csv
-from gravcomp.calibration.measured import Measured, StillWindows
+from gravcomp.calibration.files import read_measured, write_csv
+from gravcomp.calibration.measured import Measured, StillWindows, still_windows
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
@@ -50,6 +50,13 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
 
 
 @pytest.fixture(scope="module")
+def first_cable(windows):
+    """The windows of one pose in which no cable but the first is taut."""
+    rows = [k for k, command in enumerate(windows.displacement[:13]) if np.isnan(command[1:]).all()]
+    return StillWindows(windows.gravity[rows], windows.displacement[rows], windows.tip_position[rows])
+
+
+@pytest.fixture(scope="module")
 def measured(setup, windows):
     """Resting tips under 39 states of the cables, and one free fall."""
     fall = free_fall((setup, 20.0, 0.0, 1.5, 0))
@@ -67,8 +74,8 @@ def calibrate(capsys, *arguments: str) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
-def judge(result: dict) -> None:
-    """The known robot is found, the page shows it, and the YAML is a robot."""
+def check(result: dict) -> None:
+    """Check that the known robot is found, that the page shows it, and that the YAML is a robot."""
     found = {p["name"]: p for p in result["data"]["parameters"]}
     modulus = found["Young's modulus"]
     assert modulus["value"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
@@ -78,7 +85,7 @@ def judge(result: dict) -> None:
     assert 0.0 < interval < 0.2 * damping
     figures = {f["name"]: f["value"] for f in result["figures"]}
     assert figures["tip error at rest after, RMS"] < 0.1 * figures["tip error at rest before, RMS"]
-    # Both with the modulus from rest: only the damping differs. What is left is a camera's noise, and that a rod is not this model.
+    # Both use the modulus from rest: only the damping differs. Noise of the camera and the difference of the models remain.
     assert figures["tip error in motion after, RMS"] < 0.5 * figures["tip error in motion before, RMS"]
     page = Path("pages/calibration.html").read_text()
     assert page.count("<svg") >= 2 and "Resting tips, measured and modelled" in page
@@ -90,27 +97,42 @@ def judge(result: dict) -> None:
 def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured):
     write_csv(measured, here / "tips.csv", load_robot_file("article").robot.cable_names)
     result = calibrate(capsys, "tips.csv")
-    judge(result)
+    check(result)
     motors = parse_hardware(load_robot_file("mine.yaml").section("hardware"), source="mine.yaml").motors
     offsets = {f"offset of {m.cable}": 1e3 * m.offset for m in motors}
     found = {p["name"]: p["value"] for p in result["data"]["parameters"] if p["name"] in offsets}
     assert len(found) == 6 and found == pytest.approx({name: offsets[name] for name in found}, abs=1e-4)
 
 
-def test_a_bag_becomes_a_calibrated_robot(here, capsys, measured):
+def test_a_bag_contains_what_a_csv_file_does(here, measured):
+    cables = load_robot_file("article").robot.cable_names
+    write_csv(measured, here / "tips.csv", cables)
     write_bag(here / "bag", measured)
-    judge(calibrate(capsys, "bag"))
+    from_csv, from_bag = (read_measured(name, cables) for name in ("tips.csv", "bag"))
+    assert np.unique(from_bag.trial).size == np.unique(from_csv.trial).size
+    fall, same_fall = from_csv.trials()[0], from_bag.trials()[0]
+    tip = [np.interp(same_fall.time, fall.time, fall.tip_position[:, axis]) for axis in range(3)]
+    np.testing.assert_allclose(same_fall.tip_position.T, tip, atol=1e-6)
+    rest, same_rest = still_windows(from_csv), still_windows(from_bag)
+    for name in ("gravity", "tip_position"):
+        np.testing.assert_allclose(getattr(same_rest, name), getattr(rest, name), atol=1e-5)
+    np.testing.assert_allclose(same_rest.displacement, np.nan_to_num(rest.displacement, nan=LOOSE), atol=1e-7)
 
 
-def test_what_the_data_cannot_tell_is_said(here, capsys, windows):
+def test_a_bag_becomes_a_calibrated_robot(here, capsys, first_cable):
+    write_bag(here / "bag", joined(standing(first_cable)))
+    found = {p["name"]: p["value"] for p in calibrate(capsys, "bag")["data"]["parameters"]}
+    assert found["Young's modulus"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
+    assert load_robot_file("mine.yaml").robot.segments[0].material.youngs_modulus == pytest.approx(MODULUS, rel=0.02)
+
+
+def test_parameters_that_the_data_do_not_show_are_reported(here, capsys, first_cable):
     """Only the first cable is ever taut, in one pose: five offsets are invisible, and so is the damping."""
-    rows = [k for k, command in enumerate(windows.displacement[:13]) if np.isnan(command[1:]).all()]
-    few = StillWindows(windows.gravity[rows], windows.displacement[rows], windows.tip_position[rows])
-    write_csv(joined(standing(few)), here / "tips.csv", load_robot_file("article").robot.cable_names)
+    write_csv(joined(standing(first_cable)), here / "tips.csv", load_robot_file("article").robot.cable_names)
     result = calibrate(capsys, "tips.csv")
     notes = " ".join(result["notes"])
     assert "s1c2, s1c3, s2c1, s2c2, s2c3: never taut in these data" in notes
-    assert "no trial holds fast motion" in notes
+    assert "no trial contains fast motion" in notes
     assert result["data"]["damping_time_ms"] is None
     assert (
         load_robot_file("mine.yaml").robot.segments[0].material.damping_time
@@ -124,8 +146,10 @@ def test_unusable_data_end_in_a_sentence(here, capsys):
 
 
 def write_bag(path: Path, measured: Measured) -> None:
-    """The measurement as the graph's topics would hold it, two seconds between trials; released cables are paid out. The virtual robot's
-    truth/gravity is no second robot's."""
+    """Write the measurement as topics of the graph, two seconds between trials; released cables are paid out.
+
+    truth/gravity must not be taken for gravity.
+    """
     with TopicBag(path) as bag:
         start = 0.0
         for trial in measured.trials():
