@@ -15,7 +15,7 @@ setup(
     zip_safe=True,
     maintainer="gravcomp maintainers",
     maintainer_email="maintainers@gravcomp.invalid",
-    description="The sense of gravity of gravcomp: the IMU estimator with its temperature control, and the replay of recordings",
+    description="The estimation side of gravcomp: orientation and gravity from the IMU, temperature control, replays",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

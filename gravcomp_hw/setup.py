@@ -15,7 +15,7 @@ setup(
     zip_safe=True,
     maintainer="gravcomp maintainers",
     maintainer_email="maintainers@gravcomp.invalid",
-    description="The hardware side of gravcomp: the CAN bridge with its guard, and the virtual robot",
+    description="The hardware side of gravcomp: the CAN bridge with its guard process, and the virtual robot",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

@@ -1,4 +1,4 @@
-"""The node gives for a replayed recording what the offline estimator gives, bit for bit, with the stamps of the samples."""
+"""For a replayed recording the node gives the estimates of the offline estimator, bit for bit, with the samples' stamps."""
 
 import gc
 
@@ -25,7 +25,7 @@ from gravcomp_msgs.msg import ImuStatus
 from gravcomp_node import LATCHED, SENSOR
 
 EVERYTHING = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=5000)
-SURELY = [
+RELIABLY = [
     argument
     for topic in ("/imu/data", "/gravity")
     for name, value in (("reliability", "reliable"), ("depth", "5000"))
@@ -60,7 +60,7 @@ class Graph:
             if done():
                 return
             self.executor.spin_once(timeout_sec=0.05)
-        pytest.fail("what was waited for did not come")
+        pytest.fail("the awaited event did not happen")
 
     def close(self):
         for node in self.nodes:
@@ -78,15 +78,17 @@ def write_trial(path, count=300):
     return path
 
 
-def test_the_replayed_recording_gives_what_the_offline_estimator_gives(graph, tmp_path):
+def test_a_replay_gives_the_estimates_of_the_offline_estimator(graph, tmp_path):
     trial = write_trial(tmp_path / "trial.npz")
-    graph.open(*("-p", f"imu_replay:file:={trial}", "-p", "imu_replay:rate:=0.0", "-p", "imu_replay:exit_at_end:=false"), *SURELY)
+    graph.open(
+        *("-p", f"imu_replay:file:={trial}", "-p", "imu_replay:rate:=0.0", "-p", "imu_replay:exit_at_end:=false"), *RELIABLY
+    )
     orientation, gravity = [], []
     estimator = graph.start(ImuEstimator)
     graph.observer.create_subscription(Imu, "imu/data", orientation.append, EVERYTHING)
     graph.observer.create_subscription(Vector3Stamped, "gravity", gravity.append, EVERYTHING)
     graph.spin_until(lambda: estimator.count_subscribers("gravity") == 1)
-    # What is overridden for two topics stays with them.
+    # The overrides of two topics do not affect others.
     (bias,) = graph.observer.get_publishers_info_by_topic("imu/bias")
     assert bias.qos_profile.reliability == SENSOR.reliability == ReliabilityPolicy.BEST_EFFORT and SENSOR.depth == 5
     graph.start(ImuReplay)
@@ -102,7 +104,7 @@ def test_the_replayed_recording_gives_what_the_offline_estimator_gives(graph, tm
     assert orientation[-1].orientation_covariance[0] > 0.0
 
 
-def test_the_collector_has_little_to_look_through_once_a_node_is_configured(graph):
+def test_a_configured_node_leaves_little_to_the_garbage_collector(graph):
     graph.open()
     graph.start(ImuEstimator)
     try:
@@ -111,7 +113,7 @@ def test_the_collector_has_little_to_look_through_once_a_node_is_configured(grap
         gc.unfreeze()
 
 
-def test_status_comes_to_late_joiners_and_reset_begins_anew(graph):
+def test_late_subscribers_receive_the_status_and_reset_restarts(graph):
     graph.open()
     node = graph.start(ImuEstimator)
     publisher = graph.observer.create_publisher(Imu, "imu/data_raw", 5)

@@ -23,7 +23,7 @@ def situation():
     return Situation(0.01, Problem.NONE, None, estimate, HEATER, 0.5)
 
 
-def test_all_well(situation):
+def test_without_a_problem_the_status_is_ok(situation):
     assert evaluate(situation) == (ImuStatus.OK, "at rest")
 
 
@@ -37,7 +37,7 @@ def test_all_well(situation):
         ({"estimate": None}, ImuStatus.INITIALISING, "not converged"),
     ],
 )
-def test_each_thing_that_is_wrong_has_its_code(situation, change, code, words):
+def test_each_problem_has_its_code(situation, change, code, words):
     found, sentence = evaluate(replace(situation, **change))
     assert found == code and words in sentence
 
@@ -47,7 +47,7 @@ def test_no_data_precedes_a_heater_fault(situation):
     assert evaluate(worse)[0] == ImuStatus.NO_DATA
 
 
-def test_an_accelerometer_off_by_much_is_uncalibrated(situation):
+def test_an_accelerometer_with_a_large_error_is_uncalibrated(situation):
     off = replace(situation.estimate, calibrated=False)
     code, sentence = evaluate(replace(situation, estimate=off))
     assert code == ImuStatus.UNCALIBRATED and "calibrate" in sentence

@@ -1,4 +1,4 @@
-"""Shapes and targets survive their messages; messages that do not fit are refused."""
+"""Shapes and targets survive their messages; invalid messages are refused."""
 
 import dataclasses
 import subprocess
@@ -53,7 +53,7 @@ def test_the_response_survives_its_message_bit_for_bit(shape):
 
 
 @pytest.mark.parametrize("field", ["compliance_aa", "compliance_ea", "cable_displacement_free", "effector_free"])
-def test_arrays_that_do_not_fit_or_are_not_finite_are_refused(shape, field):
+def test_arrays_of_wrong_size_or_not_finite_are_refused(shape, field):
     message = deformation_message(shape, Header())
     setattr(message, field, list(getattr(message, field))[:-1])
     with pytest.raises(ValueError, match=field):
@@ -66,7 +66,7 @@ def test_arrays_that_do_not_fit_or_are_not_finite_are_refused(shape, field):
         response_of(message)
 
 
-def test_a_compliance_of_nothing_is_refused(shape):
+def test_a_compliance_of_zero_is_refused(shape):
     message = deformation_message(shape, Header())
     message.compliance_aa = [0.0] * len(message.compliance_aa)
     with pytest.raises(ValueError, match="diagonal of compliance_aa"):
@@ -129,6 +129,6 @@ print(sorted(signatures() - before))
 """
 
 
-def test_the_warm_up_compiles_all_that_the_loop_runs():
+def test_the_warm_up_compiles_everything_that_the_loop_runs():
     ended = subprocess.run([sys.executable, "-c", COMPILED_IN_THE_LOOP], capture_output=True, text=True)
     assert ended.stdout == "[]\n", ended.stdout + ended.stderr

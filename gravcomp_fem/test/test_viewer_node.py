@@ -126,14 +126,14 @@ def test_the_last_of_many_tilts_turns_the_base(stand):
         (BridgeService("stop"), "can_bridge/stop", None),
     ],
 )
-def test_compensation_and_motors_are_asked_for_and_the_answer_is_told(stand, request_, service, value):
+def test_compensation_and_motors_are_requested_and_the_answer_is_shown(stand, request_, service, value):
     stand.ask(request_)
     stand.until(lambda: stand.notified, "no answer")
     assert stand.heard == {service: [value]}
     assert stand.notified == [(service, "done as requested", True)]
 
 
-def test_a_fault_goes_to_the_virtual_robot_in_its_words(stand):
+def test_a_fault_is_published_as_yaml_of_the_virtual_robot(stand):
     stand.ask(InjectFault("{kind: stall, cable: s1c2, duration: 2}"))
     stand.until(lambda: "virtual/fault" in stand.heard, "no fault")
     fault = Fault.parse(yaml.safe_load(stand.heard["virtual/fault"][0].data), "page")

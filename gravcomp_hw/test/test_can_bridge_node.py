@@ -157,9 +157,8 @@ class TestRunning:
         answer = running.call("stop")
         assert answer.success and "resume" in answer.message
         running.until(lambda: running.state() == CableState.STOPPED, "not stopped", running.drive)
-        running.until(
-            lambda: set(running.board.currents.values()) == {ZERO}, "current is left"
-        )  # the board's thread may yet have to read it
+        # The board's thread reads the last frame with a delay.
+        running.until(lambda: set(running.board.currents.values()) == {ZERO}, "the currents are not zero")
         assert running.call("resume").success
         running.follow()
 
@@ -178,22 +177,22 @@ class TestRunning:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_without_current_and_with_code_0(bench, number):
+def test_a_signal_ends_the_node_without_current_and_with_code_0(bench, number):
     bench.follow()
     bench.process.send_signal(number)
     assert bench.process.wait(15.0) == 0
-    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "current is left")
+    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "the currents are not zero")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGHUP, signal.SIGSEGV, signal.SIGSTOP])
-def test_whatever_else_ends_it_the_guard_zeroes_the_currents(bench, number):
+def test_the_guard_zeroes_the_currents_of_a_killed_or_stopped_bridge(bench, number):
     bench.follow()
     bench.process.send_signal(number)
-    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "current is left")
+    bench.until(lambda: set(bench.board.currents.values()) == {ZERO}, "the currents are not zero")
 
 
 @pytest.mark.parametrize("bench", [("zero:=home",)], indirect=True)
-def test_without_a_known_zero_nothing_is_driven(bench):
+def test_without_zero_positions_nothing_is_driven(bench):
     bench.until(lambda: bench.state() == CableState.STOPPED, "not stopped", bench.drive)
     assert "not homed" in bench.heard["cable/state"].message and not bench.board.driven
 

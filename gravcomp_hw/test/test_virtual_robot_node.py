@@ -57,7 +57,7 @@ class Graph:
 def test_truth_is_published_in_the_base_frame_with_one_stamp():
     with Graph("inclination_deg:=45.0") as graph:
         graph.start()
-        graph.until(lambda: len(graph.received) == 3, "no truth")
+        graph.until(lambda: len(graph.received) == 3, "no ground truth")
         tip, gravity = graph.received["truth/tip"], graph.received["truth/gravity"].vector
         assert {m.header.frame_id for m in graph.received.values()} == {"soft_base"}
         np.testing.assert_allclose([gravity.x, gravity.y, gravity.z], [-9.80665 / 2**0.5, 0.0, -9.80665 / 2**0.5], atol=1e-6)
@@ -80,20 +80,20 @@ def test_the_base_follows_its_topic(parameters):
         graph.until(points_up, "the base does not turn")
 
 
-def test_a_base_that_may_not_be_steered_does_not_listen():
+def test_a_base_that_is_not_steerable_has_no_subscription():
     with Graph("motion:=tilt") as graph:
         graph.start()
         publisher = graph.listener.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
         fault = graph.listener.create_publisher(String, "virtual/fault", 20)
-        graph.until(lambda: fault.get_subscription_count() == 1, "the node does not listen to virtual/fault")
+        graph.until(lambda: fault.get_subscription_count() == 1, "the node does not subscribe to virtual/fault")
         assert publisher.get_subscription_count() == 0
 
 
-def test_faults_begin_end_and_are_refused_in_words():
+def test_faults_begin_and_end_and_wrong_ones_are_refused():
     with Graph() as graph:
         graph.start()
         publisher = graph.listener.create_publisher(String, "virtual/fault", 20)
-        graph.until(lambda: publisher.get_subscription_count() == 1, "the node does not listen to virtual/fault")
+        graph.until(lambda: publisher.get_subscription_count() == 1, "the node does not subscribe to virtual/fault")
         robot = graph.node._live.robot
         publisher.publish(String(data="{kind: imu_stuck}"))
         graph.until(lambda: [f.kind for f in robot.faults] == ["imu_stuck"], "the fault does not begin")
@@ -113,12 +113,12 @@ def test_faults_begin_end_and_are_refused_in_words():
         ("tilt:=3", "unknown parameter 'tilt'"),
     ],
 )
-def test_bad_parameters_are_refused_in_words(parameter, words):
+def test_bad_parameters_are_refused_with_a_sentence(parameter, words):
     with Graph(parameter) as graph, pytest.raises(ConfigError, match=words):
         graph.start()
 
 
-def test_an_unreadable_recording_is_refused_in_words(tmp_path):
+def test_an_unreadable_recording_is_refused_with_a_sentence(tmp_path):
     with (
         Graph("motion:=recording", f"recording:={tmp_path / 'none.npz'}") as graph,
         pytest.raises(ConfigError, match="does not exist"),
@@ -129,9 +129,9 @@ def test_an_unreadable_recording_is_refused_in_words(tmp_path):
 def test_it_can_be_deactivated_and_activated_again():
     with Graph() as graph:
         graph.start()
-        graph.until(lambda: len(graph.received) == 3, "no truth")
+        graph.until(lambda: len(graph.received) == 3, "no ground truth")
         graph.node.trigger_deactivate()
         assert not graph.node._live.link.is_open
         graph.received.clear()
         graph.node.trigger_activate()
-        graph.until(lambda: len(graph.received) == 3, "no truth after the second activation")
+        graph.until(lambda: len(graph.received) == 3, "no ground truth after the second activation")
