@@ -1,15 +1,18 @@
-"""A small robot to test the inverse problem with: two segments of constant curvature, six cables, gravity; no finite elements.
+"""A small robot for tests of the inverse problem: two segments of constant curvature, six cables, gravity; no finite elements.
 
 Coordinates q (6,): for each segment the curvatures about y and -x (rad/m) and the axial strain. Potential energy
 U = sum_j L_j/2 (EI |kappa_j|^2 + EA strain_j^2) - integral of w g . p ds. Cable i at the pitch radius r and angle phi_i
 has the path displacement delta_i = sum over its segments of L_j (r (cos phi_i kappa_x + sin phi_i kappa_y) - strain_j).
 """
 
+import functools
 from types import SimpleNamespace
 
 import numpy as np
 
+from gravcomp.cables.slack import taut_tensions
 from gravcomp.description import Cable, Limits, Robot, Segment
+from gravcomp.inverse import Command, InverseController, InverseOptions, Target
 
 SEGMENT = 0.05
 LENGTH = 2 * SEGMENT
@@ -26,14 +29,14 @@ LIMITS = Limits(tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, 
 
 
 def description(limits: Limits = LIMITS) -> Robot:
-    """What the controller knows of this robot."""
+    """The robot's description for the controller."""
     segments = tuple(Segment(name=f"s{j}", length=SEGMENT, outer_diameter=9e-3, lumen_diameter=3.6e-3) for j in (1, 2))
     cables = tuple(Cable(name=n, angle=float(a), radius=RADIUS, segment=n[:2]) for n, a in zip(NAMES, ANGLES))
     return Robot(name="arc", segments=segments, cables=cables, limits=limits)
 
 
 def cable_jacobian() -> np.ndarray:
-    """d delta / d q (6, 6): the paths of this robot are linear in its coordinates."""
+    """Return d delta / d q (6, 6), which is constant for this robot."""
     jacobian = np.zeros((6, 6))
     for i, angle in enumerate(ANGLES):
         row = SEGMENT * np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), -1.0])
@@ -44,10 +47,9 @@ def cable_jacobian() -> np.ndarray:
 
 
 def centre_line(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (..., 33, 3), base to tip, and the directions there (..., 33, 3), for coordinates (..., 6); midpoint rule
-    along each segment."""
+    """Points (..., 33, 3), base to tip, and directions there (..., 33, 3), for coordinates (..., 6), by the midpoint rule."""
     q = np.asarray(q)
-    position, frame = np.zeros(q.shape[:-1] + (3,)), np.broadcast_to(np.eye(3), q.shape[:-1] + (3, 3))
+    position, frame = np.zeros((*q.shape[:-1], 3)), np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
     positions, directions = [position], [frame[..., :, 2]]
     h = SEGMENT / _POINTS_A_SEGMENT
     for segment in (q[..., :3], q[..., 3:]):
@@ -68,27 +70,26 @@ def effector(q: np.ndarray) -> np.ndarray:
 
 
 class ArcRobot:
-    """Quasi-static, one Newton step a call, driven by cable displacements with slack: delta >= u, lambda >= 0, complementary."""
+    """Quasi-static, one Newton step per call, driven by cable displacements with slack."""
 
     def __init__(self):
         self.q = np.zeros(6)
         self.tension = np.zeros(6)
 
     def step(self, gravity: np.ndarray, displacement: np.ndarray | None, iterations: int = 1) -> SimpleNamespace:
-        """The linear answer at the new state. displacement (6,) m; None: cables released."""
+        """Take a step; return the linear response at the new state. displacement (6,) in m; None: cables released."""
         jacobian = cable_jacobian()
         for _ in range(iterations):
             gradient, hessian = _derivatives(self.q, gravity)
             compliance = jacobian @ np.linalg.solve(hessian, jacobian.T)
             free = self.q - np.linalg.solve(hessian, gradient)
-            self.tension = _complementary(compliance, jacobian @ free, displacement)
+            self.tension = np.zeros(6) if displacement is None else taut_tensions(compliance, jacobian @ free, displacement)
             self.q = free + np.linalg.solve(hessian, jacobian.T @ self.tension)
         return self.response(gravity)
 
     def response(self, gravity: np.ndarray) -> SimpleNamespace:
         jacobian = cable_jacobian()
-        gradient, hessian = _derivatives(self.q, gravity)
-        answer = np.linalg.solve(hessian, jacobian.T)
+        answer = np.linalg.solve(_derivatives(self.q, gravity)[1], jacobian.T)
         shifts = 1e-6 * np.eye(6)
         sensitivity = (effector(self.q + shifts) - effector(self.q - shifts)).T / 2e-6
         compliance_aa, compliance_ea = jacobian @ answer, sensitivity @ answer
@@ -109,35 +110,54 @@ def _rotation(bend: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _weight_energy(q: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+def _weight_energy(q: np.ndarray) -> np.ndarray:
+    """Potential energy (..., 3) of the weight per unit of gravity along x, y and z."""
     positions, _ = centre_line(q)
     centres = 0.5 * (positions[..., 1:, :] + positions[..., :-1, :])
-    return -LINE_DENSITY * LENGTH / centres.shape[-2] * (centres @ gravity).sum(axis=-1)
+    return -LINE_DENSITY * LENGTH / centres.shape[-2] * centres.sum(axis=-2)
 
 
 def _derivatives(q: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (6,) and Hessian (6, 6) of the potential energy, that of the weight by central differences."""
+    """Gradient (6,) and Hessian (6, 6) of the potential energy."""
     stiffness = np.diag(np.tile([BENDING, BENDING, AXIAL], 2)) * SEGMENT
+    gradient, hessian = _weight_derivatives(tuple(q))
+    return stiffness @ q + gradient @ gravity, stiffness + hessian @ gravity
+
+
+@functools.lru_cache(maxsize=64)
+def _weight_derivatives(q: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (6, 3) and Hessian (6, 6, 3) of `_weight_energy` by central differences. A step reuses the last response's."""
     steps = np.diag(np.tile([1e-2, 1e-2, 1e-4], 2))
+    first, second = np.triu_indices(6)
     signs = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
-    shifts = signs[:, 0, None, None, None] * steps[:, None, :] + signs[:, 1, None, None, None] * steps[None, :, :]
-    energy = _weight_energy(q + shifts, gravity)
+    shifts = signs[:, 0, None, None] * steps[first] + signs[:, 1, None, None] * steps[second]
+    energy = _weight_energy(np.array(q) + shifts)
     size = np.diag(steps)
-    gradient = (np.diagonal(energy[0]) - np.diagonal(energy[3])) / (4 * size)
-    hessian = (energy[0] - energy[1] - energy[2] + energy[3]) / (4 * np.outer(size, size))
-    return stiffness @ q + gradient, stiffness + hessian
+    gradient = (energy[0] - energy[3])[first == second] / (4 * size[:, None])
+    hessian = np.empty((6, 6, 3))
+    hessian[first, second] = (energy[0] - energy[1] - energy[2] + energy[3]) / (4 * size[first] * size[second])[:, None]
+    hessian[second, first] = hessian[first, second]
+    return gradient, hessian
 
 
-def _complementary(compliance: np.ndarray, free: np.ndarray, displacement: np.ndarray | None) -> np.ndarray:
-    """Tensions with delta - u >= 0, lambda >= 0, complementary, by projected Gauss-Seidel."""
-    tension = np.zeros(free.size)
-    if displacement is None:
-        return tension
-    for _ in range(400):
-        before = tension.copy()
-        for i in range(free.size):
-            gap = compliance[i] @ tension + free[i] - displacement[i]
-            tension[i] = max(0.0, tension[i] - gap / compliance[i, i])
-        if np.abs(tension - before).max() < 1e-12:
-            break
-    return tension
+def controller(options: InverseOptions | None = None, limits: Limits = LIMITS) -> InverseController:
+    """A controller of this robot."""
+    return InverseController(description(limits), options)
+
+
+def closed_loop(
+    gravities: np.ndarray | list,
+    target: Target,
+    control: InverseController | None = None,
+    robot: "ArcRobot | None" = None,
+) -> "tuple[ArcRobot, np.ndarray, Command]":
+    """Run the closed loop over the gravities (k, 3); return robot, displacements (k, 6) and the last command."""
+    robot = robot or ArcRobot()
+    control = control or controller()
+    response = robot.step(gravities[0], None, iterations=20)
+    displacements = []
+    for gravity in gravities:
+        command = control.step(response, target, backbone_station=STATIONS, tension=robot.tension)
+        response = robot.step(gravity, command.displacement)
+        displacements.append(command.displacement)
+    return robot, np.array(displacements), command

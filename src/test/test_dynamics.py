@@ -77,15 +77,15 @@ def course(of: RobotModel, h: float = 5e-3, count: int = 60) -> np.ndarray:
     return np.array([simulator.step(GRAVITY).tip_position for _ in range(count)])
 
 
-def test_what_never_creeps_away_is_stiffness():
+def test_creep_that_takes_forever_is_stiffness():
     creeping = model(0.01, creep_ratio=0.25, creep_time=1e4)
     stiffer = model(0.01 / 1.25, youngs_modulus=1.25 * 0.8e6)
-    # 0.3 s of 10,000 creep away: 30 parts of a million of the quarter.
+    # In 0.3 s of 10,000 s, 30 millionths of the quarter creep away.
     assert course(creeping) == pytest.approx(course(stiffer), abs=2e-6)
 
 
-def test_what_creeps_away_at_once_is_damping():
-    # The branch's strain is held for T: rho T of damping. It lags by T, which shows where the swing is fast.
+def test_immediate_creep_is_damping():
+    # The branch holds its strain for T, which is a damping time of rho T, with a lag of T.
     swing = course(model(0.01), h=2e-3, count=100)
     crept = course(model(0.006, creep_ratio=2.0, creep_time=2e-3), h=2e-3, count=100)
     without = course(model(0.006), h=2e-3, count=100)
@@ -99,7 +99,7 @@ def test_creep_does_not_change_where_the_robot_comes_to_rest():
 
 
 def test_gravity_acts_from_the_moment_of_letting_go():
-    """In free fall an unsupported tip accelerates by one and a half of gravity at first; a late start would be a fall of half the way."""
+    """At first the tip of a falling rod accelerates by 1.5 g; if gravity started a step late, half the fall would be missing."""
     fine, coarse = course(model(0.01), h=1e-3, count=30), course(model(0.01), h=1e-2, count=3)
     assert coarse[-1] == pytest.approx(fine[-1], abs=0.3e-3)
 

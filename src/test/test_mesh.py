@@ -23,7 +23,7 @@ def test_stepped_tubes_and_caps_share_their_nodes():
         ),
         elements=Elements(around=12, along=8),
     )
-    model = RobotModel(robot)  # raises for a part that is not connected with the base
+    model = RobotModel(robot)  # raises for a part that is not connected to the base
     assert robot.length == pytest.approx(0.062)
     volume = np.pi / 4 * ((9e-3**2 - 3e-3**2) * 0.032 + (7e-3**2 - 4e-3**2) * 0.03)
     assert model.elements.weights.sum() == pytest.approx(volume, rel=2e-3)  # facets of 30 deg
@@ -47,11 +47,11 @@ def test_sections_see_where_the_axis_goes():
 
 def test_too_few_layers_are_named():
     robot = dataclasses.replace(load_robot_file("three_segment").robot, elements=Elements(along=2))
-    with pytest.raises(MeshError, match="elements.along is 2; the robot has 3 tubes"):
+    with pytest.raises(MeshError, match=r"elements\.along is 2; the robot has 3 tubes"):
         tube_mesh(robot)
 
 
-def test_the_shipped_body_is_computed():
+def test_the_shipped_body_has_an_equilibrium():
     shape = Simulator(load_robot_file("mesh_body").robot, reduced=False).solve([-9.81, 0.0, 0.0])
     assert shape.status == 0 and shape.tip_position[0] < -5e-3
 
@@ -65,7 +65,7 @@ def shipped_mesh() -> str:
 
 
 @pytest.mark.parametrize(
-    "changes, words",
+    ("changes", "words"),
     [
         ({"file_unit": 1.0}, ["length_mm says 80 along z", "check file_unit_mm"]),
         ({"length": 0.05}, ["length_mm says 50"]),
@@ -89,7 +89,7 @@ def test_a_body_lying_on_its_side_is_refused(tmp_path):
         body_mesh(body(str(tmp_path / "side.vtk")))
 
 
-def test_linear_tetrahedra_are_raised_with_a_warning(tmp_path, caplog):
+def test_linear_tetrahedra_become_quadratic_with_a_warning(tmp_path, caplog):
     import meshio
 
     content = meshio.read(shipped_mesh())

@@ -9,7 +9,7 @@ from gravcomp.calibration.statics import StaticParameters
 from gravcomp.calibration.unknowns import Unknown
 from gravcomp.description import Robot
 
-SEEN = 0.7  # with a posterior deviation above this fraction of the prior's, the data tell nothing
+SEEN = 0.7  # a posterior deviation above this fraction of the prior's means that the data do not determine the value
 SEEN_MODULUS = 0.25  # the same for the modulus, which has no prior: relative deviation
 CORRELATED = 0.95
 

@@ -236,8 +236,8 @@ class StaticTracker:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
         If the tangent is not positive definite, a multiple of the identity is added: the step still goes downhill, but its
-        length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does not help, or at once
-        if `stable`.
+        length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does not help, or
+        immediately if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
         shifts = () if stable else (self._stiffness * 10.0**power for power in range(-6, 1))

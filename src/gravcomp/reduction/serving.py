@@ -58,7 +58,7 @@ class ReducedServing:
         self.reset()
 
     def stand_by(self) -> None:
-        """Wait for a shape of the full model; it serves until both models agree."""
+        """Wait for a shape of the full model, which is used until both models agree."""
         self.reason, self._until_return = "the reduced model has just been built", 0
 
     @property

@@ -51,11 +51,11 @@ class Reduction:
 def why_not(model: RobotModel) -> str:
     """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
     if not isinstance(model.elements, SolidElements):
-        return "corotational tetrahedra have no polynomial strain: the full model serves"
+        return "corotational tetrahedra have no polynomial strain: the full model is used"
     if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
-        return "the reduction needs the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model serves"
+        return "the reduction needs the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model is used"
     if model.tendons.friction.any():
-        return "cables with friction depend on their past motion: the full model serves"
+        return "cables with friction depend on their past motion: the full model is used"
     return ""
 
 

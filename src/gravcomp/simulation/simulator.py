@@ -108,7 +108,7 @@ class Simulator:
         self._serving.take_over(state, gravity, cables)
         if shape.status != ShapeStatus.OK:
             return shape
-        return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model serves")
+        return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
 
     def solve(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
         """Return the equilibrium found from the straight robot, independent of all earlier shapes; arguments as in `step`."""

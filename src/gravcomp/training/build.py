@@ -85,7 +85,7 @@ def build(
     unseen = samples(model, options.test, lambda share: progress("testing", share))
     errors = tip_errors(model, reduction, unseen)
     if not errors.size:
-        raise MeshError("the reduced model finds none of the test's equilibria: the full model serves")
+        raise MeshError("the reduced model finds none of the test's equilibria: the full model is used")
     reduction = replace(reduction, error_median=float(np.median(errors)), error_worst=float(errors.max()))
     # A running simulator must find everything compiled when it finds the file.
     ReducedServing(model, reduction.reduced_model(model), StaticSolver(model)).warm_up()

@@ -1,0 +1,96 @@
+"""The quadratic programme of one step: weights, optimality, and bounds that cannot be satisfied."""
+
+import numpy as np
+import pytest
+from arc_robot import LENGTH, STATIONS, ArcRobot
+
+from gravcomp.description.robot import Limits
+from gravcomp.inverse import InverseOptions, straight_target
+from gravcomp.inverse.limits import StepBounds
+from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.scaling import Programme, scaled, unscaled
+from gravcomp.inverse.solver import ProgrammeSolver
+
+GRAVITY = 9.81
+
+
+def solved(solver, programme):
+    """The tensions (m,) of the programme."""
+    parts = scaled(programme)
+    solution = solver.solve(parts)
+    return unscaled(solution.unknowns, solution.multipliers, parts.scale, parts.tension_lower, parts.tension_upper)[0]
+
+
+def test_solution_satisfies_the_optimality_conditions():
+    rng = np.random.default_rng(3)
+    solver = ProgrammeSolver()
+    for _ in range(30):
+        root = rng.normal(size=(6, 6))
+        compliance = 1e-3 * (root @ root.T + np.eye(6))
+        jacobian, missed = 0.03 * rng.normal(size=(8, 6)), 0.01 * rng.normal(size=8)
+        bounds = StepBounds(np.full(6, -4e-3), np.full(6, 4e-3), np.zeros(6), np.full(6, 0.5))
+        programme = Programme(2 * jacobian.T @ jacobian, 2 * jacobian.T @ missed, compliance, np.zeros(6), bounds)
+        tension = solved(solver, programme)
+        slope = programme.hessian @ tension + programme.gradient
+        # The elastic bounds give by about a micrometre at most.
+        assert np.abs(compliance @ tension).max() < 4e-3 + 2e-6
+        for other in rng.uniform(0.0, 0.5, size=(2000, 6)):
+            if np.abs(compliance @ other).max() < 4e-3:  # a feasible point: the cost does not fall toward it
+                assert slope @ (other - tension) > -1e-3 * np.linalg.norm(slope) * np.linalg.norm(other - tension)
+
+
+def test_incompatible_bounds_are_violated_as_little_as_possible():
+    """After a jump of gravity a path may be longer than its winch allows, whatever the tension."""
+    solver = ProgrammeSolver()
+    compliance = 1e-3 * np.array([[2.0, 0.5], [0.5, 2.0]])
+    hessian, gradient = 2e-6 * np.eye(2), np.array([-1e-7, -1e-7])
+    bounds = StepBounds(np.array([3e-3, -9e-3]), np.full(2, 9e-3), np.zeros(2), np.full(2, 1.0))
+    kept = solved(
+        solver,
+        Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))),
+    )
+    assert kept == pytest.approx([0.05, 0.05], abs=1e-5)
+    for _ in range(2):
+        missed = solved(solver, Programme(hessian, gradient, compliance, np.zeros(2), bounds))
+        assert missed == pytest.approx([1.0, 1.0], abs=1e-3)  # 2.5 mm of the 3 mm asked for
+    again = solved(
+        solver,
+        Programme(hessian, gradient, compliance, np.zeros(2), StepBounds(-np.ones(2), np.ones(2), np.zeros(2), np.ones(2))),
+    )
+    assert again == pytest.approx(kept, abs=1e-5)
+
+
+def test_weights_are_the_squares_of_the_rows():
+    # The programme's cost equals the weighted squares of the errors, evaluated term by term.
+    robot, gravity = ArcRobot(), np.array([-GRAVITY, 0.0, 0.0])
+    response = robot.step(gravity, None, iterations=20)
+    target = straight_target(LENGTH, tip_direction_weight=1e-3, backbone_station=[0.3], backbone_weight=[0.7])
+    options = InverseOptions(energy_weight=1e-6, proximal_weight=0.0, axial_weight=0.25)
+    zeros = np.zeros(6)
+    programme = build_programme(
+        response,
+        target,
+        Limits(),
+        tension=zeros,
+        displacement=zeros,
+        backbone_station=STATIONS,
+        interval=0.01,
+        damping=1.0,
+        options=options,
+    )
+
+    def cost(tension):
+        e = response.compliance_ea @ tension + response.effector_free
+        tip = e[:3] - [0, 0, LENGTH]
+        point = [np.interp(0.3, STATIONS, e[6 + k :: 3]) for k in range(3)] - np.array([0, 0, 0.3 * LENGTH])
+        along = response.effector_free[6 + 9 : 6 + 12] - response.effector_free[6 + 6 : 6 + 9]
+        axial = point @ along / np.linalg.norm(along)
+        middle = 0.7 * (point @ point - 0.75 * axial**2)
+        towards = response.effector_free[3:6]
+        along_target = (1.0 - 0.5 * (towards[2] / np.linalg.norm(towards)) ** 2) ** 2  # 0.25 for a tip that points there
+        return tip[:2] @ tip[:2] + along_target * tip[2] ** 2 + 1e-3 * np.sum((e[3:6] - [0, 0, 1]) ** 2) + middle
+
+    tension = np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.1])
+    x = tension / programme.scale
+    quadratic = 2e-6 * (0.5 * x @ programme.hessian @ x + programme.gradient @ x)  # its cost is in mm^2, halved
+    assert quadratic == pytest.approx(cost(tension) - cost(np.zeros(6)), rel=1e-3)
