@@ -2,12 +2,16 @@
 
 import argparse
 import json
-import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
+
+if TYPE_CHECKING:
+    from rich.console import Group
 
 # Numba compiles once for each machine; the first start waits for it.
 _START_TIMEOUT = 300.0
@@ -36,7 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_page_arguments(parser)
     parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes, for one of several robots")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
-    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,11 +70,9 @@ def run(args: argparse.Namespace) -> int:
             if args.viewer:
                 show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
             processes.start()
-            print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
+            output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             figures = _follow(processes, result)
-    _print_summary(figures)
-    if args.json:
-        print(json.dumps(figures), flush=True)
+    output.result(figures, _summary(figures))
     return 0
 
 
@@ -90,9 +91,7 @@ def _start_of_tour(urdf: Path) -> dict:
 
 def _follow(processes, result: Path) -> dict:
     """Until the tour has ended; its figures. Raises NodeDied, TimeoutError."""
-    from rich.console import Console
-
-    console, phase, begin = Console(stderr=True), "", time.monotonic()
+    phase, begin = "", time.monotonic()
     while True:
         # Looked at before the file is read: the player's last word is in it when it has gone.
         dead = processes.dead()
@@ -106,14 +105,15 @@ def _follow(processes, result: Path) -> dict:
             processes.check()
         if state["phase"] != phase:
             phase, begin = state["phase"], time.monotonic()
-            console.print(phase, highlight=False)
+            output.note(phase)
         if phase not in ("released", "compensated") and time.monotonic() - begin > _START_TIMEOUT:
             raise TimeoutError(f"the tour did not go on ({phase}); the nodes' output is in {processes.logs}")
         time.sleep(0.1)
 
 
-def _print_summary(figures: dict) -> None:
-    from rich.console import Console
+def _summary(figures: dict[str, Any]) -> "Group":
+    """Table of the tip errors at the poses, and what is to be known about the run."""
+    from rich.console import Group
     from rich.table import Table
 
     table = Table(
@@ -127,13 +127,10 @@ def _print_summary(figures: dict) -> None:
     for inclination, released, compensated in rows:
         table.add_row(f"{inclination:g}", f"{released:.2f}", f"{compensated:.2f}")
     table.add_row("RMS", f"{figures['tip_error_released_rms_mm']:.2f}", f"{figures['tip_error_compensated_rms_mm']:.2f}")
-    console = Console(file=sys.stderr)
-    console.print(table)
     disagreement = figures["arm_and_imu_disagree_by_deg"]
     agree = "" if disagreement is None else f"; at the poses arm and IMU disagree on gravity by at most {disagreement:g} deg"
-    console.print(f"{figures['ratio']:g} times smaller with compensation{agree}", highlight=False)
+    notes = [f"{figures['ratio']:g} times smaller with compensation{agree}"]
     if min(figures["followed_percent"].values()) < 100.0:
         shares = ", ".join(f"{name} {share:g} %" for name, share in figures["followed_percent"].items())
-        console.print(
-            f"The bridge did not follow all the time ({shares} of what was measured): this machine was too busy", highlight=False
-        )
+        notes.append(f"The bridge did not follow all the time ({shares} of the run): this machine was too busy")
+    return Group(table, *notes)

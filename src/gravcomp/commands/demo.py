@@ -2,12 +2,16 @@
 
 import argparse
 import json
-import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 # A run shorter than this shows neither sag nor compensation.
 _SHORTEST = 10.0
@@ -24,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = "Virtual robot on a CAN bus of its own, the four nodes as processes, the viewer; ends with the figures."
     parser.add_argument("--duration", type=float, default=30.0, metavar="S", help="seconds to play (default 30, at least 10)")
     parser.add_argument("--headless", action="store_true", help="without the viewer")
-    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
     parser.add_argument(
         "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
     )
@@ -63,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of truth and feedback than the hardware's: judging and a bus in software shall not take the loop's time.
-    motion = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True}
+    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True}
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
@@ -89,10 +92,9 @@ def run(args: argparse.Namespace) -> int:
             if not args.headless:
                 address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
             processes.start()
-            print(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}", file=sys.stderr)
-            ready = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller"]
-            processes.wait(lambda: _all_active(_read(result_file), ready), _START_TIMEOUT, "the nodes' start")
-            # Last, because its motion begins with its activation.
+            output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
+            processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
+            # The last one, because its motion begins with its activation.
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
             state = _follow(processes, result_file, args, pictures)
             problem = pictures.take(address) if pictures else ""
@@ -101,9 +103,7 @@ def run(args: argparse.Namespace) -> int:
                 "nodes": state["nodes"],
                 "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
             }
-    _print_summary(figures)
-    if args.json:
-        print(json.dumps(figures), flush=True)
+    output.result(figures, _summary(figures))
     if problem:
         raise ConfigError(problem)
     return 0
@@ -133,17 +133,11 @@ def _read(path: Path) -> dict:
         return {}
 
 
-def _all_active(state: dict, names: list[str]) -> bool:
-    states = state.get("nodes", {})
-    return all(states.get(name) == "active" for name in names)
-
-
 def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=None) -> dict:
     """Show the run until the judge is done, with the moments of the page's `pictures`; returns its last state. Raises NodeDied."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
+    console = output.console()
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[note]}"))
     deadline = time.monotonic() + args.duration + _START_TIMEOUT
     with Progress(*columns, console=console, transient=True) as progress:
@@ -163,7 +157,7 @@ def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=Non
                 processes.check()
             if state.get("phase") and state["phase"] != phase:
                 phase = state["phase"]
-                console.print(f"{state['elapsed']:5.1f} s  {phase}", highlight=False)
+                console.print(f"{state['elapsed']:5.1f} s  {phase}")
             if pictures:
                 pictures.follow(state.get("elapsed", 0.0), time.monotonic())
             error = state.get("tip_error_mm")
@@ -174,8 +168,7 @@ def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=Non
             time.sleep(0.2)
 
 
-def _print_summary(figures: dict) -> None:
-    from rich.console import Console
+def _summary(figures: dict[str, Any]) -> "Table":
     from rich.table import Table
 
     delay = figures["delay_ms"] or {"median": None, "p99": None}
@@ -197,4 +190,4 @@ def _print_summary(figures: dict) -> None:
     ]
     for name, value, unit in rows:
         table.add_row(name, f"{value} {unit}".strip())
-    Console(file=sys.stderr).print(table)
+    return table

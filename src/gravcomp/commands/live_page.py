@@ -2,11 +2,13 @@
 
 import argparse
 import os
-import sys
 import webbrowser
+from typing import TYPE_CHECKING
 
-from gravcomp.launcher import Graph, NodeSpec
-from gravcomp.launcher.page_address import wait_for_page
+from gravcomp.commands import output
+
+if TYPE_CHECKING:
+    from gravcomp.launcher import Graph, NodeSpec
 
 
 def add_page_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,15 +19,17 @@ def add_page_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def show_page(processes: Graph, viewer: NodeSpec, no_open: bool) -> str:
+def show_page(processes: "Graph", viewer: "NodeSpec", no_open: bool) -> str:
     """Start the node `viewer`, print its page's address, and open it in a graphical session unless `no_open`; returns the address.
 
     To be called before the other nodes are started: beside all of them the page would take four times as long to come. Raises LaunchError,
     NodeDied, TimeoutError.
     """
+    from gravcomp.launcher.page_address import wait_for_page
+
     processes.start_one(viewer)
     address = wait_for_page(processes)
-    print(f"The live page: {address}", file=sys.stderr, flush=True)
+    output.note(f"The live page: {address}")
     if not no_open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         webbrowser.open(address)
     return address

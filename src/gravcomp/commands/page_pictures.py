@@ -3,9 +3,9 @@
 So the browser, which takes a processor for itself where there is no graphics card, neither disturbs the play nor is too late for it.
 """
 
-import sys
 from pathlib import Path
 
+from gravcomp.commands import output
 from gravcomp.config import ConfigError
 from gravcomp.view.browser import Browser, BrowserError, find_chromium
 
@@ -14,7 +14,8 @@ class PagePictures:
     """`moments`: when (s into the play) to take the picture of which name. Raises ConfigError when there is no browser or no folder."""
 
     def __init__(self, folder: Path, moments: dict[str, float]):
-        self._folder, self._due, self._times = folder, dict(moments), {}
+        self._folder, self._due = folder, dict(moments)
+        self._times: dict[str, float] = {}
         if find_chromium() is None:
             raise ConfigError("--screenshots: no Chromium on this machine: apt-get install chromium")
         try:
@@ -37,7 +38,7 @@ class PagePictures:
                     browser.look_back(time)
                     path = self._folder / f"{name}.png"
                     browser.save(path)
-                    print(f"Picture of the page: {path}", file=sys.stderr, flush=True)
+                    output.note(f"Picture of the page: {path}")
         except (BrowserError, OSError) as error:
             return f"--screenshots: {error}"
         return ""

@@ -33,7 +33,6 @@ def parser_of(command: str, kind: type[argparse.ArgumentParser] = argparse.Argum
         epilog=_EPILOG,
         allow_abbrev=False,
         parents=[_common()],
-        conflict_handler="resolve",
     )
     module_of(command).add_arguments(parser)
     return parser
@@ -48,7 +47,6 @@ def add_subcommand(choices: Any, name: str, summary: str) -> argparse.ArgumentPa
         epilog=_EPILOG,
         allow_abbrev=False,
         parents=[_common()],
-        conflict_handler="resolve",
     )
 
 

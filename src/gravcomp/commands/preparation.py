@@ -1,8 +1,8 @@
 """Prepare a robot before its nodes start: check its file, compile what they run, build its reduced model in the background."""
 
 import subprocess
-import sys
 
+from gravcomp.commands import output
 from gravcomp.launcher import compilation
 from gravcomp.launcher.model_builder import ModelBuilder
 from gravcomp.launcher.robot_graph import check_robot_file
@@ -24,16 +24,14 @@ def _compile(virtual: bool) -> None:
     missing = compilation.missing(compilation.LOOP + (compilation.VIRTUAL if virtual else ()))
     if not missing:
         return
-    from rich.console import Console
-
     processes = compilation.start(missing)
     try:
-        with Console(stderr=True).status("compiling, once for this machine (about a minute)"):
+        with output.console().status("compiling, once for this machine (about a minute)"):
             for part, process in zip(missing, processes):
                 _, errors = process.communicate()
                 if process.returncode:
                     last = (errors.strip().splitlines() or [""])[-1]
-                    print(f"gravcomp: compiling the {part} failed ({last}); the nodes compile it", file=sys.stderr)
+                    output.note(f"compiling the {part} failed ({last}); the nodes compile it")
     finally:
         for process in processes:
             _end(process)

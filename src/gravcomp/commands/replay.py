@@ -1,11 +1,10 @@
 """`gravcomp replay BAG`: the whole graph on a recorded IMU stream, at any speed, with /clock."""
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
 
+from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
 
 # A machine that has never run the graph compiles first.
@@ -34,7 +33,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_page_arguments(parser)
     parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
-    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object, the last line")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,9 +78,7 @@ def run(args: argparse.Namespace) -> int:
         "elapsed_s": round(time.monotonic() - begin, 2)}  # fmt: skip
     if args.out:
         figures["recorded"] = describe(Path(args.out))
-    print(f"{figures['source']}: {figures['samples']} samples, {figures['duration_s']:.1f} s, played to the end", file=sys.stderr)
-    if args.json:
-        print(json.dumps(figures), flush=True)
+    output.result(figures, f"{figures['source']}: {figures['samples']} samples, {figures['duration_s']:.1f} s, played to the end")
     return 0
 
 
@@ -101,17 +97,16 @@ def _whole(path: str) -> str:
         return path
     bag = readable(path)
     if bag.problem:
-        print(f"{path}: damaged ({bag.problem}); {bag.messages} messages could be read", file=sys.stderr)
+        output.note(f"{path}: damaged ({bag.problem}); {bag.messages} messages could be read")
     return str(bag.path)
 
 
 def _follow(processes, replay: str, duration: float, speed: float) -> None:
     """Until the replay has ended well. Raises NodeDied when any node ends otherwise."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("starting", total=duration / speed if speed else None)
         log, started = processes.processes[replay].log, None
         while processes.processes[replay].exit_code is None:

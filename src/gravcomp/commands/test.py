@@ -13,6 +13,9 @@ OWN = ("--fast", "--json", "--quiet", "-h", "--help")
 """Options of the command itself, which come first; all other words are passed to pytest."""
 
 FOLDERS = ("src/test", "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
+_WORKERS = (os.cpu_count() or 1) + 1
+"""Processes that run tests side by side: one more than cores, because tests of the graph mostly wait."""
+
 # System packages that only tests need, and their use.
 _BROWSER = {"chromium": "tests of the viewer"}
 
@@ -38,6 +41,9 @@ def run(args: argparse.Namespace) -> int:
     given = [a for a in args.arguments if a != "--"]
     targets = [] if any((root / a.split("::")[0]).exists() for a in given if not a.startswith("-")) else folders
     how = ["-q", "--no-header"] if args.quiet else ["-ra", "--durations=10"]
+    if targets:
+        # A module's tests share a process, because they share what takes long to make: a graph, a model, a browser.
+        how += ["-n", str(_WORKERS), "--dist", "loadscope"]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
     if not args.json:
         return subprocess.run(command, cwd=root).returncode

@@ -1,10 +1,10 @@
 """`gravcomp up`: the graph for real hardware or as the robot's YAML says, until Ctrl-C."""
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
+from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
 
 
@@ -49,10 +49,20 @@ def run(args: argparse.Namespace) -> int:
     with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment) as processes:
         if args.viewer:
             show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
+        begin = time.monotonic()
         processes.start()
         names = ", ".join(processes.processes)
         bus = f" Bus: {interface} {channel}." if interface or channel else ""
-        print(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.", file=sys.stderr, flush=True)
+        output.note(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.")
+        processes.wait(processes.were_active, float("inf"), "the activation of all nodes")
+        figures = {
+            "nodes": list(processes.processes),
+            "active_after_s": round(time.monotonic() - begin, 1),
+            "interface": interface,
+            "channel": channel,
+            "logs": str(processes.logs),
+        }
+        output.result(figures, f"All nodes are active after {figures['active_after_s']:.1f} s.")
         while True:
             processes.check()
             time.sleep(0.2)

@@ -1,28 +1,23 @@
-"""`gravcomp model build ROBOT`: the robot's reduced model, which the simulator uses from then on."""
+"""`gravcomp model build ROBOT`: build the reduced model of a robot, which the simulator then uses."""
 
 import argparse
-import json
-import sys
+
+from gravcomp.commands import output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("robot", nargs="?", default="article", help="robot file, or the name of a shipped one (default: article)")
-    parser.add_argument("--force", action="store_true", help="build it anew where it is built already")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument(
+        "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
+    )
+    parser.add_argument("--force", action="store_true", help="build it again when it exists")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: built, or built already, 2: this robot cannot be reduced."""
-    from gravcomp.config import ConfigError
-    from gravcomp.mesh import MeshError
+    """Run the subcommand. Returns 0: built, or built already. Raises ConfigError, MeshError when the robot cannot be reduced."""
     from gravcomp.reduction import path_of
 
-    try:
-        model, reduction, seconds = prepare(args.robot, force=args.force)
-    except (ConfigError, MeshError) as error:
-        print(f"gravcomp model build: {error}", file=sys.stderr)
-        return 2
+    model, reduction, seconds = prepare(args.robot, force=args.force)
     figures = {
         "robot": model.robot.name,
         "unknowns": reduction.basis.shape[0],
@@ -35,13 +30,12 @@ def run(args: argparse.Namespace) -> int:
         "seconds": seconds,
         "file": str(path_of(model)),
     }
-    print(json.dumps(figures) if args.json else _sentences(figures))
+    output.result(figures, _sentences(figures))
     return 0
 
 
 def prepare(robot: str, *, force: bool = False) -> tuple:
     """(model, its reduction, seconds it took), built with a progress bar unless it is there. Raises ConfigError, MeshError."""
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from gravcomp.description import load_robot_file
@@ -54,7 +48,7 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     if reduction is not None:
         return model, reduction, 0.0
     columns = TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("training", total=1.0)
         with alone(model, lambda: progress.update(task, description="waiting for another build")):
             reduction = None if force else load(model)
@@ -73,7 +67,7 @@ def prepare_model(robot: str) -> None:
     try:
         prepare(robot)
     except ConfigError as error:
-        print(f"No reduced model: {error}", file=sys.stderr)
+        output.note(f"No reduced model: {error}")
 
 
 def _sentences(figures: dict) -> str:
