@@ -72,7 +72,7 @@ def time_step(
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
     of the step. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step.
+    material keep their values from before the step, and the caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_end.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
@@ -84,16 +84,8 @@ def time_step(
             force[k, i] = mass[k] * gravity[i]
     share = tension_shares(strain, length, sliding, tendon_start, tendon_end, mu, guide_angle)
 
-    total_increment = np.zeros((n + 1, 6))
-    for k in range(1, n + 1):
-        for i in range(6):
-            a = (_ALPHA_F * velocity_rate[k, i] - _ALPHA_M * acceleration[k, i]) / (1.0 - _ALPHA_M)
-            total_increment[k, i] = dt * velocity[k, i] + dt * dt * ((0.5 - _BETA) * acceleration[k, i] + _BETA * a)
-            velocity[k, i] += dt * ((1.0 - _GAMMA) * acceleration[k, i] + _GAMMA * a)
-            acceleration[k, i] = a
-            velocity_rate[k, i] = 0.0
+    total_increment = _predict(dt, velocity, acceleration, velocity_rate)
     start_orientation, start_position = orientation.copy(), position.copy()
-    start_branch_strain, start_slip_strain = branch_strain.copy(), slip_strain.copy()
     copy_pose(base_orientation, base_position, orientation[0], position[0])
 
     path_before = path.copy()
@@ -157,6 +149,10 @@ def time_step(
         for i in range(6):
             acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
 
+    if not _is_possible(orientation, position, new_strain, velocity, length):
+        for k in range(n + 1):
+            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
+        return False, iterations
     update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
     update_sliding(sliding, path_before, path, wound_before, wound, presliding)
     for c in range(m):
@@ -164,17 +160,21 @@ def time_step(
     for e in range(n):
         for i in range(6):
             strain[e, i] = new_strain[e, i]
-    possible = _is_possible(orientation, position, strain, velocity, length)
-    if not possible:
-        for k in range(n + 1):
-            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-        for e in range(n):
-            for i in range(2):
-                slip_strain[e, i] = start_slip_strain[e, i]
-            for j in range(branch_time.shape[0]):
-                for i in range(6):
-                    branch_strain[j, e, i] = start_branch_strain[j, e, i]
-    return possible, iterations
+    return True, iterations
+
+
+@njit(cache=True, error_model="numpy")
+def _predict(dt: float, velocity: np.ndarray, acceleration: np.ndarray, velocity_rate: np.ndarray) -> np.ndarray:
+    """Return the first increment (n + 1, 6) of the cross-sections; set velocity, acceleration and rate to match."""
+    total_increment = np.zeros(velocity.shape)
+    for k in range(1, velocity.shape[0]):
+        for i in range(6):
+            a = (_ALPHA_F * velocity_rate[k, i] - _ALPHA_M * acceleration[k, i]) / (1.0 - _ALPHA_M)
+            total_increment[k, i] = dt * velocity[k, i] + dt * dt * ((0.5 - _BETA) * acceleration[k, i] + _BETA * a)
+            velocity[k, i] += dt * ((1.0 - _GAMMA) * acceleration[k, i] + _GAMMA * a)
+            acceleration[k, i] = a
+            velocity_rate[k, i] = 0.0
+    return total_increment
 
 
 @njit(cache=True, error_model="numpy")
