@@ -1,6 +1,8 @@
 """A lifecycle node with one frozen data class of parameters, which by default configures and activates itself."""
 
 import gc
+import os
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -10,6 +12,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.shared import SharedParameters
+from gravcomp.launcher.node_process import ACTIVE_FILE
 from gravcomp_node import ros_parameters
 
 OK, WARN, ERROR = (bytes([level]) for level in (0, 1, 2))
@@ -77,6 +80,8 @@ class ManagedNode(LifecycleNode):
         for transition in (self.trigger_configure, self.trigger_activate):
             if transition() != TransitionCallbackReturn.SUCCESS:
                 raise ConfigError(self.failure or "could not be started")
+        if note := os.environ.get(ACTIVE_FILE):
+            Path(note).touch()
 
     def shut_down(self) -> None:
         """Deactivate and clean up from any state. Logs exceptions instead of raising them."""

@@ -37,7 +37,7 @@ class Graph:
     def __enter__(self) -> "Graph":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def start(self) -> None:
@@ -65,6 +65,10 @@ class Graph:
         dead = self.dead()
         if dead:
             raise NodeDied("; ".join(f"{name} {why}" for name, why in dead.items()))
+
+    def were_active(self) -> bool:
+        """Whether every node has become active since it was started."""
+        return all(process.was_active for process in self.processes.values())
 
     def states(self) -> dict[str, str]:
         """'running' or why it ended, for each node."""

@@ -20,6 +20,9 @@ _NODE_ENVIRONMENT = {
 }
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
+ACTIVE_FILE = "GRAVCOMP_ACTIVE_FILE"
+"""Environment variable with the path of a file that a node creates when it becomes active at its start."""
+
 
 class LaunchError(RuntimeError):
     """A node that cannot be started; the text is for people."""
@@ -82,6 +85,8 @@ class NodeProcess:
     def __init__(self, spec: NodeSpec, log: Path, environment: dict[str, str] | None = None):
         self.spec = spec
         self.log = log
+        self._active = log.with_name(log.name + ".active")
+        self._active.unlink(missing_ok=True)
         with open(log, "ab") as output:
             self._process = subprocess.Popen(
                 spec.command(),
@@ -91,9 +96,20 @@ class NodeProcess:
                 # A session of its own: Ctrl-C at the terminal reaches the launcher alone, which ends the nodes in order.
                 start_new_session=True,
                 preexec_fn=_die_with_parent,
-                env={**_NODE_ENVIRONMENT, **os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},
+                env={
+                    **_NODE_ENVIRONMENT,
+                    **os.environ,
+                    "PYTHONUNBUFFERED": "1",
+                    ACTIVE_FILE: str(self._active),
+                    **(environment or {}),
+                },
             )
         self.pid = self._process.pid
+
+    @property
+    def was_active(self) -> bool:
+        """Whether the node has become active since it was started."""
+        return self._active.exists()
 
     @property
     def exit_code(self) -> int | None:
