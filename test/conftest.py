@@ -1,4 +1,4 @@
-"""Helpers for tests that run the product as its users do: by its commands, as processes."""
+"""Fixtures of the tests that run the product as a user does: by its commands, as processes."""
 
 import json
 import os
@@ -18,7 +18,7 @@ WRITTEN_BY_LINES = ("src/README.md", "src/doc/figures.md")
 
 @dataclass
 class Answer:
-    """What a command gave."""
+    """Exit code and output of a command."""
 
     code: int
     out: str
@@ -48,7 +48,7 @@ def gravcomp():
 
 @pytest.fixture
 def gravcomp_process():
-    """Start `./gravcomp ...` and hand over the running process; whatever is left of it at the end is killed."""
+    """Start `./gravcomp ...` and return the running process; what still runs of it at the end is killed."""
     started = []
 
     def start(*arguments: str) -> subprocess.Popen:
@@ -58,7 +58,7 @@ def gravcomp_process():
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
-            preexec_fn=_heed_ctrl_c,
+            preexec_fn=_react_to_sigint,
         )
         started.append(process)
         return process
@@ -70,14 +70,14 @@ def gravcomp_process():
             process.wait()
 
 
-def _heed_ctrl_c() -> None:
-    """A shell starts what runs in its background deaf to SIGINT, and the tests' children would inherit that."""
+def _react_to_sigint() -> None:
+    """React to SIGINT: a process in the background of a shell ignores it, and the children of the tests would inherit that."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.fixture
 def broad():
-    """The folder with BROAD recordings: GRAVCOMP_DATA, else beside the repository; skipped when neither is there."""
+    """Return the folder with BROAD recordings: GRAVCOMP_DATA, else next to the repository; skip when neither exists."""
     folders = [Path(os.environ["GRAVCOMP_DATA"])] if "GRAVCOMP_DATA" in os.environ else [ROOT.parent / "shared" / "data"]
     for folder in [f for base in folders for f in (base / "broad", base)]:
         if sorted(folder.glob("*.npz")):
@@ -87,7 +87,7 @@ def broad():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """What the reader's folder looks like: the repository, but what is written into it stays here."""
+    """A folder that looks like the repository to the reader; what is written into it does not reach the repository."""
     folder = tmp_path_factory.mktemp("repository")
     mirror(ROOT, folder, [Path(path) for path in WRITTEN_BY_LINES] + [Path("src/doc/pictures/none")])
     for name in ("ROBOT", "my_robot", "left", "right", "robot"):
@@ -97,12 +97,18 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def type_in(folder):
-    """Types a documented line, `shorter` behind it, and gives the exit code and what was printed."""
+    """Return a function that types a documented line followed by `shorter`, and returns exit code and output."""
 
     def run(line: str, shorter: str = "", timeout: float = 600.0, **given: object) -> tuple[int, str]:
         done = subprocess.run(
             [*documented(line, **given), *shorter.split()],
-            cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=timeout)  # fmt: skip
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=timeout,
+        )
         return done.returncode, done.stdout
 
     return run
@@ -110,7 +116,7 @@ def type_in(folder):
 
 @pytest.fixture(scope="module")
 def recording():
-    """An IMU stream with ground truth: BROAD's where there is one; the bag in the repository has none."""
+    """An IMU stream with ground truth: one of BROAD; the bag in the repository has no ground truth."""
     from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
     files = broad_files()

@@ -1,6 +1,6 @@
-"""What a `ros2 ...` line of the documents does: by the command itself where it is installed, else by the same calls of rclpy.
+"""Run a `ros2 ...` line of the documents: by the command itself if it is installed, else by the same calls of rclpy.
 
-The wheels of ROS 2 bring no command line. The calls here are those that ros2cli makes: the node's own services for parameters and the
+The wheels of ROS 2 have no command line. The calls here are those of ros2cli: the services of a node for parameters and
 lifecycle, a message made from YAML for `topic pub` and `service call`, one message for `topic echo`, a count for `topic hz`.
 """
 
@@ -26,7 +26,7 @@ _HEARD = 3.0  # s that `topic hz` listens
 
 
 class Ros2:
-    """Runs lines against the graph of this process's domain; each raises AssertionError when it does not do what it is for."""
+    """Runs lines against the graph in the domain of this process. A line that fails raises AssertionError."""
 
     def __init__(self) -> None:
         self._context = rclpy.Context()
@@ -40,7 +40,7 @@ class Ros2:
         rclpy.shutdown(context=self._context)
 
     def run(self, line: str) -> str:
-        """What the line prints."""
+        """Return what the line prints."""
         if shutil.which("ros2"):
             endless = line.startswith(("ros2 topic hz", "ros2 topic echo"))
             words = ["timeout", "--signal=INT", "15", *shlex.split(line)] if endless else shlex.split(line)
@@ -68,13 +68,13 @@ class Ros2:
                 return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
             case ["lifecycle", "set", node, transition]:
                 return self._change(node, transition)
-        raise AssertionError(f"nobody knows what {line} does")
+        raise AssertionError(f"no replacement is known for: {line}")
 
     def state_of(self, node: str) -> str:
         return self.ask(GetState, f"{node}/get_state", GetState.Request()).current_state.label
 
     def listen(self, kind: type, topic: str, latched: bool = False) -> list:
-        """Messages of a topic, as they come while this spins; in another list each time."""
+        """Return a list to which the messages of a topic are appended while this node spins."""
         heard: list = []
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         reliability = ReliabilityPolicy.RELIABLE if latched else ReliabilityPolicy.BEST_EFFORT
@@ -91,7 +91,7 @@ class Ros2:
     def ask(self, service: type, name: str, request: object) -> object:
         client = self._node.create_client(service, name)
         try:
-            assert client.wait_for_service(PATIENCE), f"nobody serves {name}"
+            assert client.wait_for_service(PATIENCE), f"no node serves {name}"
             future = client.call_async(request)
             self._executor.spin_until_future_complete(future, PATIENCE)
             assert future.done(), f"no answer of {name}"
@@ -102,9 +102,9 @@ class Ros2:
     def _publish(self, kind: str, name: str, content: str) -> str:
         message = _filled(_interface(kind)(), content)
         publisher = self._node.create_publisher(type(message), name, 10)
-        self.until(lambda: publisher.get_subscription_count() > 0, f"nobody listens to {name}")
+        self.until(lambda: publisher.get_subscription_count() > 0, f"no node subscribes to {name}")
         publisher.publish(message)
-        # In small pieces: others of this node are heard meanwhile.
+        # In short waits, so that other messages for this node are received as well.
         self.until(lambda: publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=0.01)), f"{name} is not acknowledged")
         self._node.destroy_publisher(publisher)
         return f"publishing #1: {message}"
@@ -120,7 +120,7 @@ class Ros2:
         return heard[-1]
 
     def _listen(self, name: str, callback, done) -> None:
-        self.until(lambda: self._node.get_publishers_info_by_topic(name), f"nobody publishes {name}")
+        self.until(lambda: self._node.get_publishers_info_by_topic(name), f"no node publishes {name}")
         (offer,) = self._node.get_publishers_info_by_topic(name)
         latched = offer.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
@@ -152,7 +152,7 @@ class Ros2:
 
 
 def run_node(line: str, environment: dict[str, str], seconds: float | None) -> tuple[int, str]:
-    """The exit code and the output of a `ros2 run ...` line: SIGINT after `seconds`, None: it ends by itself."""
+    """Return exit code and output of a `ros2 run ...` line. It gets SIGINT after `seconds`; None: it ends by itself."""
     _, run, package, executable, *arguments = shlex.split(line)
     assert run == "run"
     command = shlex.split(line) if shutil.which("ros2") else [find_executable(package, executable), *arguments]
@@ -166,7 +166,7 @@ def run_node(line: str, environment: dict[str, str], seconds: float | None) -> t
 
 
 def _interface(kind: str) -> type:
-    """The class of pkg/msg/Name or pkg/srv/Name."""
+    """Return the class of pkg/msg/Name or pkg/srv/Name."""
     package, folder, name = kind.split("/")
     return getattr(importlib.import_module(f"{package}.{folder}"), name)
 

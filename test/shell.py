@@ -1,4 +1,4 @@
-"""Typing what the documents tell the reader to type: commands that run until Ctrl-C, and a folder that looks like the reader's."""
+"""Run documented lines as a reader does: commands that run until Ctrl-C, and a folder that looks like the repository."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ START = 300.0  # s; a machine that has never run the graph compiles first
 
 
 def mirror(source: Path, target: Path, written: list[Path]) -> None:
-    """Links to all that is in `source`; the files `written` and the folders that lead to them are the target's own."""
+    """Fill `target` with links to everything in `source`; the files `written` and the folders that contain them are copies."""
     target.mkdir(exist_ok=True)
     for path in source.iterdir():
         below = [Path(*w.parts[1:]) for w in written if w.parts[0] == path.name and len(w.parts) > 1]

@@ -1,4 +1,4 @@
-"""The worked example for larger arms: the arm turns the robot's base through five poses, and the robot keeps its shape."""
+"""`./gravcomp arm`: the arm turns the base of the robot through five poses, and the robot keeps its shape."""
 
 import pytest
 from documents import documented
@@ -11,7 +11,7 @@ def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcom
     figures = answer.json
     assert figures["inclination_deg"] == [135.0, 90.0, 45.0, 0.0, -45.0]
     assert figures["tip_error_released_rms_mm"] > 15.0 and figures["ratio"] >= 5.0
-    # The mount is known and the URDF is right: what is left is the filter's error and the base's settling.
+    # The mount is known and the URDF is right: the remaining error is that of the filter and of the settling base.
     assert figures["arm_and_imu_disagree_by_deg"] < 3.0
 
 

@@ -1,4 +1,4 @@
-"""Whatever is wrong with what is given: a clear sentence, a code that is not zero, and nothing hangs."""
+"""Invalid input gives a clear message and exit code 2, and nothing hangs."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_a_recording_that_cannot_be_used_is_refused(gravcomp, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change, words",
+    ("change", "words"),
     [
         (lambda d: d["robot"].update(colour="red"), ["robot.colour", "robot.yaml"]),
         (lambda d: d["robot"]["segments"][0].update(length_mm=-5), ["robot.segments[0].length_mm", "-5", "mm"]),

@@ -1,4 +1,4 @@
-"""The main job: processes, DDS and CAN frames, judged by the virtual robot's truth."""
+"""`./gravcomp demo`: processes, DDS and CAN frames, evaluated by the ground truth of the virtual robot."""
 
 import os
 import re
@@ -15,7 +15,7 @@ LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "v
 
 
 def marked(mark: str) -> list[str]:
-    """Command lines of the processes that have the mark in their environment."""
+    """Return the command lines of the processes that have the mark in their environment."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -41,7 +41,7 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     answer = gravcomp(*documented("./gravcomp demo --headless --duration 30 --json")[1:], GRAVCOMP_TEST=mark.split("=")[1])
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
-    # Truth and model sag, straighten and turn alike.
+    # The virtual robot and the model sag, straighten and turn alike.
     assert answer.json["correlation"] > 0.9
     assert marked(mark) == []
 
@@ -68,7 +68,7 @@ def test_pictures_of_the_page_show_each_moment(gravcomp, tmp_path):
     for name in ("sagging", "compensated", "tilted"):
         picture = np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")).astype(int)
         middle[name] = picture[:, 420:-420]
-        # Thousands of colours beside the panels: shaded surfaces, not an empty canvas.
+        # Thousands of colours next to the panels: shaded surfaces, not an empty canvas.
         assert len(np.unique(middle[name].reshape(-1, 3), axis=0)) > 2000
     # The robot is somewhere else in each.
     for a, b in (("sagging", "compensated"), ("compensated", "tilted")):

@@ -1,4 +1,4 @@
-"""The running graph: its nodes take, give and serve what the table of nodes says, and the doctor sees how it does."""
+"""The running graph: its nodes have the topics and services of the table of nodes, and the doctor measures the graph."""
 
 import functools
 import importlib
@@ -15,11 +15,11 @@ from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
 pytestmark = pytest.mark.timeout(600)
 
-# A namespace, because nothing may depend on there being none.
+# With a namespace, because nothing must depend on an empty one.
 NAMESPACE = "/left"
 DOMAIN = reserve_domain()
 START = 300.0  # s; a machine that has never run the graph compiles first
-# What every node has: rclpy's own topics, those of the parameters and of the lifecycle.
+# Ports of every node: those of rclpy, of the parameters and of the lifecycle.
 COMMON_TOPICS = {"/rosout", "/parameter_events", "/clock"}
 COMMON_SERVICES = ("rcl_interfaces/", "lifecycle_msgs/", "type_description_interfaces/")
 RATED = {port.name: port.type for entry in NODES for port in entry.publishes if port.rate is not None}
@@ -27,7 +27,7 @@ RATED = {port.name: port.type for entry in NODES for port in entry.publishes if 
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory):
-    """The loop on a virtual robot; hands over the processes, to which more may be added."""
+    """The loop on a virtual robot, as processes; a test can add more."""
     from gravcomp.canbus.multicast import private_channel
 
     motion = {"motion": "topic", "truth_rate": 50.0, "feedback_rate": 250}
@@ -40,7 +40,7 @@ def robot(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def observer(robot):
-    """A node that asks the middleware who is there."""
+    """A node that asks the middleware for the nodes and topics of the graph."""
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(DOMAIN))
     observer = rclpy.create_node("doctors_test", context=context)
@@ -72,21 +72,21 @@ def interface(observer, executable: str) -> tuple[dict, dict, dict]:
 
 
 def resolved(ports, executable: str) -> dict[str, str]:
-    """Full names of ports to their types."""
+    """Return the types of ports by their full names."""
     names = {p.name: p.name.replace("~", f"{NAMESPACE}/{executable}") for p in ports}
     return {n if n.startswith("/") else f"{NAMESPACE}/{n}": next(p.type for p in ports if p.name == k) for k, n in names.items()}
 
 
 def agrees(found: dict, ports: tuple, executable: str) -> bool:
-    """All ports that are not optional are found, and nothing that is no port."""
+    """Check that all ports are found that are not optional, and nothing else."""
     declared = resolved([p for p in ports if p.name not in COMMON_TOPICS], executable)
     needed = resolved([p for p in ports if not p.optional and p.name not in COMMON_TOPICS], executable)
     return needed.items() <= found.items() <= declared.items()
 
 
 def test_the_doctor_finds_rates_delays_and_fitting_qos(gravcomp, robot, observer):
-    graph, processes = robot
-    # Once everything is compiled and follows: until then the topics are silent.
+    _, processes = robot
+    # Wait until everything is compiled and follows commands; before that the topics are silent.
     heard = set()
     for name, kind in RATED.items():
         take = functools.partial(lambda n, _: heard.add(n), name)
@@ -136,22 +136,23 @@ def test_every_node_takes_gives_and_serves_what_the_table_says(robot, observer, 
         processes.start_one(spec)
     names = [executable for _, executable in LOOP] + ["virtual_robot"] + [spec.executable for spec in more]
     for executable in names:
-        entry = node(executable)
-
-        def fits() -> bool:
-            takes, gives, services = interface(observer, executable)
-            return (
-                agrees(takes, entry.subscribes, executable)
-                and agrees(gives, entry.publishes, executable)
-                and agrees(services, entry.services, executable)
-            )
-
-        until(lambda: is_there(observer, executable), f"no {executable}", processes)
+        until(functools.partial(is_there, observer, executable), f"no {executable}", processes)
         try:
-            # The last of a node's ports come with its activation.
-            until(fits, "", processes, 60.0)
+            # A node creates its last ports at its activation.
+            until(functools.partial(fits_the_table, observer, executable), "", processes, 60.0)
         except AssertionError:
             raise AssertionError(f"{executable} is not what the table says: {interface(observer, executable)}") from None
+
+
+def fits_the_table(observer, executable: str) -> bool:
+    """Return whether a running node has the ports of the table of nodes."""
+    entry = node(executable)
+    takes, gives, services = interface(observer, executable)
+    return (
+        agrees(takes, entry.subscribes, executable)
+        and agrees(gives, entry.publishes, executable)
+        and agrees(services, entry.services, executable)
+    )
 
 
 def message_class(kind: str) -> type:

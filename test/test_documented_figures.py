@@ -1,4 +1,4 @@
-"""The documented lines that measure figures: each runs briefly."""
+"""The documented lines that measure figures, each with --brief."""
 
 import functools
 import subprocess
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.timeout(900)
 
 
 @pytest.mark.parametrize(
-    "line, about",
+    ("line", "about"),
     [
         ("./gravcomp bench engine --write src/README.md", "closed-loop"),
         ("./gravcomp bench estimator", "cost of a sample"),
@@ -27,17 +27,17 @@ pytestmark = pytest.mark.timeout(900)
     ],
 )
 def test_figures_are_made(made, line, about):
-    """Briefly: whole, they take from minutes to half an hour. What --write does with a document is test_figures_table's."""
+    """Without --brief they take from minutes to half an hour. `test_figures_table` checks what --write does with a document."""
     code, output = made(
         tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
     )
-    # 1: a figure was missed, as brief ones may be.
+    # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output
 
 
 @pytest.fixture(scope="module")
 def made(folder):
-    """What a command prints with --brief, made once where several lines differ in the document alone that they write to."""
+    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
 
     @functools.cache
     def run(words: tuple[str, ...]) -> tuple[int, str]:

@@ -1,4 +1,4 @@
-"""The documented lines that talk to a live graph: one virtual robot that runs as the tutorial says."""
+"""The documented lines that talk to a running graph: one virtual robot that runs as the tutorial says."""
 
 import os
 import re
@@ -35,7 +35,7 @@ def ros2():
     ros2.close()
 
 
-SAID_ONCE = (
+PUBLISHED_ONCE = (
     "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, tip_position_weight: 1.0}'"
 )
 
@@ -47,9 +47,9 @@ ROS2_LINES = (
     ("ros2 param set /inverse_controller inverse.axial_weight 0.1", "successful"),
     ("ros2 topic hz /cable/command", "average rate: 9|average rate: 10"),
     ("ros2 topic echo /controller/status --field message", "target"),
-    (SAID_ONCE, "publishing"),
+    (PUBLISHED_ONCE, "publishing"),
     (
-        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, bend_plane: 1.57, tip_position_weight: 1.0}'",
+        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 0.5, bend_plane: 1.57, tip_position_weight: 1.0}'",  # noqa: E501 (a whole line of a document)
         "publishing",
     ),
     ("ros2 service call /inverse_controller/relax std_srvs/srv/Trigger", "success=True"),
@@ -78,10 +78,10 @@ def test_the_live_graph_is_recorded_and_judged(live, ros2, type_in, folder):
         words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     time.sleep(5.0)
-    ros2.run(SAID_ONCE)
+    ros2.run(PUBLISHED_ONCE)
     output, _ = recorder.communicate(timeout=60.0)
     assert recorder.returncode == 0, output
-    # What was said there once, by somebody who came and went, is in it as well.
+    # A message that was published once, by a node that ended since, is recorded as well.
     topics = describe(folder / "my_bag")["topics"]
     assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 500
     code, output = type_in("./gravcomp reproduce all --bag my_bag")
@@ -91,7 +91,7 @@ def test_the_live_graph_is_recorded_and_judged(live, ros2, type_in, folder):
 def test_an_imu_is_calibrated_from_a_recording(live, type_in, folder):
     code, output = type_in("./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 8")
     assert code == 0, output
-    # The robot's base stands still: one pose, which is too few for the scale but enough for the offset of the gyroscope.
+    # The base is at rest: one pose, which is too few for the scale but enough for the offset of the gyroscope.
     code, output = type_in("./gravcomp calibrate-imu poses --write my_robot.yaml", "--robot article")
     assert code == 0 and "gyroscope" in (folder / "my_robot.yaml").read_text(), output
 

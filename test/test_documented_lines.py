@@ -1,9 +1,10 @@
-"""Every line that the documents tell the reader to type is run: as it stands, or shortened by the options next to it in a test.
+"""Every line in a code block of the documents is run: as it is, or with options of the test that make it shorter.
 
-A value replaces what the reader puts in (FILE, ROBOT.yaml), and what a line writes goes into a folder of the test. Lines for
-a CAN device are held to the error that a machine without one gives; those that start other programmes are not run.
+A value replaces each placeholder (FILE, ROBOT.yaml), and what a line writes goes into a folder of the test. Lines for a CAN
+device must give the error of a machine without one; lines that start other programmes are not run.
 
-Here: lines that need no running graph. `test_documented_graph`, `test_documented_nodes` and `test_documented_figures` run the others.
+This file runs lines that need no running graph. `test_documented_graph`, `test_documented_nodes` and `test_documented_figures`
+run the others.
 """
 
 import os
@@ -25,7 +26,7 @@ RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 
 def test_every_line_is_run_by_a_test():
-    """A line that a document gains is missing here until a test runs it."""
+    """A new line of a document fails here until a test runs it."""
     sources = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
     run = set(re.findall(r"""["']((?:\./gravcomp|ros2) [^"\n]*?)["'](?=[,)\]\s])""", sources))
     missing = [line for line in TYPED if line not in run and not line.startswith(FOREIGN)]
@@ -52,8 +53,13 @@ def test_a_model_is_asked_and_built(type_in, folder, line):
 @pytest.mark.parametrize("line", ["./gravcomp doctor", "./gravcomp doctor --robot src/examples/own_robot.yaml"])
 def test_the_doctor_looks_at_the_machine(type_in, line):
     code, output = type_in(line)
-    # 1 where this machine lacks something that it needs; that is an answer.
+    # 1: this machine lacks something that is needed; that is a valid result.
     assert code in (0, 1) and "Python" in output
+
+
+def test_the_source_is_checked(type_in):
+    code, output = type_in("./gravcomp check")
+    assert code == 0 and "mypy: passed" in output, output
 
 
 ESTIMATES = ("./gravcomp estimate FILE", "./gravcomp estimate FILE --json", "./gravcomp estimate FILE --out gravity.npz")
@@ -84,13 +90,13 @@ def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
     line = "./gravcomp calibrate DATA.csv --robot ROBOT.yaml --write CALIBRATED.yaml"
     code, output = type_in(line, DATA="measured.csv", ROBOT="ROBOT.yaml", CALIBRATED="calibrated.yaml")
     assert code == 0, output
-    # Without cables the tips tell the modulus alone, to within the rounding of a tenth of a micrometre.
+    # With released cables the tips determine the modulus only, to within the rounding of a tenth of a micrometre.
     modulus = load_robot_file(str(folder / "calibrated.yaml")).robot.segments[0].material.youngs_modulus
     assert modulus == pytest.approx(330e3, rel=1e-3)
 
 
 @pytest.mark.parametrize(
-    "line, shorter",
+    ("line", "shorter"),
     [
         ("./gravcomp test", "--collect-only -q"),
         ("./gravcomp test --fast", "--collect-only -q"),

@@ -1,4 +1,4 @@
-"""The documented lines that start graphs and nodes of their own: your own robot, replayed bags, single nodes, two robots."""
+"""The documented lines that start graphs and nodes: your own robot, replayed bags, single nodes, two robots."""
 
 import os
 import re
@@ -29,7 +29,7 @@ def test_an_own_robot_is_demonstrated(type_in):
 
 @pytest.fixture
 def apart(monkeypatch):
-    """A domain in which no other node speaks."""
+    """A ROS domain without other nodes."""
     monkeypatch.setenv("ROS_DOMAIN_ID", APART)
 
 
@@ -48,8 +48,8 @@ def test_a_bag_is_replayed(type_in, folder, apart, line):
         "ros2 run gravcomp_estimation imu_estimator --ros-args -p use_sim_time:=true",
         "ros2 run gravcomp_fem fem_simulator",
         "ros2 run gravcomp_fem inverse_controller",
-        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",
-        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",
     ],
 )
@@ -60,7 +60,7 @@ def test_a_node_runs_until_ctrl_c(folder, apart, monkeypatch, line):
     monkeypatch.chdir(folder)
     code, output = run_node(line, dict(os.environ), 6.0)
     if "source:=tf" in line and code == 2:
-        assert "tf2_msgs" in output  # comes with an installed ROS alone
+        assert "tf2_msgs" in output  # part of an installed ROS only
         return
     assert code == 0 and "Traceback" not in output, output
 

@@ -24,7 +24,7 @@ def campaign():
 
 @pytest.fixture(autouse=True)
 def driving(campaign):
-    """Every test begins with a bridge that follows commands and ends with one that does so again."""
+    """Start every test with a bridge that follows commands; at its end the bridge must follow commands again."""
     assert campaign.make_active()
     yield
     campaign.clear_faults()
@@ -50,9 +50,9 @@ def test_a_killed_process_may_be_started_again(campaign, executable):
 
 
 def test_a_killed_bridge_comes_back_with_the_cables_zeros(campaign):
-    """Without current the robot sags and takes its cables along; a bridge without zeros would call that place zero."""
-    # Without commands it goes on holding, so the probe finds it there however late it discovers the new node.
-    asked = time.time()  # the bridge may hold before the answer to the service is here
+    """Without current the robot sags and pulls its cables out; a bridge without zero positions would take that place as zero."""
+    # Without commands the bridge continues to hold, so the probe finds that state even if it discovers the new node late.
+    asked = time.time()  # the bridge can hold before the service has answered
     campaign.probe.enable(False)
     assert campaign.probe.wait_for({State.HOLDING}, asked, 10.0)
     killed = time.time()

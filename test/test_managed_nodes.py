@@ -1,4 +1,4 @@
-"""Nodes as users of ros2cli meet them: lifecycle to its end, what is told of nodes that do not work, parameters out and in again."""
+"""Nodes as users of ros2cli see them: the whole lifecycle, reports of nodes that fail, parameters dumped and loaded."""
 
 import time
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(300)
 
 
 class Observer(Ros2):
-    """Also hears diagnostics."""
+    """Runs lines and receives diagnostics."""
 
     def __init__(self):
         super().__init__()
@@ -38,7 +38,7 @@ def observer():
 
 @pytest.fixture
 def start(tmp_path, observer):
-    """Starts a node and waits until it answers."""
+    """Return a function that starts a node and waits until it answers."""
     processes = []
 
     def start(package: str, executable: str, **parameters) -> NodeProcess:
@@ -55,7 +55,7 @@ def test_a_node_that_is_shut_down_is_finalized_and_stays(start, observer):
     process = start("gravcomp_estimation", "imu_estimator")
     observer.run("ros2 lifecycle set /imu_estimator active_shutdown")
     assert observer.state_of("/imu_estimator") == "finalized"
-    observer.until(lambda: "shut down" in observer.diagnostics.get("imu_estimator", (b"", ""))[1], "nothing is told of the end")
+    observer.until(lambda: "shut down" in observer.diagnostics.get("imu_estimator", (b"", ""))[1], "the end is not reported")
     assert process.exit_code is None
 
 
@@ -88,12 +88,13 @@ def test_a_controller_that_is_not_active_promises_nothing(start, observer):
 
 
 def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tmp_path):
-    """Also while there is no deformation to follow, which the controller says several times a second."""
+    """Also without deformation, which the controller reports several times a second."""
     start("gravcomp_fem", "inverse_controller")
     heard = observer.listen(ControllerStatus, "controller/status", latched=True)
-    observer.until(lambda: heard and heard[-1].code == ControllerStatus.STALE, "it does not say that nothing comes")
+    observer.until(lambda: heard and heard[-1].code == ControllerStatus.STALE, "it does not report that no deformation comes")
     observer.run(
-        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'"
+        "ros2 topic pub --once /target/shape gravcomp_msgs/msg/ShapeTarget"
+        " '{bend: true, bend_angle: 50.0, tip_position_weight: 1.0}'"
     )
     begin = time.monotonic()
     observer.until(lambda: "at most a full turn" in heard[-1].message, "it is not refused")
@@ -106,7 +107,7 @@ def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tm
 
 
 def test_what_is_dumped_of_parameters_that_are_unset_can_be_given_again(start, observer):
-    """`ros2 param dump` writes null for them."""
+    """`ros2 param dump` writes null for these parameters."""
     start("gravcomp_estimation", "imu_estimator", **{"heater.target": None, "heater.ambient": 21.0})
     assert observer.state_of("/imu_estimator") == "active"
     assert "successful" in observer.run("ros2 param set /imu_estimator heater.ambient None")

@@ -1,4 +1,4 @@
-"""How far nodes' messages reach: this host's loopback alone unless asked, and never through shared memory."""
+"""Reach of the messages: the loopback of this host unless more is asked for, and never shared memory."""
 
 import os
 import subprocess
@@ -10,7 +10,7 @@ from gravcomp.environment.middleware import middleware, reach
 from gravcomp.launcher.domain import reserve_domain
 
 DOMAIN = reserve_domain()
-# Says what it hears of the other, and how its participant is connected, in one process each.
+# A process for each node: it prints what it receives from the other, and how its participant is connected.
 NODE = """
 import os, sys, time, rclpy
 from std_msgs.msg import String

@@ -1,4 +1,4 @@
-"""Bags of the running graph: replayed, the same gravity comes out; recorded, killed and read again, nothing but the last second is lost."""
+"""Bags of the running graph: a replay gives the same gravity; a recorder that is killed loses at most the last second."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 
 def gravity(path: Path) -> dict[int, tuple]:
-    """Gravity by stamp, ns."""
+    """Return gravity by stamp in ns."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -46,13 +46,13 @@ def test_a_replayed_bag_gives_the_offline_gravity_bit_for_bit_at_any_speed(gravc
         assert answer.code == 0, answer.err
         assert answer.json["recorded"]["topics"]["/clock"] > 0
         again.append(gravity(out))
-    # To the last message and the last bit, and the same as without a graph.
+    # Every message and every bit, and the same as without a graph.
     recording = read_recording(RECORDED)
     mount = quaternion.from_roll_pitch_yaw(*load_robot_file("article").robot.imu_mount.rpy)
     offline = estimate_recording(recording, GravityEstimator(mount=mount)).gravity.tolist()
     assert again[0] == dict(zip(recording.stamp_ns.tolist(), map(tuple, offline)))
     assert again[1] == again[0]
-    # The bag's own gravity came from the filter of its day; half a degree is what a retuned one may differ by.
+    # The gravity in the bag is from an earlier filter; a retuned one can differ by half a degree.
     recorded = gravity(RECORDED)
     angles = [angle_between(np.array(recorded[s]), np.array(again[0][s])) for s in recorded.keys() & again[0].keys()]
     assert np.degrees(max(angles)) < 0.5
@@ -64,13 +64,13 @@ def test_a_recorder_that_is_killed_leaves_a_bag_that_can_be_replayed(gravcomp, g
     player = gravcomp_process("replay", str(RECORDED), "--out", str(bag))
     end = time.monotonic() + 300
     file = bag / "killed.mcap"
-    # Half of the stream has been played when this much of the file is written; the graph lives on in its own session.
+    # At this size of the file half of the stream has been played; the graph continues in a session of its own.
     while not (file.exists() and file.stat().st_size > 500_000):
         assert time.monotonic() < end and player.poll() is None, player.stderr.read()
         time.sleep(0.1)
     (recorder,) = [p for p in processes("gravcomp_fem/recorder") if str(bag) in p[1]]
     os.kill(recorder[0], signal.SIGKILL)
-    # The graph notices that one of its nodes is gone, and says which.
+    # The graph detects that one of its nodes has ended, and reports which.
     _, error = player.communicate(timeout=120)
     assert player.returncode == 2 and "recorder was ended by SIGKILL" in error
     saved = readable(bag)
@@ -85,7 +85,7 @@ def test_a_recorder_that_is_killed_leaves_a_bag_that_can_be_replayed(gravcomp, g
 
 
 def processes(what: str) -> list[tuple[int, str]]:
-    """Process ids and command lines that contain the text."""
+    """Return process ids and command lines that contain the text."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:

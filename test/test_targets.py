@@ -1,4 +1,4 @@
-"""Targets that no shape has, in the running graph: commands go on, and the next target is reached."""
+"""Targets without equilibrium in the running graph: commands continue, and the next target is reached."""
 
 import pytest
 
@@ -26,9 +26,9 @@ def ros2(graph):
     ros2.close()
 
 
-@pytest.mark.parametrize("angle, plane", [(4.5, 0.0), (5.5, 1.0)])
+@pytest.mark.parametrize(("angle", "plane"), [(4.5, 0.0), (5.5, 1.0)])
 def test_a_target_that_no_shape_has_is_left_again(graph, ros2, angle, plane):
-    """The robot goes where the model's equilibria end, and finds a way back from there. How fast commands come meanwhile the bench tells."""
+    """The robot moves to where the model's equilibria end, and recovers. `bench engine` measures the longest step."""
     commands = ros2.listen(CableCommand, f"{graph.namespace}/cable/command")
     statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
     pub = f"ros2 topic pub --once {graph.namespace}/target/shape gravcomp_msgs/msg/ShapeTarget"

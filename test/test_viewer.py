@@ -1,4 +1,4 @@
-"""The viewer in a real browser, headless: it renders, follows the graph, a control changes the robot, nothing leaves the machine."""
+"""The viewer in a headless browser: it renders and follows the graph, a control changes the robot, nothing leaves the machine."""
 
 import io
 import socket
@@ -14,7 +14,7 @@ rclpy = pytest.importorskip(
     "rclpy", reason="the viewer's test publishes gravity: it runs inside the environment, by ./gravcomp test"
 )
 
-# Drawing by the processor alone on a busy machine.
+# Software rendering on a busy machine.
 PATIENCE = 240.0
 
 pytestmark = [
@@ -24,7 +24,7 @@ pytestmark = [
 
 
 class Robot:
-    """Plays gravity into the graph and listens to the model's tip."""
+    """Publishes gravity and receives the tip of the model."""
 
     def __init__(self):
         from geometry_msgs.msg import PoseStamped, Vector3Stamped
@@ -40,7 +40,7 @@ class Robot:
         self._message.vector.x = -9.81
         self.node.create_subscription(PoseStamped, "robot/tip", self._on_tip, SENSOR)
         self.node.create_timer(0.02, self._publish)
-        # An executor of its own: rclpy's common one does not come back after another test's shutdown.
+        # An executor of this test: the common one of rclpy does not work after the shutdown by another test.
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._stopped = threading.Event()
@@ -68,7 +68,7 @@ class Robot:
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """The page of a viewer beside simulator and controller, in the ROS domain of this process."""
+    """The page of a viewer with simulator and controller, in the ROS domain of this process."""
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph
 
@@ -106,7 +106,7 @@ def test_it_says_what_the_controller_says(page):
 
 
 def test_the_robot_is_drawn(browser):
-    """Thousands of colours beside the panels: shaded surfaces on the background's gradient, not an empty canvas."""
+    """Thousands of colours next to the panels: shaded surfaces on the gradient of the background, not an empty canvas."""
     from PIL import Image
 
     end = time.monotonic() + PATIENCE
@@ -121,7 +121,7 @@ def test_the_robot_is_drawn(browser):
 
 
 def test_every_curve_has_a_range(page):
-    """Also those that have one without values: this robot has no truth."""
+    """Also without values for one of them: this robot has no ground truth."""
     ranges = page.evaluate(
         "Object.values(window.__viserTestpoints.uplots).map(u => [u.chart.scales.y.min, u.chart.scales.y.max])"
     )
@@ -131,7 +131,7 @@ def test_every_curve_has_a_range(page):
 def test_a_control_bends_the_robot(browser, robot):
     end = time.monotonic() + PATIENCE
     browser.set_slider("bend °", 40)
-    # An arc of 100 mm bent by 40 degrees ends 33.5 mm beside the axis.
+    # An arc of 100 mm bent by 40 degrees ends 33.5 mm from the axis.
     while robot.tip is None or np.hypot(*robot.tip[:2]) < 0.028:
         assert time.monotonic() < end, f"the tip is at {robot.tip}"
         time.sleep(0.2)
