@@ -16,7 +16,7 @@ def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcom
 
 
 @pytest.mark.timeout(700)
-def test_gravity_from_the_arm_alone_serves_as_well(gravcomp):
+def test_gravity_from_the_arm_only_works_as_well(gravcomp):
     answer = gravcomp(*documented("./gravcomp arm --gravity arm --hold 3 --json")[1:], "--hold", "1", timeout=600)
     assert answer.code == 0, answer.err
     assert answer.json["ratio"] >= 5.0

@@ -87,7 +87,7 @@ def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, delay, monkeyp
     assert marked(f"GRAVCOMP_TEST={mark}") == []
 
 
-def test_a_launcher_that_is_killed_takes_its_nodes_along(gravcomp_process, monkeypatch):
+def test_the_nodes_of_a_killed_launcher_end(gravcomp_process, monkeypatch):
     mark = f"{os.getpid()}-kill"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
     process = gravcomp_process("demo", "--headless", "--duration", "60")
@@ -101,7 +101,7 @@ def test_a_launcher_that_is_killed_takes_its_nodes_along(gravcomp_process, monke
     assert marked(f"GRAVCOMP_TEST={mark}") == []
 
 
-def test_a_node_that_dies_ends_the_run_with_its_name(gravcomp_process, monkeypatch):
+def test_a_node_that_dies_ends_the_run_and_is_named(gravcomp_process, monkeypatch):
     mark = f"{os.getpid()}-node"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
     process = gravcomp_process("demo", "--headless", "--duration", "120")

@@ -113,14 +113,14 @@ def test_the_doctor_names_a_subscription_that_cannot_be_served(gravcomp, robot, 
     assert "imu_estimator to doctors_test" in wrong[0]["found"] and "reliab" in wrong[0]["found"].lower()
 
 
-def test_the_doctor_says_when_nothing_runs(gravcomp):
+def test_the_doctor_reports_that_nothing_runs(gravcomp):
     answer = gravcomp("doctor", "--graph", "--json", ROS_DOMAIN_ID=reserve_domain())
     assert answer.code == 1
     silent = {f["subject"] for f in answer.json["findings"] if f["found"] == "nothing is published"}
     assert silent == set(RATED)
 
 
-def test_every_node_takes_gives_and_serves_what_the_table_says(robot, observer, tmp_path):
+def test_every_node_has_the_topics_and_services_of_the_table(robot, observer, tmp_path):
     from gravcomp.arm.description import expanded, shipped_xacro
 
     graph, processes = robot

@@ -61,7 +61,7 @@ ROS2_LINES = (
 )
 
 
-def test_the_doctor_sees_the_live_graph(live, ros2, type_in):
+def test_the_doctor_examines_the_running_graph(live, ros2, type_in):
     end = time.monotonic() + START
     while "target" not in (said := ros2.run("ros2 topic echo /controller/status --field message")):
         assert time.monotonic() < end, said
@@ -70,7 +70,7 @@ def test_the_doctor_sees_the_live_graph(live, ros2, type_in):
     assert code == 0 and "cable/command" in output, output
 
 
-def test_the_live_graph_is_recorded_and_judged(live, ros2, type_in, folder):
+def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder):
     from gravcomp.commands.record import describe
 
     words = [*documented("./gravcomp record --out my_bag --duration 60"), "--duration", "10"]

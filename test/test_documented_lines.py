@@ -44,14 +44,14 @@ MODEL_LINES = (
 
 
 @pytest.mark.parametrize("line", MODEL_LINES)
-def test_a_model_is_asked_and_built(type_in, folder, line):
+def test_a_model_is_described_solved_drawn_and_built(type_in, folder, line):
     code, output = type_in(line)
     assert code == 0, output
     assert "--out" not in line or (folder / "bent.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("line", ["./gravcomp doctor", "./gravcomp doctor --robot src/examples/own_robot.yaml"])
-def test_the_doctor_looks_at_the_machine(type_in, line):
+def test_the_doctor_examines_the_machine(type_in, line):
     code, output = type_in(line)
     # 1: this machine lacks something that is needed; that is a valid result.
     assert code in (0, 1) and "Python" in output
@@ -119,7 +119,7 @@ def test_tests_are_found(type_in, line, shorter):
         "./gravcomp doctor --robot ROBOT.yaml --interface socketcan --channel can0",
     ],
 )
-def test_without_the_can_device_it_is_named(type_in, line):
+def test_a_missing_can_device_is_reported(type_in, line):
     code, output = type_in(line, ROBOT="ROBOT.yaml")
     assert code == (1 if "doctor" in line else 2) and re.search(r"can[01]", output), output
     assert "Traceback" not in output
@@ -133,7 +133,7 @@ def test_without_the_can_device_it_is_named(type_in, line):
         "ros2 run gravcomp_hw can_bridge --ros-args -p interface:=socketcan -p channel:=can0 -p zero:=home",
     ],
 )
-def test_a_bridge_without_its_device_names_it(folder, monkeypatch, line):
+def test_a_bridge_without_its_can_device_reports_it(folder, monkeypatch, line):
     documented(line)
     monkeypatch.chdir(folder)
     code, output = run_node(line, dict(os.environ), None)

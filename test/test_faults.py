@@ -42,14 +42,14 @@ def test_a_fault_leads_to_zero_current_or_holding(campaign, name):
 
 
 @pytest.mark.parametrize("executable", ["can_bridge", "virtual_robot", "inverse_controller"])
-def test_a_killed_process_may_be_started_again(campaign, executable):
+def test_a_killed_process_can_be_started_again(campaign, executable):
     kill = send_signal(executable, signal.SIGKILL)
     assert campaign.time_to_safe(kill, zero=executable != "inverse_controller") is not None
     campaign.graph.restart(executable)
     assert campaign.make_active()
 
 
-def test_a_killed_bridge_comes_back_with_the_cables_zeros(campaign):
+def test_a_killed_bridge_starts_again_with_its_zero_positions(campaign):
     """Without current the robot sags and pulls its cables out; a bridge without zero positions would take that place as zero."""
     # Without commands the bridge continues to hold, so the probe finds that state even if it discovers the new node late.
     asked = time.time()  # the bridge can hold before the service has answered

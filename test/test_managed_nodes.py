@@ -59,7 +59,7 @@ def test_a_node_that_is_shut_down_is_finalized_and_stays(start, observer):
     assert process.exit_code is None
 
 
-def test_diagnostics_tell_that_a_node_does_not_work(start, observer):
+def test_diagnostics_report_a_node_that_does_not_work(start, observer):
     start("gravcomp_estimation", "imu_estimator")
     for transition, said in (("deactivate", "not active"), ("cleanup", "not configured")):
         observer.run(f"ros2 lifecycle set /imu_estimator {transition}")
@@ -69,7 +69,7 @@ def test_diagnostics_tell_that_a_node_does_not_work(start, observer):
         assert observer.diagnostics["imu_estimator"][0] == b"\x01"
 
 
-def test_whoever_comes_late_hears_that_the_estimator_is_not_active(start, observer):
+def test_a_late_subscriber_receives_that_the_estimator_is_not_active(start, observer):
     start("gravcomp_estimation", "imu_estimator")
     observer.run("ros2 lifecycle set /imu_estimator deactivate")
     heard = observer.listen(ImuStatus, "imu/status", latched=True)
@@ -77,7 +77,7 @@ def test_whoever_comes_late_hears_that_the_estimator_is_not_active(start, observ
     assert heard[-1].code == ImuStatus.NO_DATA and heard[-1].message == "not active"
 
 
-def test_a_controller_that_is_not_active_promises_nothing(start, observer):
+def test_a_controller_that_is_not_active_refuses_its_services(start, observer):
     start("gravcomp_fem", "inverse_controller")
     observer.run("ros2 lifecycle set /inverse_controller deactivate")
     for kind, name, request in ((SetBool, "enable", SetBool.Request(data=True)), (Trigger, "relax", Trigger.Request())):
@@ -87,7 +87,7 @@ def test_a_controller_that_is_not_active_promises_nothing(start, observer):
     assert observer.ask(Trigger, "/inverse_controller/relax", Trigger.Request()).success
 
 
-def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tmp_path):
+def test_a_refused_target_is_reported_for_seconds_and_in_the_log(start, observer, tmp_path):
     """Also without deformation, which the controller reports several times a second."""
     start("gravcomp_fem", "inverse_controller")
     heard = observer.listen(ControllerStatus, "controller/status", latched=True)
@@ -106,14 +106,14 @@ def test_a_refused_target_is_told_for_seconds_and_in_the_log(start, observer, tm
         time.sleep(0.1)
 
 
-def test_what_is_dumped_of_parameters_that_are_unset_can_be_given_again(start, observer):
+def test_a_dump_with_unset_parameters_can_be_loaded(start, observer):
     """`ros2 param dump` writes null for these parameters."""
     start("gravcomp_estimation", "imu_estimator", **{"heater.target": None, "heater.ambient": 21.0})
     assert observer.state_of("/imu_estimator") == "active"
     assert "successful" in observer.run("ros2 param set /imu_estimator heater.ambient None")
 
 
-def test_a_node_ends_without_complaints(start, observer, tmp_path):
+def test_a_node_ends_without_error_messages(start, observer, tmp_path):
     process = start("gravcomp_fem", "inverse_controller")
     process.stop()
     assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text()

@@ -52,14 +52,14 @@ def start(name, other, environment):
 @pytest.mark.parametrize(
     "peer", [{}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, middleware({})], ids=["any", "localhost", "ours"]
 )
-def test_a_node_listens_on_loopback_alone_and_is_heard_by_nodes_of_every_range_of_this_host(peer):
+def test_a_node_uses_loopback_only_and_reaches_nodes_of_every_range_on_this_host(peer):
     ours, theirs = start("ours", "theirs", middleware({})), start("theirs", "ours", peer)
     said, answer = ours.communicate(timeout=60)[0].strip(), theirs.communicate(timeout=60)[0].strip()
     assert said == f"heard True, bound to ['{LOOPBACK}'], shared memory False"
     assert answer.startswith("heard True")
 
 
-def test_only_who_asks_for_more_gets_more():
+def test_messages_leave_this_host_only_on_request():
     assert reach(middleware({})) == "LOCALHOST"
     assert reach(middleware({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})) == "LOCALHOST"
     assert reach(middleware({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})) == "SUBNET"

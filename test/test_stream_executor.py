@@ -74,7 +74,7 @@ def test_every_message_comes_in_order_to_a_subscription_that_was_made_while_it_r
     assert heard == list(range(30))
 
 
-def test_a_destroyed_subscription_is_silent_and_the_others_go_on(pair):
+def test_a_destroyed_subscription_receives_nothing_and_the_others_continue(pair):
     first, second = [], []
     gone = pair.node.create_subscription(Int32, "numbers", first.append, QOS)
     pair.node.create_subscription(Int32, "others", second.append, QOS)
@@ -95,7 +95,7 @@ def test_timers_keep_their_period(pair):
     assert ticks[-1] - ticks[0] == pytest.approx(0.02 * (len(ticks) - 1), rel=0.1)
 
 
-def test_services_are_served_at_once_and_never_beside_another_callback(pair):
+def test_services_are_served_immediately_and_never_during_another_callback(pair):
     inside, together = [], []
 
     def work(name):
@@ -141,7 +141,7 @@ def test_an_error_of_a_callback_ends_the_spinning(pair, kind):
         pair.until(lambda: False)
 
 
-def test_what_is_only_asked_for_never_calls(pair):
+def test_a_polled_subscription_never_calls_back(pair):
     polled = Polled(pair.node, Int32, "numbers", QOS)
     publisher = pair.connected("numbers")
     for k in range(5):

@@ -27,7 +27,7 @@ def ros2(graph):
 
 
 @pytest.mark.parametrize(("angle", "plane"), [(4.5, 0.0), (5.5, 1.0)])
-def test_a_target_that_no_shape_has_is_left_again(graph, ros2, angle, plane):
+def test_the_robot_recovers_from_a_target_without_equilibrium(graph, ros2, angle, plane):
     """The robot moves to where the model's equilibria end, and recovers. `bench engine` measures the longest step."""
     commands = ros2.listen(CableCommand, f"{graph.namespace}/cable/command")
     statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)

@@ -101,7 +101,7 @@ def page(browser):
     return browser.page
 
 
-def test_it_says_what_the_controller_says(page):
+def test_the_page_shows_the_message_of_the_controller(page):
     page.wait_for_function("document.querySelector('[data-gravcomp=status]').innerText.includes('target')", polling=500)
 
 
