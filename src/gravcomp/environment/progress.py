@@ -6,6 +6,12 @@ import time
 WIDTH = 28
 
 
+def note(text: str, end: str = "\n") -> None:
+    """Print a note on stderr unless --quiet was given: commands are not yet parsed while the environment is built."""
+    if "--quiet" not in sys.argv:
+        print(text, end=end, file=sys.stderr, flush=True)
+
+
 class Progress:
     """One long step: `with Progress("Python packages", total=200) as p: p.advance("numpy")`."""
 
@@ -27,7 +33,7 @@ class Progress:
         end = "done" if kind is None else "not finished"
         notes = "".join(f" ({note})" for note in self._notes)
         line = f"{self.title}: {end} after {seconds:.0f} s{notes}"
-        print(f"{chr(13) if self._tty else ''}{line}".ljust(79), file=sys.stderr, flush=True)
+        note(f"{chr(13) if self._tty else ''}{line}".ljust(79))
 
     def advance(self, what: str, steps: int = 1) -> None:
         """Count completed steps; `what` names the latest."""
@@ -42,7 +48,7 @@ class Progress:
         share = self.done / self.total
         if self._tty:
             bar = "#" * int(share * WIDTH)
-            print(f"\r{self.title} [{bar:<{WIDTH}}] {what[:28]:<28}", end="", file=sys.stderr, flush=True)
+            note(f"\r{self.title} [{bar:<{WIDTH}}] {what[:28]:<28}", end="")
         elif int(share * 10) > self._printed_tenth:
             self._printed_tenth = int(share * 10)
-            print(f"{self.title}: {share:4.0%} {what}", file=sys.stderr, flush=True)
+            note(f"{self.title}: {share:4.0%} {what}")

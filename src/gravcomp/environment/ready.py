@@ -17,6 +17,7 @@ from gravcomp.environment.end_with_parent import end_with_parent
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import choose_interpreter
 from gravcomp.environment.middleware import middleware
+from gravcomp.environment.progress import note
 
 COMPILED_PARTS = ("virtual_robot", "controller", "model")
 """Parts of gravcomp.launcher.compilation, the longest first."""
@@ -140,6 +141,6 @@ def _alone(root: Path) -> "Iterator[None]":
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            print("gravcomp: another start is setting up; waiting for it", file=sys.stderr)
+            note("gravcomp: another start is setting up; waiting for it")
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield

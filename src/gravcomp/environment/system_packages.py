@@ -7,6 +7,7 @@ import sys
 
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.interpreter import Interpreter
+from gravcomp.environment.progress import note
 
 
 def missing_packages(python: Interpreter) -> "dict[str, str]":
@@ -39,7 +40,7 @@ def install(names: "list[str]", wanted: str) -> None:
         raise SetupError(f"missing on this machine: {wanted}. Install what provides them here; on Debian and Ubuntu: {line}")
     if not root and not _yes(f"Missing: {wanted}.\nInstall with '{line}'? [y/N] "):
         raise SetupError(f"missing on this machine: {wanted}. Run: {line}")
-    print(f"Installing {wanted}", file=sys.stderr, flush=True)
+    note(f"Installing {wanted}")
     prefix = [] if root else ["sudo"]
     environment = dict(os.environ, DEBIAN_FRONTEND="noninteractive")
     for step in (["update"], ["install", "-y", "--no-install-recommends", *names]):
