@@ -1,3 +1,3 @@
-"""gravcomp: gravity compensation for soft slender robots. This is the core; it knows no ROS."""
+"""gravcomp: gravity compensation for soft slender robots. The core: everything that computes, without ROS."""
 
 __version__ = "0.1.0"

@@ -28,7 +28,7 @@ def note(text: str) -> None:
 
 
 def console() -> "Console":
-    """Return a console for progress, notes and tables beside the result: stderr, silent with --quiet."""
+    """Return a console for progress, notes and tables in addition to the result: stderr, silent with --quiet."""
     return _console(sys.stderr, quiet=_options.quiet)
 
 
