@@ -38,6 +38,12 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
     """Read and check a robot file: a shipped one by its name ('article'), any other by its path.
 
     Raises ConfigError, which names file and key and says what was found and what is allowed.
+
+    >>> robot = load_robot_file("article").robot
+    >>> robot.cable_names
+    ('s1c1', 's1c2', 's1c3', 's2c1', 's2c2', 's2c3')
+    >>> robot.length  # m
+    0.1
     """
     path = _resolve(name_or_path)
     document = load_yaml(path)

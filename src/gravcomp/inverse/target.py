@@ -97,6 +97,12 @@ def bend_target(
     """Return the target of constant curvature: a robot of `length` m bent by `angle` rad in the plane at `plane` rad about z.
 
     Raises TargetError for numbers that are not finite, a length of 0 or less, and more than a full turn.
+
+    >>> target = bend_target(0.1, np.radians(90.0), 0.0)
+    >>> target.tip_position.round(4)  # m: an arc of radius 0.1 m / (pi / 2)
+    array([0.0637, 0.    , 0.0637])
+    >>> target.tip_direction.round(3)
+    array([1., 0., 0.])
     """
     if not np.all(np.isfinite([length, angle, plane])) or length <= 0.0 or abs(angle) > 2.0 * np.pi:
         bend = f"a bend of {angle!r} rad at {plane!r} rad over {length!r} m"

@@ -72,7 +72,12 @@ def matrix(q: Sequence[float]) -> np.ndarray:
 
 
 def from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return the rotation by roll about x, then pitch about y, then yaw about z, all in the fixed frame (REP-103), rad."""
+    """Return the rotation by roll about x, then pitch about y, then yaw about z, all in the fixed frame (REP-103), rad.
+
+    >>> quarter_turn = from_roll_pitch_yaw(0.0, 0.0, math.pi / 2)
+    >>> [round(component, 3) for component in rotate(quarter_turn, (1.0, 0.0, 0.0))]
+    [0.0, 1.0, 0.0]
+    """
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)

@@ -122,7 +122,11 @@ class Result:
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """Format a number with `digits` significant digits, with an exponent only below 1e-3 and from 1e5."""
+    """Format a number with `digits` significant digits, with an exponent only below 1e-3 and from 1e5.
+
+    >>> number(0.012345), number(123.456, 4), number(2.0e-5), number(float("nan"))
+    ('0.0123', '123.5', '2.00e-05', '–')
+    """
     if isinstance(value, str):
         return value
     if isinstance(value, bool) or value is None:

@@ -30,6 +30,12 @@ class Simulator:
     """Quasi-static simulation of a robot.
 
     `step` uses the reduced model if one is built and its error is small, else the full model; `solve` uses the full model.
+
+    >>> from gravcomp.description import load_robot_file
+    >>> simulator = Simulator(load_robot_file("article").robot, reduced=False)
+    >>> shape = simulator.solve(np.array([-9.81, 0.0, 0.0]))  # m/s^2 in soft_base: the robot is horizontal
+    >>> bool(shape.is_equilibrium), float((1e3 * shape.tip_position[0]).round(1))  # mm
+    (True, -27.9)
     """
 
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
