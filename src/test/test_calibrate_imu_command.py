@@ -1,6 +1,7 @@
 """`gravcomp calibrate-imu`: what it writes is what the estimator reads, and makes good what was wrong with the IMU."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_comments_and_the_rest_of_the_robot_stay(recorded):
     written, shipped = load_robot_file("mine.yaml"), load_robot_file("article")
     assert written.robot == shipped.robot
     assert written.section("hardware") == shipped.section("hardware")
-    assert "# the board lies flat" in open("mine.yaml").read().replace("# imu_link in soft_base: ", "# ")
+    assert "# the board lies flat" in Path("mine.yaml").read_text().replace("# imu_link in soft_base: ", "# ")
 
 
 def test_one_pose_says_what_it_does_not_show(tmp_path, monkeypatch, capsys):
@@ -116,7 +117,7 @@ def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkey
 
 
 @pytest.mark.parametrize(
-    "arguments, words",
+    ("arguments", "words"),
     [
         (["missing.npz"], "missing.npz: does not exist"),
         (["poses.npz", "--up", "0", "0", "1"], "has 6 distinct pose(s) at rest, but 1 direction(s)"),

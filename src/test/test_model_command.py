@@ -36,7 +36,7 @@ def test_info_tells_masses_modes_and_reach(capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments, words",
+    ("arguments", "words"),
     [
         (["solve", "nowhere"], "does not exist"),
         (["solve", "--tension", "1"], "(6,) is needed"),
