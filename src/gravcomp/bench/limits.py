@@ -97,6 +97,18 @@ ROWS = {
         Row("worst_safe_ms", "time from fault to safe current, worst", "ms", 250.0),
         Row("safe_ms.stop", "time from stop to zero current", "ms", 20.0),
     ),
+    "start": (
+        Row("first_page_s", "clone to the moving page with empty caches, without the downloads", "s", 90.0),
+        Row("download_s", "downloads of the first start", "s"),
+        Row("later_page_s", "second start: until the page moves", "s", 3.0),
+        Row("later_loop_s", "second start: until the loop is closed", "s", 5.0),
+        Row("nodes_active_s", "start of the nodes until all are active, caches warm", "s", 2.5),
+        Row("venv_mb", "size of .venv", "MB", 600.0),
+        Row("command_ms.version", "`./gravcomp --version`", "ms", 300.0),
+        Row("command_ms.model_help", "`./gravcomp model --help`", "ms", 300.0),
+        Row("test_s", "all tests", "s", 480.0),
+        Row("test_fast_s", "tests without the running graph", "s", 90.0),
+    ),
     "soak": (
         Row("minutes", "duration", "min", 30.0, True),
         Row("commands", "commands", ""),

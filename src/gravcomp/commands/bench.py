@@ -17,6 +17,7 @@ BENCHMARKS = {
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
+    "start": "the first and the second start in a new clone, start of the nodes, size of the environment",
     "soak": "a long run: lost commands, growing memory",
 }
 
@@ -28,6 +29,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "seed": (1, "seed of the random frames and faults"),
     },
     "soak": {"minutes": (30.0, "duration in minutes")},
+    "start": {"tests": (False, "measure the tests, too")},
 }
 """Keyword arguments of a benchmark's `run` that are options of the command: default and meaning."""
 
@@ -37,6 +39,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "graph": {"listen": 4.0, "cost": 4.0},
     "page": {"listen": 5.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6},
+    "start": {},
     "soak": {"minutes": 0.2},
 }
 """Keyword arguments of a benchmark's `run` with --brief."""
@@ -53,7 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         )
         own.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
         for option, (default, meaning) in OPTIONS.get(name, {}).items():
-            own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
+            if default is False:
+                own.add_argument(f"--{option}", action="store_true", help=meaning)
+            else:
+                own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
 
 
 def run(args: argparse.Namespace) -> int:
