@@ -77,7 +77,11 @@ def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder
     recorder = subprocess.Popen(
         words, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
-    time.sleep(5.0)
+    end = time.monotonic() + START
+    while not (folder / "my_bag").exists():
+        assert recorder.poll() is None and time.monotonic() < end, "the recorder does not start"
+        time.sleep(0.1)
+    time.sleep(5.0)  # the recorder finds the topics
     ros2.run(PUBLISHED_ONCE)
     output, _ = recorder.communicate(timeout=60.0)
     assert recorder.returncode == 0, output
