@@ -24,7 +24,7 @@ _START_PATIENCE = 120.0  # s
 _COMMAND_RUNS = 5
 _OURS = (
     "AMENT_", "CMAKE_", "COLCON_", "GRAVCOMP_", "NUMBA_", "OMP_", "OPENBLAS_", "MKL_", "PYTHON", "LD_LIBRARY", "UV_CACHE",
-    "XDG_CACHE", "FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "VIRTUAL_ENV", "DISPLAY", "WAYLAND_",
+    "XDG_CACHE", "FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "VIRTUAL_ENV", "_ROS_WHEELS", "DISPLAY", "WAYLAND_",
 )  # fmt: skip
 _DOWNLOADED = re.compile(r"downloaded \d+ packages? in (?:(\d+)m )?([\d.]+)(ms|s)")
 _ACTIVE = re.compile(r"All nodes are active after ([\d.]+) s")

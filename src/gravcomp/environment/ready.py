@@ -53,6 +53,8 @@ def environment(root: Path, paths: "dict[str, str]") -> "dict[str, str]":
         parts += [p for p in os.environ.get(name, "").split(":") if p and p not in parts]
         result[name] = ":".join(parts)
     result.update(middleware(os.environ))
+    if paths.get("bootstrapped"):
+        result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
     # One thread for matrices of this size.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         result.setdefault(name, "1")

@@ -78,9 +78,15 @@ def _search_paths(root: Path, python: Interpreter, inner: Path, environment: dic
     else:
         prefix = root / ".venv"
         paths["AMENT_PREFIX_PATH"] = ":".join(filter(None, [paths["AMENT_PREFIX_PATH"], str(prefix)]))
-        paths["LD_LIBRARY_PATH"] = ":".join(filter(None, [paths["LD_LIBRARY_PATH"], str(prefix / "lib")]))
+        paths["LD_LIBRARY_PATH"] = ":".join(filter(None, [paths["LD_LIBRARY_PATH"], *_wheel_libraries(prefix, inner)]))
+        paths["bootstrapped"] = "1"
     paths["PATH"] = str(inner.parent)
     return paths
+
+
+def _wheel_libraries(prefix: Path, inner: Path) -> "list[str]":
+    """Return the folders that the bootstrapper of the ROS wheels would find, for which it starts each Python twice."""
+    return [str(prefix / "lib"), *sorted(str(path) for path in _site_packages(inner).glob("ros_*.libs"))]
 
 
 def _site_packages(inner: Path) -> Path:
