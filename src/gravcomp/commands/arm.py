@@ -1,4 +1,4 @@
-"""`gravcomp arm`: a seven-axis arm carries the virtual robot through five poses, with released cables and compensated."""
+"""`gravcomp arm`: move the virtual robot through five poses on a seven-axis arm, released and compensated."""
 
 import argparse
 import json
@@ -13,37 +13,35 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 if TYPE_CHECKING:
     from rich.console import Group
 
-# Numba compiles once for each machine; the first start waits for it.
+    from gravcomp.launcher import Graph
+
+# s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "The worked example for larger arms: the URDF of arm and robot, gravity from the IMU checked against the arm's joints, "
-        "the tip error at five poses with and without compensation."
+        "Example for larger arms: URDF of arm and robot, gravity from the IMU checked against the arm's joints, "
+        "and the tip error at five poses with and without compensation."
     )
-    parser.add_argument(
-        "--xacro", metavar="FILE", help="another arm of seven axes with the soft robot in it (default: the shipped one)"
-    )
+    parser.add_argument("--xacro", metavar="FILE", help="another seven-axis arm with the soft robot (default: the shipped one)")
     parser.add_argument(
         "--gravity",
         choices=("imu", "arm", "both"),
         default="both",
-        help="from the IMU, from the arm's joints, or the IMU checked by the arm (default)",
+        help="from the IMU, from the arm's joints, or from the IMU and checked against the joints (default: both)",
     )
-    parser.add_argument(
-        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
-    )
-    parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="seconds at each pose (default 5)")
-    parser.add_argument("--viewer", action="store_true", help="show it in a browser")
+    parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="time at each pose in seconds (default: 5)")
+    parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
-    parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes, for one of several robots")
+    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for one of several robots")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: played to the end, 2: it could not be."""
+    """Run the tour. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
     from gravcomp.arm.description import expanded, shipped_xacro
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
@@ -56,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         urdf, result = Path(scratch) / "arm.urdf", Path(scratch) / "result.json"
         urdf.write_text(expanded(xacro), encoding="utf-8")
-        # Lower rates of truth and feedback than the hardware's: judging and a bus in software shall not take the loop's time.
+        # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
         motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
         graph = RobotGraph(args.robot, "udp_multicast", private_channel(), args.namespace, {"virtual_robot": motion})
         specs = [spec for spec in graph.loop() if args.gravity != "arm" or spec.executable != "imu_estimator"]
@@ -77,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _start_of_tour(urdf: Path) -> dict:
-    """How the virtual robot's base stands at first: as the arm holds it, so that nothing is jerked."""
+    """Return the initial pose of the virtual robot's base: that of the arm, so that the robot is not jerked."""
     import math
 
     from gravcomp.arm.chain import Chain
@@ -89,11 +87,11 @@ def _start_of_tour(urdf: Path) -> dict:
     return {"inclination_deg": math.degrees(math.atan2(-z, math.hypot(x, y))), "roll_deg": math.degrees(math.atan2(y, -x))}
 
 
-def _follow(processes, result: Path) -> dict:
-    """Until the tour has ended; its figures. Raises NodeDied, TimeoutError."""
+def _follow(processes: "Graph", result: Path) -> dict[str, Any]:
+    """Wait until the tour is completed. Returns its figures. Raises NodeDied, TimeoutError."""
     phase, begin = "", time.monotonic()
     while True:
-        # Looked at before the file is read: the player's last word is in it when it has gone.
+        # Read before the file: the player writes its result before it ends.
         dead = processes.dead()
         try:
             state = json.loads(result.read_text())
@@ -107,12 +105,12 @@ def _follow(processes, result: Path) -> dict:
             phase, begin = state["phase"], time.monotonic()
             output.note(phase)
         if phase not in ("released", "compensated") and time.monotonic() - begin > _START_TIMEOUT:
-            raise TimeoutError(f"the tour did not go on ({phase}); the nodes' output is in {processes.logs}")
+            raise TimeoutError(f"the tour did not continue ({phase}); the nodes' output is in {processes.logs}")
         time.sleep(0.1)
 
 
 def _summary(figures: dict[str, Any]) -> "Group":
-    """Table of the tip errors at the poses, and what is to be known about the run."""
+    """Return the table of tip errors at the poses, with notes on the run."""
     from rich.console import Group
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""`gravcomp demo`: the main job on a virtual robot: it sags, is compensated, and is tilted; ends with the figures."""
+"""`gravcomp demo`: run the loop on a virtual robot: it sags, is compensated and tilted; print the figures of the run."""
 
 import argparse
 import json
@@ -13,38 +13,40 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 if TYPE_CHECKING:
     from rich.table import Table
 
-# A run shorter than this shows neither sag nor compensation.
-_SHORTEST = 10.0
-# A hand that holds still, with the gyroscope's bias, stays below this.
-_TURNING = 0.2  # rad/s
-# Numba compiles once for each machine; the first start waits for it.
-_START_TIMEOUT = 300.0
+    from gravcomp.commands.page_pictures import PagePictures
+    from gravcomp.launcher import Graph
+
+_SHORTEST = 10.0  # s: a shorter run shows neither sag nor compensation
+_TURNING = 0.2  # rad/s: above the rate of a hand at rest plus the gyroscope's bias
+_START_TIMEOUT = 300.0  # s: on the first start on a machine Numba compiles
 _LONGEST_LOOKED_BACK = 3000.0  # s
-_BROWSER_TIME = 200.0  # s from the play's end until a browser shows the page, at worst
+_BROWSER_TIME = 200.0  # s from the end of the run until a browser shows the page, at most
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "Virtual robot on a CAN bus of its own, the four nodes as processes, the viewer; ends with the figures."
-    parser.add_argument("--duration", type=float, default=30.0, metavar="S", help="seconds to play (default 30, at least 10)")
-    parser.add_argument("--headless", action="store_true", help="without the viewer")
+    parser.description = (
+        "Run the four nodes, a virtual robot on a private CAN bus and the viewer as processes; print the figures of the run."
+    )
+    parser.add_argument(
+        "--duration", type=float, default=30.0, metavar="S", help="duration in seconds (default: 30, at least 10)"
+    )
+    parser.add_argument("--headless", action="store_true", help="start no viewer")
     parser.add_argument(
         "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
     )
-    parser.add_argument(
-        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
-    )
+    parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     add_page_arguments(parser)
     parser.add_argument(
         "--screenshots",
         metavar="DIR",
-        help="pictures of the page, sagging, compensated and tilted, by Chromium after the play",
+        help="take pictures of the page with Chromium after the run: sagging, compensated and tilted",
     )
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: played to the end, 2: it could not be."""
+    """Run the demo. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
@@ -56,16 +58,16 @@ def run(args: argparse.Namespace) -> int:
     if not _SHORTEST <= args.duration <= 86400.0:
         raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
     if args.screenshots and args.headless:
-        raise ConfigError("--screenshots shows the page, which --headless leaves out: give one of them")
+        raise ConfigError("--screenshots and --headless exclude each other: the pictures show the page")
     if args.screenshots and args.duration > _LONGEST_LOOKED_BACK:
         raise ConfigError(
-            f"--screenshots looks back over the play: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
+            f"--screenshots looks back over the run: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
         )
     builder = prepare(args.robot, virtual=True)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
-    # Lower rates of truth and feedback than the hardware's: judging and a bus in software shall not take the loop's time.
+    # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
     motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True}
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
@@ -110,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _begin_of_motion(path: str) -> float:
-    """Seconds into the recording at which it begins to turn: what lies still before is shortened to the time of sagging."""
+    """Return the time (s) in the recording at which rotation begins; the rest before it is shortened to the time of sagging."""
     import numpy as np
 
     from gravcomp.config import ConfigError
@@ -121,7 +123,9 @@ def _begin_of_motion(path: str) -> float:
     except RecordingError as error:
         raise ConfigError(str(error)) from error
     if recording.orientation is None:
-        raise ConfigError(f"{path}: has no ground truth of the orientation; the virtual robot's base cannot turn as it did")
+        raise ConfigError(
+            f"{path}: has no ground truth of the orientation, which the virtual robot's base needs to turn like the recorded one"
+        )
     turning = np.linalg.norm(recording.gyro, axis=1) > _TURNING
     return float(recording.stamp_ns[np.argmax(turning)] - recording.stamp_ns[0]) * 1e-9
 
@@ -133,8 +137,10 @@ def _read(path: Path) -> dict:
         return {}
 
 
-def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=None) -> dict:
-    """Show the run until the judge is done, with the moments of the page's `pictures`; returns its last state. Raises NodeDied."""
+def _follow(
+    processes: "Graph", result_file: Path, args: argparse.Namespace, pictures: "PagePictures | None" = None
+) -> dict[str, Any]:
+    """Show progress until the node `judge` has evaluated the run. Returns its last state. Raises NodeDied, TimeoutError."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = output.console()
@@ -150,7 +156,7 @@ def _follow(processes, result_file: Path, args: argparse.Namespace, pictures=Non
                 return state
             dead = processes.dead()
             if dead:
-                # The judge may have just written its last word and gone.
+                # The judge may have written its result and ended since.
                 state = _read(result_file)
                 if set(dead) == {"judge"} and state.get("phase") == "done":
                     return state
@@ -182,8 +188,8 @@ def _summary(figures: dict[str, Any]) -> "Table":
             f"{figures['tip_error_with_mm']} / {figures['tip_error_without_mm']}",
             "mm RMS",
         ),
-        ("correlation of model and truth", figures["correlation"], ""),
-        ("gravity's error", figures["gravity_error_deg"], "deg RMS"),
+        ("correlation of model and ground truth", figures["correlation"], ""),
+        ("error of gravity", figures["gravity_error_deg"], "deg RMS"),
         ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),
         ("delay, IMU to motor current, median / p99", f"{delay['median']} / {delay['p99']}", "ms"),
         ("nodes", ", ".join(f"{name} {state}" for name, state in figures["nodes"].items()), ""),

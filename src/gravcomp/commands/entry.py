@@ -1,6 +1,6 @@
-"""`./gravcomp COMMAND ...` before anything is installed: the overview, wrong names, then the environment and the command in it.
+"""`./gravcomp COMMAND ...` before anything is installed: overview, version, unknown commands; else enter the environment.
 
-Nothing but Python's own library is imported here.
+Only the standard library is imported here.
 """
 
 import sys
@@ -11,7 +11,7 @@ from gravcomp.commands.version import version_text
 
 
 def start(root: Path, arguments: "list[str]") -> int:
-    """Run the command of the repository `root`; returns the exit code where no command replaces this process."""
+    """Run the command in the repository `root`. Returns the exit code, unless the command replaces this process."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(overview())
         return 0

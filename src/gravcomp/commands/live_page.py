@@ -1,4 +1,4 @@
-"""Starting the viewer, telling people where the live page is, and opening it where there is a screen."""
+"""Start the viewer, print the address of the live page, and open the page in a graphical session."""
 
 import argparse
 import os
@@ -12,18 +12,16 @@ if TYPE_CHECKING:
 
 
 def add_page_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare where the page is served, and whether it is opened."""
-    parser.add_argument("--port", type=int, default=8080, help="the viewer's port on this machine (default 8080)")
-    parser.add_argument(
-        "--no-open", action="store_true", help="only print the page's address, even where a browser could be opened"
-    )
+    """Declare the page's port and whether a browser is opened."""
+    parser.add_argument("--port", type=int, default=8080, help="port of the live page on this machine (default: 8080)")
+    parser.add_argument("--no-open", action="store_true", help="print the address of the page, but open no browser")
 
 
 def show_page(processes: "Graph", viewer: "NodeSpec", no_open: bool) -> str:
-    """Start the node `viewer`, print its page's address, and open it in a graphical session unless `no_open`; returns the address.
+    """Start the node `viewer`, print the address of its page, and open it in a graphical session unless `no_open`.
 
-    To be called before the other nodes are started: beside all of them the page would take four times as long to come. Raises LaunchError,
-    NodeDied, TimeoutError.
+    Returns the address. Call it before the other nodes are started: while they start, the page needs four times as long.
+    Raises LaunchError, NodeDied, TimeoutError.
     """
     from gravcomp.launcher.page_address import wait_for_page
 

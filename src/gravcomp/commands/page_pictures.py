@@ -1,6 +1,6 @@
-"""The pictures that `demo --screenshots` takes of the live page once the play is over: the page is turned back to each moment.
+"""Pictures of the live page for `demo --screenshots`, taken after the run: the page is turned back to each moment.
 
-So the browser, which takes a processor for itself where there is no graphics card, neither disturbs the play nor is too late for it.
+Without a graphics card a browser uses a whole processor. After the run it neither disturbs the loop nor misses a moment.
 """
 
 from pathlib import Path
@@ -11,7 +11,11 @@ from gravcomp.view.browser import Browser, BrowserError, find_chromium
 
 
 class PagePictures:
-    """`moments`: when (s into the play) to take the picture of which name. Raises ConfigError when there is no browser or no folder."""
+    """Takes pictures of given moments of the run.
+
+    folder: for the pictures; moments: time in the run (s) by name. Raises ConfigError when there is no browser and when the
+    folder cannot be created.
+    """
 
     def __init__(self, folder: Path, moments: dict[str, float]):
         self._folder, self._due = folder, dict(moments)
@@ -21,19 +25,19 @@ class PagePictures:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ConfigError(f"--screenshots {folder}: cannot be made: {error.strerror}") from error
+            raise ConfigError(f"--screenshots {folder}: cannot be created: {error.strerror}") from error
 
     def follow(self, elapsed: float, now: float) -> None:
-        """Note when a moment has come: `elapsed` (s) into the play at the time `now` (s, monotonic)."""
+        """Record the moments that are reached: `elapsed` s of the run at the time `now` (s, monotonic)."""
         for name, moment in self._due.items():
             if name not in self._times and elapsed >= moment:
                 self._times[name] = now
 
     def take(self, address: str) -> str:
-        """Write NAME.png of each moment that has come; returns why not all could be, or nothing."""
+        """Write NAME.png for each recorded moment. Returns the error as text, or ''."""
         try:
             with Browser() as browser:
-                browser.open(f"{address}?fixedDpr=1")  # sharp, however slowly it is drawn
+                browser.open(f"{address}?fixedDpr=1")  # full resolution, even when drawing is slow
                 for name, time in self._times.items():
                     browser.look_back(time)
                     path = self._folder / f"{name}.png"

@@ -1,42 +1,51 @@
-"""`gravcomp replay BAG`: the whole graph on a recorded IMU stream, at any speed, with /clock."""
+"""`gravcomp replay BAG`: run the graph on a recorded IMU stream, at any speed, with /clock."""
 
 import argparse
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
 
-# A machine that has never run the graph compiles first.
+if TYPE_CHECKING:
+    from gravcomp.launcher import Graph
+
+# s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
-# What the graph still computes when the last sample has been sent.
+# s for the graph to process the last samples.
 _SETTLE = 1.0
-# Topics of the estimator that a recorded replay must not lose anything of, and the messages that wait for a slow recorder.
+# Topics of the estimator of which a recorded replay must not lose a message, and the length of their queues.
 _ESTIMATES, _KEPT = ("gravity", "imu/data", "imu/bias"), 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "Play a recorded IMU stream into estimator, simulator and controller. A bag that was cut off or damaged is read as far as it goes."
+    parser.description = (
+        "Play a recorded IMU stream into estimator, simulator and controller. "
+        "A truncated or damaged bag is read as far as possible."
+    )
     parser.add_argument(
         "bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, or an .npz file in BROAD's layout"
     )
     parser.add_argument(
-        "--speed", type=float, default=1.0, metavar="X", help="times real time (default 1); 0: as fast as it is taken"
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="factor to real time (default: 1); 0: as fast as the graph processes it",
     )
-    parser.add_argument("--topic", default="", help="the IMU topic, for a bag with several")
-    parser.add_argument(
-        "--robot", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
-    )
-    parser.add_argument("--out", metavar="DIR", help="record what the graph makes of it into a new bag")
-    parser.add_argument("--viewer", action="store_true", help="show it in a browser")
+    parser.add_argument("--topic", default="", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    parser.add_argument("--out", metavar="DIR", help="record the output of the graph into a new bag")
+    parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
-    parser.add_argument("--namespace", default="", metavar="NS", help="of all nodes")
+    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 0: played to the end, 2: it could not be."""
+    """Replay. Returns 0: played to the end. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
     from gravcomp.commands.preparation import prepare
     from gravcomp.commands.record import describe
     from gravcomp.config import ConfigError
@@ -45,9 +54,9 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.recordings.imu import RecordingError, read_recording
 
     if not 0.0 <= args.speed <= 1000.0:
-        raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as it is taken) to 1000")
+        raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as the graph processes it) to 1000")
     if args.out and Path(args.out).exists():
-        raise ConfigError(f"{args.out}: exists; a bag is not written over, name another folder")
+        raise ConfigError(f"{args.out}: exists and is not overwritten; name another folder")
     bag = _whole(args.bag)
     try:
         recording = read_recording(bag, args.topic or None)
@@ -83,14 +92,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _lossless(namespace: str) -> dict:
-    """Parameters by which what the estimator gives is recorded to the last message: the same bag twice then makes the same bag."""
+    """Return parameters with which every message of the estimator is recorded: two replays of a bag then give equal bags."""
     prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
     wanted = {"reliability": "reliable", "depth": _KEPT}
     return {f"qos_overrides.{prefix}/{topic}.publisher.{key}": value for topic in _ESTIMATES for key, value in wanted.items()}
 
 
 def _whole(path: str) -> str:
-    """The path itself, or what could be saved of a damaged bag."""
+    """Return the path itself, or that of the readable part of a damaged bag."""
     from gravcomp.recordings.bags.recovery import readable
 
     if Path(path).suffix == ".npz":
@@ -101,8 +110,8 @@ def _whole(path: str) -> str:
     return str(bag.path)
 
 
-def _follow(processes, replay: str, duration: float, speed: float) -> None:
-    """Until the replay has ended well. Raises NodeDied when any node ends otherwise."""
+def _follow(processes: "Graph", replay: str, duration: float, speed: float) -> None:
+    """Show progress until the replay has ended. Raises NodeDied when a node fails."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())

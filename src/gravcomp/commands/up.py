@@ -1,4 +1,4 @@
-"""`gravcomp up`: the graph for real hardware or as the robot's YAML says, until Ctrl-C."""
+"""`gravcomp up`: start the graph on real hardware, or as the robot file says, until Ctrl-C."""
 
 import argparse
 import time
@@ -10,25 +10,25 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.description = "Bridge, estimator, simulator and controller of a robot, until Ctrl-C. The motors are driven."
-    parser.add_argument(
-        "robot", nargs="?", default="article", help="a shipped robot's name or the path of a robot's YAML (default article)"
-    )
+    parser.description = "Start bridge, estimator, simulator and controller of a robot, until Ctrl-C. The motors are driven."
+    parser.add_argument("robot", nargs="?", default="article", help="robot file or shipped robot (default: article)")
     parser.add_argument(
         "--interface",
         default="",
-        help="python-can interface in place of the file's, e.g. socketcan; with --virtual a bus of its own",
+        help="python-can interface in place of the file's, e.g. socketcan (default with --virtual: a private bus)",
     )
-    parser.add_argument("--channel", default="", help="its channel, e.g. can0")
-    parser.add_argument("--virtual", action="store_true", help="with the virtual robot on the bus")
-    parser.add_argument("--namespace", default="", help="of all nodes, e.g. /left; for several robots in one graph")
-    parser.add_argument("--viewer", action="store_true", help="with the viewer")
+    parser.add_argument("--channel", default="", help="channel of the interface, e.g. can0")
+    parser.add_argument("--virtual", action="store_true", help="start the virtual robot on the bus as well")
+    parser.add_argument(
+        "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
+    )
+    parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; 130 after Ctrl-C, 2 when a node ended by itself."""
+    """Run the graph until Ctrl-C (exit code 130). Raises ConfigError, LaunchError, NodeDied when a node ends by itself."""
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     builder = prepare(args.robot, args.virtual)
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
-        # Several virtual robots on one machine would hear each other's motors on the file's bus.
+        # On the bus of the robot file, several virtual robots on one machine would receive each other's frames.
         interface, channel = "udp_multicast", private_channel()
     graph = RobotGraph(args.robot, interface, channel, args.namespace)
     specs = graph.loop()

@@ -1,6 +1,7 @@
 """`gravcomp model build ROBOT`: build the reduced model of a robot, which the simulator then uses."""
 
 import argparse
+from typing import Any
 
 from gravcomp.commands import output
 
@@ -30,12 +31,15 @@ def run(args: argparse.Namespace) -> int:
         "seconds": seconds,
         "file": str(path_of(model)),
     }
-    output.result(figures, _sentences(figures))
+    output.result(figures, _text(figures))
     return 0
 
 
 def prepare(robot: str, *, force: bool = False) -> tuple:
-    """(model, its reduction, seconds it took), built with a progress bar unless it is there. Raises ConfigError, MeshError."""
+    """Return (model, its reduction, seconds of the build); built with a progress bar unless it exists.
+
+    Raises ConfigError, MeshError.
+    """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from gravcomp.description import load_robot_file
@@ -61,7 +65,7 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
 
 
 def prepare_model(robot: str) -> None:
-    """Build the reduced model on a robot's first use; a robot that cannot be reduced is served by its full model."""
+    """Build the reduced model of a robot when it is missing; a robot that cannot be reduced uses its full model."""
     from gravcomp.config import ConfigError
 
     try:
@@ -70,13 +74,13 @@ def prepare_model(robot: str) -> None:
         output.note(f"No reduced model: {error}")
 
 
-def _sentences(figures: dict) -> str:
+def _text(figures: dict[str, Any]) -> str:
     low, high = figures["youngs_modulus_mpa"]
-    took = f"built in {figures['seconds']:.0f} s" if figures["seconds"] else "was built before (--force builds it anew)"
+    took = f"built in {figures['seconds']:.0f} s" if figures["seconds"] else "was built before (--force builds it again)"
     return (
         f"{figures['robot']}: the reduced model {took}: {figures['modes']} modes and {figures['strains']} strains in place of"
         f" {figures['unknowns']} unknowns\n"
-        f"trained with {figures['samples']} shapes; tip error over others: median {figures['tip_error_median_mm']:.4f} mm,"
-        f" worst {figures['tip_error_worst_mm']:.3f} mm; serves Young's moduli from {low:.3g} to {high:.3g} MPa\n"
-        f"kept in {figures['file']}"
+        f"trained with {figures['samples']} shapes; tip error for other shapes: median {figures['tip_error_median_mm']:.4f} mm,"
+        f" worst {figures['tip_error_worst_mm']:.3f} mm; valid for Young's moduli from {low:.3g} to {high:.3g} MPa\n"
+        f"stored in {figures['file']}"
     )
