@@ -39,7 +39,7 @@ def content_key(*content: Any) -> str:
         elif isinstance(item, bytes):
             digest.update(item)
         else:
-            plain = dataclasses.asdict(item) if dataclasses.is_dataclass(item) else item
+            plain = dataclasses.asdict(item) if dataclasses.is_dataclass(item) and not isinstance(item, type) else item
             digest.update(json.dumps(plain, sort_keys=True, default=str).encode())
         digest.update(b"\0")
     return digest.hexdigest()[:32]

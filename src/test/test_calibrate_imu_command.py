@@ -1,4 +1,4 @@
-"""`gravcomp calibrate-imu`: what it writes is what the estimator reads, and makes good what was wrong with the IMU."""
+"""`gravcomp calibrate-imu`: the estimator reads the files that it writes, and they correct the errors of the IMU."""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""What can stand in the way of the environment."""
+"""Errors of building the environment."""
 
 
 class SetupError(Exception):
-    """The environment cannot be made; the text says what is missing and the line that mends it."""
+    """The environment cannot be built; the text names what is missing and the command that installs it."""

@@ -31,7 +31,7 @@ def middleware(given: "Mapping[str, str]") -> "dict[str, str]":
 
 
 def reach(given: "Mapping[str, str]") -> str:
-    """How far messages of a process with this environment reach, for people."""
+    """Return how far messages of a process with this environment reach, as text for the user."""
     if Path(given.get("FASTRTPS_DEFAULT_PROFILES_FILE", "")).name == "fastdds_loopback.xml":
         return "LOCALHOST"
     return given.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")

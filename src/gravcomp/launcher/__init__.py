@@ -1,4 +1,4 @@
-"""The graph as processes: starts the nodes, watches them, ends them without orphans.
+"""The graph as processes: starts the nodes, watches them, and ends them with everything that they started.
 
 with Graph([NodeSpec("gravcomp_fem", "fem_simulator", parameters={"robot": "article"})]) as graph:
     graph.start()

@@ -1,17 +1,17 @@
-"""ROS domains that no other run on this host uses, so that a demo never speaks to a robot that runs on the same machine."""
+"""ROS domains that no other run on this host uses, so that a demo does not reach a robot on the same machine."""
 
 import os
 import random
 import socket
 
-# Above 101 the ports of a domain overlap the range that Linux hands out by itself.
+# Above 101 the ports of a domain overlap the range of ports that Linux assigns.
 _DOMAINS = range(1, 100)
 
 _RESERVED: list[socket.socket] = []  # the names of the domains that this process holds
 
 
 def private_domain() -> dict[str, str]:
-    """Return the environment variable ROS_DOMAIN_ID: the user's where it is set, otherwise a domain that this process reserves."""
+    """Return the environment variable ROS_DOMAIN_ID: the user's if it is set, else a domain that this process reserves."""
     given = os.environ.get("ROS_DOMAIN_ID")
     return {"ROS_DOMAIN_ID": given or reserve_domain()}
 

@@ -1,5 +1,6 @@
-"""Several nodes as one: started in order, watched, ended together."""
+"""A graph of several nodes: started in order, watched, ended together."""
 
+import contextlib
 import os
 import signal
 import tempfile
@@ -15,7 +16,7 @@ _LEFTOVER_PATIENCE = 2.0  # s between SIGTERM and SIGKILL
 
 
 class NodeDied(RuntimeError):
-    """A node ended by itself; the text says which and why."""
+    """A node ended by itself; the text names it and the reason."""
 
 
 class Graph:
@@ -30,7 +31,7 @@ class Graph:
         self.logs = Path(logs or tempfile.mkdtemp(prefix="gravcomp-"))
         self.logs.mkdir(parents=True, exist_ok=True)
         self.processes: dict[str, NodeProcess] = {}
-        # Every process of the graph carries this mark, also those that a node put into a session of their own.
+        # Every process of the graph has this mark in its environment, also those that a node starts in a session of their own.
         self._mark = uuid.uuid4().hex
         self._environment = {**(environment or {}), _MARK: self._mark}
 
@@ -41,7 +42,7 @@ class Graph:
         self.stop()
 
     def start(self) -> None:
-        """Start all. Raises LaunchError; what was started until then is ended."""
+        """Start all nodes. Raises LaunchError; the nodes started before are then ended."""
         try:
             for spec in self.specs:
                 self.start_one(spec)
@@ -50,18 +51,18 @@ class Graph:
             raise
 
     def start_one(self, spec: NodeSpec) -> NodeProcess:
-        """Start (or start again) one node."""
+        """Start one node, or start it again."""
         log = self.logs / (spec.name.strip("/").replace("/", "_") + ".log")
         process = NodeProcess(spec, log, self._environment)
         self.processes[spec.name] = process
         return process
 
     def dead(self) -> dict[str, str]:
-        """Nodes that have ended: name and why."""
+        """Return the nodes that have ended, by name, with the reason."""
         return {name: process.why() for name, process in self.processes.items() if process.exit_code is not None}
 
     def check(self) -> None:
-        """Raises NodeDied when a node has ended."""
+        """Raise NodeDied when a node has ended."""
         dead = self.dead()
         if dead:
             raise NodeDied("; ".join(f"{name} {why}" for name, why in dead.items()))
@@ -71,11 +72,11 @@ class Graph:
         return all(process.was_active for process in self.processes.values())
 
     def states(self) -> dict[str, str]:
-        """'running' or why it ended, for each node."""
+        """Return 'running' or the reason of its end for each node."""
         return {name: process.why() for name, process in self.processes.items()}
 
     def wait(self, done: Callable[[], bool], timeout: float, what: str) -> None:
-        """Until `done()`; raises NodeDied when a node ends before, TimeoutError naming `what` after `timeout` (s)."""
+        """Wait until `done()`. Raises NodeDied when a node ends before, TimeoutError with `what` after `timeout` s."""
         end = time.monotonic() + timeout
         while not done():
             self.check()
@@ -84,32 +85,30 @@ class Graph:
             time.sleep(0.05)
 
     def stop(self) -> None:
-        """End all, side by side; nothing is left."""
+        """End all nodes in parallel, and the processes that they started."""
         stop_together(list(self.processes.values()))
         self._end_leftovers()
 
     def _end_leftovers(self) -> None:
-        """What nodes started for themselves (the bridge's guard) goes after them, gently first."""
+        """End the processes that nodes started in other sessions (the guard of the bridge): SIGTERM, then SIGKILL."""
         end = time.monotonic() + _LEFTOVER_PATIENCE
         number = signal.SIGTERM
         while leftovers := _marked(self._mark):
             for pid in leftovers:
-                try:
+                with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, number)
-                except ProcessLookupError:
-                    pass
             number = signal.SIGTERM if time.monotonic() < end else signal.SIGKILL
             time.sleep(0.05)
 
 
 def _marked(mark: str) -> list[int]:
-    """Processes that carry the mark in their environment."""
+    """Return the ids of the processes that have the mark in their environment."""
     needle = f"{_MARK}={mark}".encode()
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             if needle in (folder / "environ").read_bytes() and (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
-        except OSError:  # it has ended, or is somebody else's
+        except OSError:  # it has ended, or belongs to another user
             continue
     return found

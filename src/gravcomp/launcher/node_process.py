@@ -1,5 +1,6 @@
-"""One node as a process: found as `ros2 run` finds it, ended with all that it started."""
+"""One node as a process: its executable is found as `ros2 run` finds it, and its process group is ended with it."""
 
+import contextlib
 import ctypes
 import json
 import os
@@ -10,12 +11,12 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# How long a node may take to end after SIGINT, and then after SIGTERM, before it is killed.
+# s that a node has to end after SIGINT, then after SIGTERM, before it is killed.
 _PATIENCE = (5.0, 3.0)
 _PR_SET_PDEATHSIG = 1
 _NODE_ENVIRONMENT = {
-    # Memory in huge pages where the kernel gives them: a node that wakes a hundred times a second finds its caches cold each time, and
-    # with small pages it pays for their addresses, too (a tenth of its processor time, a fifth of the loop's delay).
+    # Memory in huge pages where the kernel offers them. A node that wakes 100 times a second finds cold caches each time; with
+    # small pages the address translation costs a tenth of its CPU time and a fifth of the loop's latency.
     "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
 }
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -25,12 +26,12 @@ ACTIVE_FILE = "GRAVCOMP_ACTIVE_FILE"
 
 
 class LaunchError(RuntimeError):
-    """A node that cannot be started; the text is for people."""
+    """A node cannot be started; the text tells the user why."""
 
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """What to start: `ros2 run package executable --ros-args -p NAME:=VALUE -r FROM:=TO`."""
+    """A node to start, as by `ros2 run package executable --ros-args -p NAME:=VALUE -r FROM:=TO`."""
 
     package: str
     executable: str
@@ -40,22 +41,22 @@ class NodeSpec:
 
     @property
     def name(self) -> str:
-        """The node's full name."""
+        """Full name of the node."""
         return f"{self.namespace.rstrip('/')}/{self.executable}" if self.namespace else self.executable
 
     def command(self) -> list[str]:
-        """The command line. Raises LaunchError when the executable is not installed."""
+        """Return the command line. Raises LaunchError when the executable is not installed."""
         return [find_executable(self.package, self.executable), *self.arguments()]
 
     def module_command(self) -> list[str]:
-        """The command line of a module with the executable's name that is run with `python -m`, for tools that are not installed."""
+        """Return the command line that runs the module of the executable's name, for tools that are not installed."""
         return [sys.executable, "-m", f"{self.package}.{self.executable}", *self.arguments()]
 
     def arguments(self) -> list[str]:
-        """The ROS arguments: parameters, remappings and namespace."""
+        """Return the ROS arguments: parameters, remappings and namespace."""
         arguments = []
         for key, value in self.parameters.items():
-            # JSON is YAML: texts are quoted, floats keep their point.
+            # JSON is YAML: text is quoted, floats keep their decimal point.
             arguments += ["-p", f"{key}:={json.dumps(value)}"]
         for key, value in self.remappings.items():
             arguments += ["-r", f"{key}:={value}"]
@@ -65,7 +66,10 @@ class NodeSpec:
 
 
 def find_executable(package: str, executable: str) -> str:
-    """`<prefix>/lib/PACKAGE/EXECUTABLE` of the first prefix in AMENT_PREFIX_PATH whose index has the package."""
+    """Return `PREFIX/lib/PACKAGE/EXECUTABLE` of the first prefix in AMENT_PREFIX_PATH that has the package.
+
+    Raises LaunchError.
+    """
     prefixes = [p for p in os.environ.get("AMENT_PREFIX_PATH", "").split(":") if p]
     for prefix in prefixes:
         if (Path(prefix) / "share" / "ament_index" / "resource_index" / "packages" / package).exists():
@@ -80,7 +84,7 @@ def find_executable(package: str, executable: str) -> str:
 
 
 class NodeProcess:
-    """A running node. Its output goes to `log`; `environment` is added to this process's own."""
+    """A running node. log: file of its output; environment: added to that of this process."""
 
     def __init__(self, spec: NodeSpec, log: Path, environment: dict[str, str] | None = None):
         self.spec = spec
@@ -93,7 +97,7 @@ class NodeProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                # A session of its own: Ctrl-C at the terminal reaches the launcher alone, which ends the nodes in order.
+                # In a session of its own: Ctrl-C in the terminal reaches the launcher only, which ends the nodes.
                 start_new_session=True,
                 preexec_fn=_die_with_parent,
                 env={
@@ -113,11 +117,11 @@ class NodeProcess:
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs."""
+        """Exit code, or None while the node runs."""
         return self._process.poll()
 
     def why(self) -> str:
-        """Why it ended: its own sentence (or the last line it wrote), and the code or signal."""
+        """Return why the node ended: exit code or signal, and its error message or last line of output."""
         code = self.exit_code
         if code is None:
             return "running"
@@ -126,14 +130,12 @@ class NodeProcess:
         return f"{how}: {last}" if last and code else how
 
     def signal(self, number: int) -> None:
-        """Signal the whole group."""
-        try:
+        """Send a signal to the process group."""
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, number)
-        except ProcessLookupError:
-            pass
 
     def stop(self) -> None:
-        """End it, gently first. Nothing of its group is left."""
+        """End the node and its process group: SIGINT, SIGTERM, SIGKILL."""
         stop_together([self])
 
     def _last_words(self) -> str:
@@ -144,7 +146,7 @@ class NodeProcess:
 
 
 def stop_together(processes: list[NodeProcess]) -> None:
-    """End them side by side: SIGINT, SIGTERM, SIGKILL."""
+    """End several nodes in parallel, with their process groups: SIGINT, SIGTERM, SIGKILL."""
     for number, patience in zip((signal.SIGINT, signal.SIGTERM), _PATIENCE):
         for process in processes:
             if process.exit_code is None:
@@ -153,11 +155,11 @@ def stop_together(processes: list[NodeProcess]) -> None:
         while any(p.exit_code is None for p in processes) and time.monotonic() < end:
             time.sleep(0.02)
     for process in processes:
-        # Also when the node has ended: whatever it left in its group goes with it.
+        # Also when the node has ended: other processes of its group may still run.
         process.signal(signal.SIGKILL)
         process._process.wait()
 
 
 def _die_with_parent() -> None:
-    """A launcher that is killed outright takes its nodes along."""
+    """Make the kernel end this process when the launcher is killed."""
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)

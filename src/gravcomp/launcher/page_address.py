@@ -1,4 +1,4 @@
-"""Where the viewer of a starting graph serves its page: the first free port is known to it alone, and it says so in its output."""
+"""Address of the live page, read from the viewer's output: the viewer takes the first free port."""
 
 import re
 
@@ -9,7 +9,7 @@ _START_TIMEOUT = 60.0  # s
 
 
 def wait_for_page(processes: Graph, timeout: float = _START_TIMEOUT) -> str:
-    """The page's address, once it is served. Raises NodeDied, TimeoutError."""
+    """Wait until the page is served. Returns its address. Raises NodeDied, TimeoutError."""
     log = next(process.log for process in processes.processes.values() if process.spec.executable == "viewer")
     found: list[str] = []
 
@@ -17,5 +17,5 @@ def wait_for_page(processes: Graph, timeout: float = _START_TIMEOUT) -> str:
         found.extend(_PAGE.findall(log.read_text(errors="replace")))
         return bool(found)
 
-    processes.wait(is_served, timeout, "the viewer's start")
+    processes.wait(is_served, timeout, "the start of the viewer")
     return found[0]

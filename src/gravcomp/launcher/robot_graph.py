@@ -1,6 +1,7 @@
-"""Which nodes make a robot's graph, and with which parameters."""
+"""Nodes of a robot's graph, with their parameters."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from gravcomp.launcher.node_process import NodeSpec
 
@@ -15,8 +16,10 @@ LOOP = (
 
 @dataclass(frozen=True)
 class RobotGraph:
-    """One robot's nodes. robot: a shipped name or a path; channel: a CAN channel in place of the file's; namespace: of all nodes;
-    parameters: {executable: {parameter: value}} beyond the robot's file.
+    """Nodes of one robot.
+
+    robot: name of a shipped robot or path of a robot file; interface, channel: CAN bus in place of the file's; namespace: of all
+    nodes; parameters: {executable: {parameter: value}} in addition to the robot file.
     """
 
     robot: str
@@ -26,12 +29,12 @@ class RobotGraph:
     parameters: dict = field(default_factory=dict)
 
     def loop(self) -> list[NodeSpec]:
-        """Bridge, estimator, simulator, controller."""
+        """Return the four nodes of the loop: bridge, estimator, simulator, controller."""
         return [self.node(package, executable) for package, executable in LOOP]
 
-    def node(self, package: str, executable: str, **parameters) -> NodeSpec:
-        """One node of this robot."""
-        given = {"robot": self.robot}
+    def node(self, package: str, executable: str, **parameters: Any) -> NodeSpec:
+        """Return one node of this robot."""
+        given: dict[str, Any] = {"robot": self.robot}
         if executable in ("can_bridge", "virtual_robot", "judge"):
             given.update({key: value for key, value in (("interface", self.interface), ("channel", self.channel)) if value})
         given.update(self.parameters.get(executable, {}))
@@ -40,7 +43,7 @@ class RobotGraph:
 
 
 def check_robot_file(robot: str) -> None:
-    """Read every section of a robot's file, so that a mistake is told before any process starts. Raises ConfigError."""
+    """Check every section of a robot file before any process starts. Raises ConfigError."""
     from gravcomp.config import from_mapping
     from gravcomp.description import load_robot_file
     from gravcomp.description.hardware import parse_hardware

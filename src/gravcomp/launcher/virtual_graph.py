@@ -1,4 +1,4 @@
-"""The whole graph on a virtual robot, as processes, for the benchmarks: on a bus and in a namespace of its own."""
+"""The graph on a virtual robot as processes, on a private bus and in a namespace of its own; for the benchmarks."""
 
 import os
 import time
@@ -14,16 +14,17 @@ from gravcomp.launcher.page_address import wait_for_page
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
 NODES = ("virtual_robot", *(executable for _, executable in LOOP))
-"""Executables of the nodes that run."""
+"""Executables of the nodes."""
 
 START_TIMEOUT = 300.0
-"""s; on first use the compiled code of the models is made."""
+"""s; on the first start on a machine Numba compiles."""
 
 
 class RunningGraph:
-    """Virtual robot and loop, and the viewer where it is asked for; starts on entering. `parameters`: executable -> parameters.
+    """Virtual robot and loop, on request with the viewer; a context manager that starts and ends them.
 
-    Attributes: can (CanInterface), namespace, robot (RobotGraph), page (the viewer's address).
+    parameters: {executable: {parameter: value}}. Attributes: can (CanInterface), namespace, robot (RobotGraph), page (address
+    of the live page).
     """
 
     def __init__(self, parameters: dict[str, dict] | None = None, *, viewer: bool = False):
@@ -52,22 +53,23 @@ class RunningGraph:
         self._graph.stop()
 
     def check(self) -> None:
-        """Raises NodeDied when a node has ended by itself."""
+        """Raise NodeDied when a node has ended by itself."""
         self._graph.check()
 
     def dead(self) -> dict[str, str]:
-        """Nodes that have ended, and why."""
+        """Return the nodes that have ended, by name, with the reason."""
         return self._graph.dead()
 
     def restart(self, executable: str) -> None:
-        """Start a node again that was ended."""
+        """Start a node again that has ended."""
         self._graph.start_one(self._specs[executable])
 
     def process(self, executable: str) -> psutil.Process:
+        """Return the process of a node."""
         return psutil.Process(self._graph.processes[self._specs[executable].name].pid)
 
     def wait_for_commands(self, timeout: float = START_TIMEOUT) -> float:
-        """s until currents follow commands, seen on the bus. Raises TimeoutError, NodeDied."""
+        """Wait until currents on the bus follow commands. Returns the time in s. Raises TimeoutError, NodeDied."""
         begin = time.monotonic()
         link = CanLink(self.can, [codec.layout("CommandTrace").frame_id])
         link.open()
