@@ -106,6 +106,11 @@ def test_bash_completes_commands_options_and_robots(words, offered, tmp_path, mo
     assert set(complete(script("bash"), "./gravcomp", *words)) == offered
 
 
+def test_the_script_prints_the_completion():
+    done = subprocess.run([ROOT / "gravcomp", "completion", "bash"], capture_output=True, text=True, check=True)
+    assert done.stdout == script("bash") and not done.stderr
+
+
 def test_bash_completes_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_robot.yaml").touch()

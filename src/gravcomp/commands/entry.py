@@ -21,6 +21,11 @@ def start(root: Path, arguments: "list[str]") -> int:
     if arguments[0] not in COMMANDS:
         print(f"gravcomp: unknown command '{arguments[0]}'\n\n{overview()}", file=sys.stderr)
         return 2
+    if arguments[0] == "completion" and sys.version_info >= (3, 11):
+        # Needs the standard library only; a shell waits for it at its start.
+        from gravcomp.commands.__main__ import main
+
+        return main(arguments)
     from gravcomp.environment.ready import enter
 
     return enter(root, arguments)
