@@ -1,7 +1,8 @@
 """The first and the second start in a new clone with empty caches, the start of the nodes, sizes and command times.
 
 The clone, its home folder and its caches are temporary. A client of the page's WebSocket sees what a browser would receive: the
-first rate of the model stands for the moving page, the first delay from IMU to command for the closed loop.
+first tension of a cable, which comes with the first shape, stands for the moving page, the first delay from IMU to command for
+the closed loop.
 """
 
 import os
@@ -28,7 +29,7 @@ _OURS = (
 )  # fmt: skip
 _DOWNLOADED = re.compile(r"downloaded \d+ packages? in (?:(\d+)m )?([\d.]+)(ms|s)")
 _ACTIVE = re.compile(r"All nodes are active after ([\d.]+) s")
-_MOVING = re.compile(rb">\d+ Hz</div><div[^>]*>rate of the model")
+_MOVING = re.compile(rb"border-radius:\.3em;width:\d")  # the bar of a cable's tension, from the first shape on
 _CLOSED = re.compile(rb">[\d.]+ ms</div><div[^>]*>IMU to command")
 
 
@@ -98,19 +99,19 @@ def _demo(clone: Path, environment: dict[str, str], begin: float, patience: floa
         process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
     times: dict[str, float] = {}
     try:
-        while time.monotonic() < begin + patience and process.poll() is None and "loop" not in times:
+        while time.monotonic() < begin + patience and process.poll() is None and len(times) < 2:
             for message in _messages(port):
                 for name, pattern in (("page", _MOVING), ("loop", _CLOSED)):
                     if name not in times and pattern.search(message):
                         times[name] = time.monotonic() - begin
-                if "loop" in times:
+                if len(times) == 2:
                     break
             time.sleep(0.05)
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60.0)
     text = log.read_text(errors="replace")
-    if "loop" not in times:
+    if len(times) < 2:
         raise TimeoutError(f"the demo's loop was not closed within {patience:.0f} s; its last lines:\n{text[-1000:]}")
     return times, text
 
