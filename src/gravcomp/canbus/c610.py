@@ -38,7 +38,10 @@ def motor_of(frame_id: int) -> int | None:
 
 
 def command(name: str, currents: Mapping[int, float]) -> can.Message:
-    """Return the command frame `name` with the currents (A) by CAN id; motors that are not in it get zero."""
+    """Return the command frame `name` with the currents (A) by CAN id; a motor without a current gets zero.
+
+    Only `motors.output` calls it in the product, because it limits the currents.
+    """
     return codec.encode(name, **{f"current_{can_id}": currents.get(can_id, 0.0) for can_id in COMMANDS[name]})
 
 

@@ -1,4 +1,4 @@
-"""The last clamp: the only module that encodes motor currents as frames.
+"""The last clamp: the only module that makes frames with motor currents (`c610.command`).
 
 A current that is not finite becomes zero, every other is clamped to the limit, and ids without a motor get zero, whatever the
 callers computed.
