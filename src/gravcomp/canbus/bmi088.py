@@ -5,7 +5,7 @@ specific force [m/s^2] = counts / (LSB per g) x 9.80665        angular rate [rad
 
 import math
 
-STANDARD_GRAVITY = 9.80665
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _LSB_PER_G = {0: 10920.0, 1: 5460.0, 2: 2730.0, 3: 1365.0}  # 3, 6, 12, 24 g
 _RANGE_DEG_S = {0: 2000, 1: 1000, 2: 500, 3: 250, 4: 125}

@@ -14,11 +14,11 @@ import can
 import numpy as np
 
 from gravcomp.canbus import c610
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
 from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
 from gravcomp.virtual.board import SAMPLE_PERIOD, STATUS_PERIOD, VirtualBoard
