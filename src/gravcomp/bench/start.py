@@ -38,7 +38,7 @@ def run(progress: Callable[[str], None], *, tests: bool = False) -> dict:
 
     first_page_s: from the clone to the moving page, without the downloads (download_s); later_page_s and later_loop_s: the second
     start until the page moves and until the loop is closed; nodes_active_s: from `up --virtual` starting its nodes until all are
-    active, with warm caches; venv_mb: size of .venv; command_ms: start of two commands; test_s, test_fast_s: with `tests`.
+    active, with warm caches; venv_mb: size of .venv as `du -sm` prints it; command_ms: start of two commands; test_s, test_fast_s: with `tests`.
     """
     root = Path(os.environ["GRAVCOMP_ROOT"])
     with tempfile.TemporaryDirectory(prefix="gravcomp-start-") as scratch:
@@ -63,7 +63,7 @@ def run(progress: Callable[[str], None], *, tests: bool = False) -> dict:
             "later_page_s": round(later["page"], 2),
             "later_loop_s": round(later["loop"], 2),
             "nodes_active_s": round(active, 2),
-            "venv_mb": round(_size(clone / ".venv") / 1e6),
+            "venv_mb": round(_size(clone / ".venv") / 2**20),
             "command_ms": {
                 "version": round(1e3 * _command_time(clone, environment, "--version")),
                 "model_help": round(1e3 * _command_time(clone, environment, "model", "--help")),
