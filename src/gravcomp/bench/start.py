@@ -36,9 +36,10 @@ _CLOSED = re.compile(rb">[\d.]+ ms</div><div[^>]*>IMU to command")
 def run(progress: Callable[[str], None], *, tests: bool = False) -> dict:
     """Return the figures of the start.
 
-    first_page_s: from the clone to the moving page, without the downloads (download_s); later_page_s and later_loop_s: the second
-    start until the page moves and until the loop is closed; nodes_active_s: from `up --virtual` starting its nodes until all are
-    active, with warm caches; venv_mb: size of .venv as `du -sm` prints it; command_ms: start of two commands; test_s, test_fast_s: with `tests`.
+    first_page_s: from the clone to the moving page, without the downloads (download_s). later_page_s and later_loop_s: the second
+    start until the page moves and until the loop is closed. nodes_active_s: from `up --virtual` starting its nodes until all are
+    active, with warm caches. venv_mb: size of .venv as `du -sm` prints it. command_ms: start of two commands. test_s,
+    test_fast_s: None without `tests`.
     """
     root = Path(os.environ["GRAVCOMP_ROOT"])
     with tempfile.TemporaryDirectory(prefix="gravcomp-start-") as scratch:
