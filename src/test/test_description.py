@@ -71,7 +71,7 @@ MISTAKES = [
     (change(["segments", 1, "lumen_diameter_mm"], 9.5), ["robot.segments[1]", "lumen_diameter_mm is 9.5", "8.82"]),
     (change(["segments", 1, "name"], "proximal"), ["segments", "'proximal'", "2 times"]),
     (change(["segments", 0, "material", "law"], "mooney"), ["material.law", "mooney", "svk, neo_hookean"]),
-    (change(["segments", 0, "material", "poissons_ratio"], 0.5), ["poissons_ratio", "0.5", "0 to 0.495"]),
+    (change(["segments", 0, "material", "poissons_ratio"], 0.5), ["poissons_ratio", "0.5", "0 to 0.4999"]),
     (change(["cables", 2, "segment"], "distel"), ["cables[2] ('s1c3').segment", "distel", "proximal, distal"]),
     (change(["cables", 1, "radius_mm"], 5.0), ["cables[1] ('s1c2')", "5 mm", "1.8 to 4.5 mm"]),
     (change(["cables", 1, "end_mm"], 40.0), ["cables[1]", "one of segment and end_mm"]),

@@ -245,7 +245,7 @@ def driven(hardware, bus):
 
 
 def wait_for_current(bus):
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while not any(any(frame.data) for frame in bus.receive(0.05)):
         assert time.monotonic() < deadline
 

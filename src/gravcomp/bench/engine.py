@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gravcomp.bench import engine_control
-from gravcomp.description import Robot, load_robot_file
+from gravcomp.description import Elements, Robot, load_robot_file
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.motion import Motion
@@ -87,7 +87,7 @@ def scaling(progress: Progress, every: int = 1) -> dict:
     along = {}
     for count in (10, 20, 40, 80)[: max(2, 4 // every)]:
         progress(f"scaling, {count} elements along the robot")
-        finer = dataclasses.replace(robot, elements=dataclasses.replace(robot.elements, along=count))
+        finer = dataclasses.replace(robot, elements=dataclasses.replace(robot.elements or Elements(), along=count))
         along[count] = _model_step(finer)
     cables = {}
     for count in (3, 6, 12, 24)[: max(2, 4 // every)]:

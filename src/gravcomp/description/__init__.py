@@ -5,14 +5,19 @@ file.robot.segments[0].length          # m
 file.section("hardware")               # another section as a plain mapping
 """
 
-from gravcomp.description.body import Cap, Elements, Material, MeshBody, Segment
+from gravcomp.description.body import Cap, Elements, Material, MeshBody
 from gravcomp.description.cable import Cable
+from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.outline import Outline
+from gravcomp.description.rest_shape import RestShape
 from gravcomp.description.robot import Effectors, Payload, Robot
 from gravcomp.description.robot_file import RobotFile, load_robot_file, shipped_robots
+from gravcomp.description.section import Lumen, Section
+from gravcomp.description.segment import Segment
 
 __all__ = [
-    "Cable", "Cap", "Effectors", "Elements", "ImuMount", "Limits", "Material", "MeshBody", "Payload", "Robot", "RobotFile",
-    "Segment", "load_robot_file", "shipped_robots",
+    "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
+    "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The robot's body: tubes from base to tip, or one mesh from a file, with their materials."""
+"""What the robot's body is made of: materials, caps, a mesh from a file, and how tubes are divided into elements."""
 
 import dataclasses
 
@@ -11,7 +11,7 @@ class Material:
 
     law: str = parameter("svk", choices=("svk", "neo_hookean"), description="St. Venant-Kirchhoff, or compressible neo-Hookean")
     youngs_modulus: float = parameter(0.8, edge="MPa", minimum=1e-3, maximum=1e6, description="Young's modulus")
-    poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.495, description="Poisson's ratio")
+    poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.4999, description="Poisson's ratio")
     density: float = parameter(1145.0, unit="kg/m^3", minimum=0.0, maximum=30000.0, description="density")
     damping_time: float = parameter(
         20.0, edge="ms", minimum=0.0, maximum=10000.0, description="Kelvin-Voigt damping: viscosity over stiffness"
@@ -36,30 +36,6 @@ class Cap:
 
 
 @dataclasses.dataclass(frozen=True)
-class Segment:
-    """A tube of constant cross-section."""
-
-    name: str = parameter(description="name, unique in the robot")
-    length: float = parameter(edge="mm", minimum=1.0, maximum=5000.0, description="length at rest, without its cap")
-    outer_diameter: float = parameter(edge="mm", minimum=0.5, maximum=1000.0, description="outer diameter")
-    lumen_diameter: float = parameter(edge="mm", minimum=0.1, maximum=999.0, description="diameter of the working channel")
-    material: Material = parameter(default_factory=Material, description="material of the tube")
-    cap: Cap | None = parameter(None, description="cap at the distal end")
-
-    def __post_init__(self) -> None:
-        if self.lumen_diameter >= 0.98 * self.outer_diameter:
-            raise ValueError(
-                f"lumen_diameter_mm is {self.lumen_diameter * 1e3:g}; allowed: below 0.98 x outer_diameter_mm"
-                f" = {self.outer_diameter * 980:g}"
-            )
-
-    @property
-    def full_length(self) -> float:
-        """Length with the cap (m)."""
-        return self.length + (self.cap.length if self.cap else 0.0)
-
-
-@dataclasses.dataclass(frozen=True)
 class MeshBody:
     """A body from a file: a closed surface, which is meshed, or a volume mesh; `mesh.body` reads the formats."""
 
@@ -80,3 +56,7 @@ class Elements:
     along: int = parameter(10, minimum=2, maximum=500, description="elements along the robot, shared out by length")
     radial: int = parameter(1, minimum=1, maximum=8, description="elements through the wall")
     grading: float = parameter(8.0, minimum=1.0, maximum=50.0, description="ratio of the last element's length to the first's")
+    equal_stiffness: bool = parameter(
+        False,
+        description="let the facets of round walls stand out a little, so that the section bends as stiffly as the round one",
+    )

@@ -1,23 +1,25 @@
-"""Cables: sliding tendons through the body, and the check that they run inside it."""
+"""Cables: sliding tendons through the body."""
 
 import dataclasses
 import math
-from collections.abc import Sequence
 
 from gravcomp.config import parameter
-from gravcomp.description.body import Segment
 
 
 @dataclasses.dataclass(frozen=True)
 class Cable:
     """A sliding tendon, fixed to the body at its last point and pulled at its first.
 
-    It runs parallel to the axis at (radius cos angle, radius sin angle), or through `via_points` in soft_base.
+    It runs along the axis at (radius cos angle, radius sin angle) of every section, or through `via_points`: their x and y
+    lie in the section, their z is the arc length along the axis, which for a robot that is straight at rest is z of soft_base.
     """
 
     name: str = parameter(description="name, unique in the robot")
     angle: float | None = parameter(None, edge="deg", minimum=-360.0, maximum=360.0, description="angle about z, from x")
     radius: float | None = parameter(None, edge="mm", minimum=0.0, maximum=500.0, description="pitch radius")
+    tip_radius: float | None = parameter(
+        None, edge="mm", minimum=0.0, maximum=500.0, description="pitch radius at the cable's end; as at its start when not given"
+    )
     segment: str | None = parameter(None, description="name of the segment at whose end the cable is fixed")
     start: float = parameter(0.0, edge="mm", minimum=0.0, maximum=50000.0, description="z where the cable enters the body")
     end: float | None = parameter(
@@ -33,7 +35,13 @@ class Cable:
 
     def __post_init__(self) -> None:
         if self.via_points is not None:
-            if self.angle is not None or self.radius is not None or self.segment is not None or self.end is not None:
+            if (
+                self.angle is not None
+                or self.radius is not None
+                or self.tip_radius is not None
+                or self.segment is not None
+                or self.end is not None
+            ):
                 raise ValueError(
                     f"cable '{self.name}' has via_points_mm and also angle_deg, radius_mm, segment or end_mm; give one form only"
                 )
@@ -45,39 +53,12 @@ class Cable:
         if (self.segment is None) == (self.end is None):
             raise ValueError(f"cable '{self.name}' needs one of segment and end_mm")
 
-    def points(self, end: float) -> tuple[tuple[float, float, float], ...]:
-        """Return the points (m, soft_base) that the cable runs through: its via points, or both ends of a straight cable.
+    def place(self, s: float, end: float) -> tuple[float, float]:
+        """Return (x, y) in m where a cable without via points crosses the section at the arc length s (m).
 
-        `end` is the z where a straight cable is fixed; its points are returned as if its angle were 0.
+        `end` (m) is the arc length where the cable is fixed.
         """
-        if self.via_points is not None:
-            return self.via_points
-        assert self.radius is not None  # __post_init__
-        return (self.radius, 0.0, self.start), (self.radius, 0.0, end)
-
-
-def check_path(key: str, cable: Cable, end: float, segments: Sequence[Segment], length: float) -> None:
-    """Raise ValueError, naming `key`, when the cable leaves the robot's length or the wall of a segment.
-
-    `end` (m) is the z where the cable is fixed, `length` (m) that of the robot; without segments only the length is checked.
-    """
-    if end > length * (1 + 1e-9):
-        raise ValueError(f"{key} ends at {end * 1e3:g} mm; allowed: up to the robot's length {length * 1e3:g} mm")
-    straight = cable.via_points is None
-    if straight and cable.start >= end:
-        raise ValueError(f"{key}.start_mm is {cable.start * 1e3:g}; allowed: below its end at {end * 1e3:g}")
-    z = 0.0
-    for segment in segments:
-        low, high = z, z + segment.full_length
-        z = high
-        for x, y, height in cable.points(end):
-            through = straight and cable.start < high - 1e-9 and end > low + 1e-9
-            if not through and not low <= height <= high:
-                continue
-            radius = math.hypot(x, y)
-            inner, outer = segment.lumen_diameter / 2, segment.outer_diameter / 2
-            if not inner <= radius <= outer:
-                raise ValueError(
-                    f"{key} runs {radius * 1e3:g} mm from the axis in segment '{segment.name}';"
-                    f" allowed: within its wall, {inner * 1e3:g} to {outer * 1e3:g} mm"
-                )
+        assert self.radius is not None and self.angle is not None  # __post_init__
+        tip = self.radius if self.tip_radius is None else self.tip_radius
+        radius = self.radius + (tip - self.radius) * min(max((s - self.start) / (end - self.start), 0.0), 1.0)
+        return radius * math.cos(self.angle), radius * math.sin(self.angle)

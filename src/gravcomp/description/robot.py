@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from gravcomp.config import parameter
-from gravcomp.description.body import Elements, MeshBody, Segment
-from gravcomp.description.cable import Cable, check_path
+from gravcomp.description.body import Elements, MeshBody
+from gravcomp.description.cable import Cable
+from gravcomp.description.cable_path import check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.segment import Segment, check_joint
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +47,10 @@ class Robot:
     segments: tuple[Segment, ...] = parameter((), description="tubes from base to tip")
     body: MeshBody | None = parameter(None, description="a body from a file, instead of segments")
     cables: tuple[Cable, ...] = parameter((), description="cables; their order is the order of every array")
-    elements: Elements = parameter(default_factory=Elements, description="mesh of the tubes")
+    elements: Elements | None = parameter(
+        None,
+        description="mesh of the segments; well-shaped when not given",
+    )
     effectors: Effectors = parameter(default_factory=Effectors, description="observed points")
     limits: Limits = parameter(default_factory=Limits, description="limits of every cable")
     payload: Payload = parameter(default_factory=Payload, description="weight at the tip")
@@ -58,8 +63,7 @@ class Robot:
         _refuse_repeats("segments", [s.name for s in self.segments])
         _refuse_repeats("cables", [c.name for c in self.cables])
         for before, after in zip(self.segments, self.segments[1:]):
-            if before.lumen_diameter >= after.outer_diameter or after.lumen_diameter >= before.outer_diameter:
-                raise ValueError(f"segments '{before.name}' and '{after.name}' do not touch: one fits into the other's lumen")
+            check_joint(before, after)
         segment_names = [s.name for s in self.segments]
         for index, cable in enumerate(self.cables):
             key = f"cables[{index}] ('{cable.name}')"

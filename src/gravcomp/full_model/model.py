@@ -6,10 +6,12 @@ displacements u (n, 3), component by component within a node.
 
 import numpy as np
 
+from gravcomp.cables.disks import disk_weights
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import Tendons, pieces_of
 from gravcomp.description import Robot
 from gravcomp.full_model.effectors import Effectors
+from gravcomp.full_model.mesh_choice import with_elements
 from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
@@ -29,13 +31,14 @@ class RobotModel:
 
         Raises MeshError for a body that cannot be meshed, a cable outside the body and parts that are not connected to the base.
         """
-        self.robot = robot
+        self.robot = robot = robot if mesh else with_elements(robot)
         mesh = mesh or body_mesh(robot)
         routes = route_cables(robot, mesh)
         cliques = [mesh.elements]
         cliques += [nodes[None, :] for route in routes for nodes, _ in pieces_of(route)]
         order, self.pattern = order_in_levels(cliques, len(mesh.nodes), mesh.clamped)
         self.mesh = mesh = mesh.renumbered(order)
+        self.disks = disk_weights(robot, mesh)
         self.n_free = self.pattern.n // 3
         kind = CorotationalElements if constant_strain(mesh.kind) else SolidElements
         self.elements = kind(mesh, self.pattern)
@@ -43,6 +46,8 @@ class RobotModel:
         self.effectors = Effectors(mesh, robot.effectors.backbone_station)
         self.body_weight = self.elements.nodal_mass()
         self.nodal_weight = self.body_weight + robot.payload.mass * self.effectors.tip_weights
+        if self.disks is not None:
+            self.nodal_weight = self.nodal_weight + self.disks.mass @ self.disks.rows[:, 0]
         self.length = robot.length
 
     @property
@@ -59,13 +64,20 @@ class RobotModel:
         matrix = self.new_matrix()
         self.elements.add_mass(matrix, 1.0)
         if self.robot.payload.mass > 0.0:
-            weights = self.effectors.tip_weights[: self.n_free]
-            nodes = np.flatnonzero(weights)
-            a, b = (nodes[index] for index in np.tril_indices(len(nodes)))
-            for i in range(3):
-                place = self.pattern.position(3 * a + i, 3 * b + i)
-                np.add.at(matrix.values, place, self.robot.payload.mass * weights[a] * weights[b])
+            self._add_point_mass(matrix, self.robot.payload.mass, self.effectors.tip_weights)
+        if self.disks is not None:
+            for mass, inertia, rows in zip(self.disks.mass, self.disks.inertia, self.disks.rows):
+                for factor, weights in zip((mass, inertia, inertia), rows):
+                    self._add_point_mass(matrix, factor, weights)
         return matrix
+
+    def _add_point_mass(self, matrix: BlockMatrix, mass: float, weights: np.ndarray) -> None:
+        """Add the inertia of a mass (kg) that moves with the weighted sum of the nodes, `weights` (n,)."""
+        weights = weights[: self.n_free]
+        nodes = np.flatnonzero(weights)
+        a, b = (nodes[index] for index in np.tril_indices(len(nodes)))
+        for i in range(3):
+            np.add.at(matrix.values, self.pattern.position(3 * a + i, 3 * b + i), mass * weights[a] * weights[b])
 
     def free(self, field: np.ndarray) -> np.ndarray:
         """Return the unknowns (3 n_free,) of a field on all nodes (n, 3), as a view if the field is contiguous."""

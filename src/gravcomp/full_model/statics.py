@@ -11,27 +11,31 @@ import numpy as np
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.tracking import StaticTracker
+from gravcomp.full_model.wrench import PointLoads, Wrench
 
 
 class StaticSolver(StaticTracker):
     """Finds equilibria of a model and tracks them."""
 
-    def solve(self, gravity: np.ndarray, cables: CableInput, parts: int = 64) -> Equilibrium:
-        """Return the equilibrium under gravity (3,) and the cables' input.
+    def solve(
+        self, gravity: np.ndarray, cables: CableInput, parts: int = 64, wrench: Wrench | tuple[Wrench, ...] | None = None
+    ) -> Equilibrium:
+        """Return the equilibrium under gravity (3,), the cables' input and point loads.
 
         If tracking from the current state fails, the load is applied in steps to the straight robot; a step that fails is
         halved. If a step of 1 / parts of the load fails, the branch of equilibria ends there in a limit point, or nearly: the
         last equilibrium is returned with `load_fraction` below 1 and `converged` False, and the solver keeps its state.
         """
-        start = self.state
-        if self.track(gravity, cables, iterations=15, exact=True).converged:
+        start, loads = self.state, PointLoads.of(self.model, wrench)
+        if self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
             return self.state
         self.reset()
         here, origin = self.state, self.state.tendons.displacement
         done, part = 0.0, 0.25
         while done < 1.0:
             fraction = min(1.0, done + part)
-            if self.track(fraction * np.asarray(gravity), cables.part(origin, fraction), 15, exact=True).converged:
+            force = fraction * np.asarray(gravity)
+            if self.track(force, cables.part(origin, fraction), 15, exact=True, loads=loads, fraction=fraction).converged:
                 here, done, part = self.state, fraction, 2.0 * part
                 continue
             self.state = here

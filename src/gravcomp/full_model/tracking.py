@@ -21,6 +21,7 @@ import numpy as np
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 
 # Smallest det F that a step may leave in an element.
@@ -29,6 +30,8 @@ _CRUSHED = 0.1
 _ROUNDING = 1e-3
 # A step below this fraction of the tolerance is the last one: the steps that would follow may add up to ten times its length.
 _SHORT = 0.1
+# The forces of a moment turn with its section. They have settled when they change by less than this fraction of the largest.
+_SETTLED_MOMENT, _UNDAMPED = 1e-6, 8
 # A factor is used again up to this displacement from where it was made, as a fraction of the length, and as long as each
 # correction is at most this fraction of the previous one.
 _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
@@ -63,27 +66,44 @@ class StaticTracker:
         self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
 
     def track(
-        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, exact: bool = False, stable: bool = False
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        iterations: int = 4,
+        exact: bool = False,
+        stable: bool = False,
+        loads: PointLoads | None = None,
+        fraction: float = 1.0,
     ) -> Equilibrium:
         """Track the equilibrium from the current state; the result's `converged` says whether it was reached.
 
         exact: use a thousandth of the tolerance and new factors of the present shape, for reference results. stable: stop where
-        the tangent is not positive definite.
+        the tangent is not positive definite. loads: act in addition, by `fraction` of their value.
         """
         previous = self.state
         if exact:
             self._kept = None
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
         self._update_pulling(state, cables)
-        weight = self.model.weight(gravity)
+        dead = self.model.weight(gravity)
+        weight = dead if loads is None else dead + loads.at(state.u, fraction)
+        if loads is not None and not loads.constant:
+            iterations *= 6
         origin: np.ndarray | None = None
         finer = 1e-3 if exact else 1.0
         while not state.converged and state.iterations < iterations:
             origin = self._newton_step(state, weight, cables, origin, finer * self.tolerance, stable)
+            settled = True
+            if loads is not None and not loads.constant:
+                turned = dead + loads.at(state.u, fraction)
+                settled = bool(np.abs(turned - weight).max() <= _SETTLED_MOMENT * np.abs(turned).max())
+                # Turning couples the two directions across the moment: after some steps half of the change is taken, which
+                # damps that.
+                weight = turned if state.iterations < _UNDAMPED else 0.5 * (weight + turned)
             self._measure(state, weight)
             if origin is None:
                 break
-            state.converged &= state.residual <= self._allowed_residual(state, weight)
+            state.converged &= settled and state.residual <= self._allowed_residual(state, weight)
         self.state = state
         return state
 

@@ -6,18 +6,25 @@ import numpy as np
 
 from gravcomp.description import MeshBody, Robot
 from gravcomp.mesh.mesh import Mesh, MeshError
+from gravcomp.mesh.refusal import require_well_shaped
 from gravcomp.mesh.surface_file import SURFACE_SUFFIXES, mesh_surface
-from gravcomp.mesh.tube import tube_mesh
+from gravcomp.mesh.tube import coarse_elements, tube_mesh
 from gravcomp.mesh.volume_file import VOLUME_SUFFIXES, read_volume
 
 # Relative to the length: difference between the file's length and length_mm, and distance of a node from the plane of base or
 # tip.
 _LENGTH_TOLERANCE, _PLANE_TOLERANCE = 0.02, 1e-4
+# Above this Poisson's ratio quadratic tetrahedra with four integration points lock.
+_LARGEST_RATIO = 0.495
 
 
 def body_mesh(robot: Robot) -> Mesh:
     """Return the mesh: graded hexahedra for tubes, quadratic tetrahedra for a body from a file. Raises MeshError."""
-    return tube_mesh(robot) if robot.body is None else _from_file(robot.body)
+    if robot.body is not None:
+        return _from_file(robot.body)
+    mesh = tube_mesh(robot)
+    require_well_shaped(robot, robot.elements or coarse_elements(robot), mesh)
+    return mesh
 
 
 def _from_file(body: MeshBody) -> Mesh:
@@ -31,6 +38,11 @@ def _from_file(body: MeshBody) -> Mesh:
         kind, nodes, elements = read_volume(str(path))
     else:
         raise MeshError(f"{path}: allowed are surfaces {SURFACE_SUFFIXES} and volume meshes {VOLUME_SUFFIXES}")
+    if kind == "tet10" and body.material.poissons_ratio > _LARGEST_RATIO:
+        raise MeshError(
+            f"{path}: quadratic tetrahedra are far too stiff at Poisson's ratio {body.material.poissons_ratio:g}; allowed: up to"
+            f" {_LARGEST_RATIO:g}, or a mesh of 20-node hexahedra"
+        )
     nodes = nodes * body.file_unit
     _check_place(path, nodes, body)
     for plane in (0.0, body.length):

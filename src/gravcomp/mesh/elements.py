@@ -46,9 +46,11 @@ def shape_values(kind: str, points: np.ndarray) -> np.ndarray:
     if kind == "hex20":
         x = points[..., None, :]
         a = _HEX_NODES
-        corner = np.prod(1 + x * a, axis=-1) / 8 * ((x * a).sum(-1) - 2)
-        edge = np.prod(np.where(a == 0, 1 - x**2, 1 + x * a), axis=-1) / 4
-        return np.where(np.all(a != 0, axis=-1), corner, edge)
+        on_edge = (a == 0).any(axis=-1)
+        along = x * a
+        factor = np.where(a == 0, 1 - x**2, 1 + along)
+        product = factor[..., 0] * factor[..., 1] * factor[..., 2]
+        return product * np.where(on_edge, 0.25, 0.125 * (along[..., 0] + along[..., 1] + along[..., 2] - 2))
     bary = _BARY_0 + points @ _BARY_D.T
     if kind == "tet4":
         return bary

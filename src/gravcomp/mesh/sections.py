@@ -1,40 +1,109 @@
 """Cross-sections of the body as linear functionals of its nodes.
 
-For a height Z of the straight body, points of the section there are fitted by x(X, Y) = p + f_1 X + f_2 Y (least squares, every
-point weighted by its share of the area). p is the present position of the axis, f_1 and f_2 are the present directions of the
-section's x and y, and d = f_1 x f_2 / |f_1 x f_2| is the direction of the axis. p, f_1 and f_2 are weighted sums of node
-positions.
+For a height Z of the straight body, points of the section there are fitted by x(X, Y) = p + f_1 X + f_2 Y (least squares,
+every point weighted by its share of the area). p is where the axis has gone, f_1 and f_2 are where the section's x and y
+have gone; the axis' direction is d = f_1 x f_2 / |f_1 x f_2|. p, f_1 and f_2 are weighted sums of node positions.
+
+On a body whose axis is bent at rest, Z is the arc length along the axis, and the section is perpendicular to it there.
 """
 
 import numpy as np
 
-from gravcomp.mesh.embedding import embed
+from gravcomp.mesh.elements import shape_gradients, shape_values
+from gravcomp.mesh.embedding import locate
+from gravcomp.mesh.local_coordinates import local_coordinates_from
 from gravcomp.mesh.mesh import Mesh, MeshError
 
 _RINGS, _SPOKES = 9, 18
 
 
 def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
-    """Return (3 s, n) the rows p, f_1, f_2 of every height (s,) in m, to be multiplied with node positions (n, 3).
+    """(3 s, n): rows p, f_1, f_2 of every height (s,), to be multiplied with node positions (n, 3).
 
-    Raises MeshError for a height at which the body has no section.
+    Raises MeshError where the body has no section.
     """
-    largest = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1]).max()
-    radius, angle = np.meshgrid(
-        largest * (np.arange(_RINGS) + 0.5) / _RINGS, 2 * np.pi * np.arange(_SPOKES) / _SPOKES, indexing="ij"
-    )
-    disc = np.column_stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()])
     rows = np.zeros((3 * len(heights), len(mesh.nodes)))
+    layered = _layered(mesh)
     for index, height in enumerate(heights):
-        points = np.column_stack([disc, np.full(len(disc), height)])
-        found = embed(mesh, points)
-        within = found.outside < 1e-6
-        if within.sum() < 6:
-            raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm for the backbone")
-        area = radius.ravel()[within]
-        design = np.column_stack([np.ones(within.sum()), disc[within]])
-        fit = np.linalg.solve(design.T @ (area[:, None] * design), design.T * area)
+        plane, area, nodes, weights = _in_layer(mesh, height) if layered else _on_rings(mesh, height)
+        design = np.column_stack([np.ones(len(plane)), plane])
+        normal = design.T @ (area[:, None] * design)
+        scale = np.sqrt(np.diag(normal))
+        if len(plane) < 6 or not scale.all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e6:
+            raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm to fix the backbone to")
+        fit = np.linalg.solve(normal, design.T * area)
         for row in range(3):
-            np.add.at(rows[3 * index + row], found.nodes[within], fit[row][:, None] * found.weights[within])
+            np.add.at(rows[3 * index + row], nodes, fit[row][:, None] * weights)
     rows[np.abs(rows) < 1e-9 * np.abs(rows).max(axis=1, keepdims=True)] = 0.0
     return rows
+
+
+def _layered(mesh: Mesh) -> bool:
+    """Whether all elements are hexahedra between two planes across the axis, as meshes of segments are."""
+    if mesh.kind != "hex20":
+        return False
+    z = mesh.straight[mesh.elements][:, :, 2]
+    slack = 1e-9 * mesh.length
+    faces = ((0, 1, 2, 3, 8, 9, 10, 11), (16, 17, 18, 19), (4, 5, 6, 7, 12, 13, 14, 15))
+    flat = all(np.ptp(z[:, face], axis=1).max() < slack for face in faces)
+    return flat and float(np.abs(z[:, 0] + z[:, 4] - 2 * z[:, 16]).max()) < slack
+
+
+def _in_layer(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Gauss points of the section: places (q, 2), areas (q,), nodes and weights (q, 20) of each."""
+    low, high = (mesh.straight[mesh.elements[:, corner], 2] for corner in (0, 4))
+    slack = 1e-9 * mesh.length
+    layer = (low < height - slack) & (high >= height - slack) if height > slack else low <= slack
+    elements = mesh.elements[layer]
+    x, w = np.polynomial.legendre.leggauss(3)
+    a, b = (grid.ravel() for grid in np.meshgrid(x, x, indexing="ij"))
+    part = np.clip(2.0 * (height - low[layer]) / (high - low)[layer] - 1.0, -1.0, 1.0)
+    part[np.abs(np.abs(part) - 1.0) < 1e-9] = np.sign(part[np.abs(np.abs(part) - 1.0) < 1e-9])
+    grid = np.empty((len(elements), 9, 3))
+    grid[..., 0], grid[..., 1], grid[..., 2] = a, b, part[:, None]
+    straight = mesh.straight[elements]
+    places = np.einsum("kqc,kci->kqi", shape_values("hex20", grid), straight)
+    jacobian = np.einsum("kci,kqcj->kqij", straight[..., :2], shape_gradients("hex20", grid)[..., :2])
+    area = np.abs(np.linalg.det(jacobian)) * np.outer(w, w).ravel()
+    local, nodes = grid.reshape(-1, 3), np.repeat(elements, 9, axis=0)
+    plane = places[..., :2].reshape(-1, 2)
+    if mesh.axis.bent:
+        # Between its end faces a quadratic element follows an arc only nearly: the points are found where they lie.
+        points = mesh.axis.points(np.column_stack([plane, np.full(len(plane), height)]))
+        tolerance = 1e-9 * mesh.length
+        local, distance, found = local_coordinates_from("hex20", mesh.nodes[nodes], points, tolerance, local)
+        if not found.all():
+            raise MeshError(
+                f"the section at {height * 1e3:g} mm does not lie in its elements, by {distance.max() * 1e3:.3g} mm:"
+                " use more elements along the robot"
+            )
+        local[np.abs(np.abs(local) - 1.0) < 1e-9] = np.sign(local[np.abs(np.abs(local) - 1.0) < 1e-9])
+    return plane, area.ravel(), nodes, shape_values("hex20", local)
+
+
+def _on_rings(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points on rings over the section: places (q, 2), areas (q,), nodes and weights (q, c) of each."""
+    plane, area = _sampled_plane(mesh, height)
+    found, attached = locate(mesh, mesh.axis.points(np.column_stack([plane, np.full(len(plane), height)])))
+    within = attached & (found.outside < 1e-6)
+    return plane[within], area[within], found.nodes[within], found.weights[within]
+
+
+def _sampled_plane(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (q, 2) in the section at `height`, on rings that reach over the body there, and the area (q,) each stands for."""
+    z = mesh.straight[mesh.elements][:, :, 2]
+    slack = 1e-6 * mesh.length
+    here = mesh.elements[(z.min(axis=1) <= height + slack) & (z.max(axis=1) >= height - slack)]
+    if not len(here):
+        raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm to fix the backbone to")
+    nodes = mesh.straight[np.unique(here)]
+    radii = np.hypot(nodes[:, 0], nodes[:, 1])
+    # A solid section is sampled from its middle, a tube from its inner wall: a thin wall would fall between two rings.
+    middle, solid = locate(mesh, mesh.axis.points(np.array([[0.0, 0.0, height]])))
+    inner = 0.0 if solid[0] and middle.outside[0] < 1e-6 else radii.min()
+    radius, angle = np.meshgrid(
+        inner + (radii.max() - inner) * (np.arange(_RINGS) + 0.5) / _RINGS,
+        2 * np.pi * np.arange(_SPOKES) / _SPOKES,
+        indexing="ij",
+    )
+    return np.column_stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()]), radius.ravel()

@@ -1,97 +1,84 @@
-"""Meshes of a row of tubes from their dimensions, graded toward the clamp, where the stress is singular.
+"""Meshes of a row of segments, built from their dimensions: graded toward the clamp, whose corner is singular.
 
-A grid in (radius, angle, z) has a plane at every radius and height where a tube begins or ends, so that tubes of different
-diameters share their nodes. Its cells become 20-node hexahedra, or six tetrahedra each (Kuhn's division).
+A division of the cross-section (`section_grid`) is swept along the axis in layers (`layers`). Its cells become 20-node
+hexahedra, or six tetrahedra each (Kuhn's division). The robot is meshed straight and then laid along its axis at rest.
 """
 
 import itertools
 
 import numpy as np
 
-from gravcomp.description import Robot
+from gravcomp.description import Elements, Robot
 from gravcomp.mesh.elements import is_hexahedron, reference_nodes
-from gravcomp.mesh.mesh import Mesh, MeshError
+from gravcomp.mesh.layers import layers_of
+from gravcomp.mesh.levels import levels_of
+from gravcomp.mesh.mesh import Mesh
+from gravcomp.mesh.pieces import pieces_of, rest_axis
 from gravcomp.mesh.quadratic import TET_EDGES
+from gravcomp.mesh.section_grid import section_grid
 
 
 def tube_mesh(
     robot: Robot, kind: str = "hex20", around: int | None = None, along: int | None = None, radial: int | None = None
 ) -> Mesh:
-    """Return the mesh of the robot's segments; numbers of elements that are not given are the robot's.
+    """Return the mesh of the robot's segments; the numbers of elements are the robot's unless given.
 
-    kind: one of `elements.KINDS`. Raises MeshError for fewer elements along the robot than tubes and caps.
+    kind: one of `elements.KINDS`. Raises MeshError when the numbers cannot be met.
     """
-    around = around or robot.elements.around
-    along = along or robot.elements.along
-    radial = radial or robot.elements.radial
-    pieces = _pieces(robot)
-    heights, piece_of_layer = _layers([p[0] for p in pieces], along, robot.elements.grading)
-    radii = _radii(pieces, radial)
+    elements = robot.elements or coarse_elements(robot)
+    pieces = pieces_of(robot)
+    levels = levels_of(pieces)
+    grid = section_grid(levels, around or elements.around, radial or elements.radial, elements.equal_stiffness)
+    heights, piece_of_layer = layers_of(pieces, along or elements.along, elements.grading)
 
-    corners = []
-    for layer, piece in enumerate(piece_of_layer):
-        _, inner, outer, _ = pieces[piece]
-        for ring in range(len(radii) - 1):
-            if inner - 1e-9 <= radii[ring] and radii[ring + 1] <= outer + 1e-9:
-                corners += [(2 * ring, 2 * sector, 2 * layer, piece) for sector in range(around)]
-    cells = np.array(corners)
-    origin, pieces_of_cells = cells[:, :3], cells[:, 3]
+    numbers, region = [], []
     # Nodes of an element in (radial, around, along) half steps of its cell.
     patterns = [np.rint(reference_nodes(kind) + 1).astype(int)] if is_hexahedron(kind) else _kuhn(quadratic=kind == "tet10")
-    grid = np.concatenate([origin[:, None, :] + pattern for pattern in patterns])
-    region = np.concatenate([pieces_of_cells] * len(patterns))
-    grid[:, :, 1] %= 2 * around
+    levels_high = 2 * len(heights) - 1
+    for pattern in patterns:
+        for layer, piece in enumerate(piece_of_layer):
+            low, high = levels.spans[piece]
+            cells = grid.cells[(grid.interval > low) & (grid.interval <= high)]
+            planar = cells[:, pattern[:, 0], pattern[:, 1]]
+            numbers.append(planar * levels_high + 2 * layer + pattern[:, 2])
+            region.append(np.full(len(planar), piece))
+    used, elements_of = np.unique(np.concatenate(numbers), return_inverse=True)
+    connectivity = elements_of.reshape(-1, len(patterns[0]))
+    planar, level = used // levels_high, used % levels_high
 
-    shape = (2 * len(radii), 2 * around, 2 * len(heights))
-    used, elements = np.unique(np.ravel_multi_index(tuple(np.moveaxis(grid, -1, 0)), shape), return_inverse=True)
-    i, j, k = np.unravel_index(used, shape)
-    radius, height = _halved(radii)[i], _halved(heights)[k]
-    angle = np.pi * j / around
-    nodes = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
-    materials = tuple(p[3] for p in pieces)
-    return Mesh(kind, nodes, elements.reshape(grid.shape[:2]), region, materials, robot.length, _halved(heights))
-
-
-def _pieces(robot: Robot) -> list[tuple]:
-    """Return (length, inner radius, outer radius, material) of every tube and cap from base to tip."""
-    pieces = []
-    for segment in robot.segments:
-        section = (segment.lumen_diameter / 2, segment.outer_diameter / 2)
-        pieces.append((segment.length, *section, segment.material))
-        if segment.cap:
-            pieces.append((segment.cap.length, *section, segment.cap.material))
-    return pieces
-
-
-def _layers(lengths: list[float], along: int, grading: float) -> tuple[np.ndarray, list[int]]:
-    """Return the heights of the layers' ends, graded and fitted to the ends of the pieces, and each layer's piece."""
-    if along < len(lengths):
-        raise MeshError(f"elements.along is {along}; the robot has {len(lengths)} tubes and caps: at least that many are needed")
-    ends = np.concatenate([[0.0], np.cumsum(lengths)])
-    sizes = grading ** (np.arange(along) / max(along - 1, 1))
-    ideal = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()]) * ends[-1]
-    index = [0]
-    for piece in range(1, len(lengths)):
-        nearest = int(np.argmin(np.abs(ideal - ends[piece])))
-        index.append(min(max(nearest, index[-1] + 1), along - (len(lengths) - piece)))
-    index.append(along)
-    heights = np.interp(ideal, ideal[index], ends)
-    return heights, [p for p, (a, b) in enumerate(itertools.pairwise(index)) for _ in range(b - a)]
+    # A section lies between the planes at both ends of its piece, and changes linearly from one to the other.
+    ends = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
+    height = _halved(heights)
+    piece_of_level = np.repeat(piece_of_layer, 2)[np.minimum(np.arange(levels_high), levels_high - 2)]
+    part = (height - ends[piece_of_level]) / np.diff(ends)[piece_of_level]
+    base, part = piece_of_level[level], part[level][:, None]
+    low_place, high_place = grid.place[base, planar], grid.place[base + 1, planar]
+    # In the plane itself the other end may not be known: a wall may end there.
+    place = np.where(part <= 0.0, low_place, np.where(part >= 1.0, high_place, (1.0 - part) * low_place + part * high_place))
+    straight = np.column_stack([place, height[level]])
+    materials = tuple(piece.material for piece in pieces)
+    axis = rest_axis(robot)
+    return Mesh(
+        kind, axis.points(straight), connectivity, np.concatenate(region), materials, robot.length, height, axis,
+        straight if axis.bent else None,
+    )  # fmt: skip
 
 
-def _radii(pieces: list[tuple], radial: int) -> np.ndarray:
-    """Return the radii of the rings: every tube's inner and outer radius, each gap divided into `radial` parts."""
-    ends = np.unique(np.round([r for p in pieces for r in p[1:3]], 9))
-    return np.concatenate([[ends[0]], *(np.linspace(a, b, radial + 1)[1:] for a, b in itertools.pairwise(ends))])
+def coarse_elements(robot: Robot) -> Elements:
+    """Return numbers of elements that every robot of segments can be meshed with."""
+    pieces = pieces_of(robot)
+    cornered = any(piece.inner is None or piece.outer[0].shape == "rectangle" for piece in pieces)
+    parts = sum(len(piece.marks) + 1 for piece in pieces)
+    return Elements(around=8 if cornered else 6, along=max(10, parts))
 
 
 def _halved(values: np.ndarray) -> np.ndarray:
-    """Return the values and the means between them."""
+    """The values and the means between them."""
     return np.interp(np.arange(2 * len(values) - 1) / 2.0, np.arange(len(values)), values)
 
 
 def _kuhn(quadratic: bool) -> list[np.ndarray]:
-    """Return the six tetrahedra of a cell, one for each order of the edges on the way from a corner to the opposite one."""
+    """The six tetrahedra of a cell: one for each order of walking its edges from the first corner to the opposite one."""
     tets = []
     for order in itertools.permutations(range(3)):
         corners = [np.zeros(3, dtype=int)]

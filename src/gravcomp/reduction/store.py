@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
+from gravcomp.description import Robot
 from gravcomp.full_model.model import RobotModel
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.total_lagrangian import SolidElements
@@ -77,8 +78,16 @@ def path_of(model: RobotModel) -> Path:
     cables = [dataclasses.asdict(cable) for cable in robot.cables]
     for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
         del cable["axial_stiffness"]
-    key = content_key(_FORMAT, mesh.kind, mesh.nodes, mesh.elements, mesh.region, materials, cables, robot.payload)
+    key = content_key(
+        _FORMAT, mesh.kind, mesh.nodes, mesh.elements, mesh.region, materials, cables, robot.payload, *_disks(robot)
+    )
     return cache_path("reduction", key, ".npz")
+
+
+def _disks(robot: Robot) -> list:
+    """Return what disks there are, segment by segment; empty without disks, so that such robots keep their keys."""
+    disks = [segment.disks and dataclasses.asdict(segment.disks) for segment in robot.segments]
+    return [disks] if any(disks) else []
 
 
 def save(reduction: Reduction, path: Path) -> None:

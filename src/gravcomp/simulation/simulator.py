@@ -14,6 +14,7 @@ from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.full_model.wrench import Wrench
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.simulation.search_pace import SearchPace
@@ -116,12 +117,21 @@ class Simulator:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
 
-    def solve(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
-        """Return the equilibrium found from the straight robot, independent of all earlier shapes; arguments as in `step`."""
+    def solve(
+        self,
+        gravity: np.ndarray,
+        displacement: np.ndarray | None = None,
+        tension: np.ndarray | None = None,
+        wrench: Wrench | tuple[Wrench, ...] | None = None,
+    ) -> Shape:
+        """Return the equilibrium found from the straight robot, independent of all earlier shapes.
+
+        wrench: forces and moments on cross-sections, constant in soft_base; the other arguments as in `step`.
+        """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
         self.solver.reset()
-        state = self.solver.solve(gravity, cables)
+        state = self.solver.solve(gravity, cables, wrench=wrench)
         self._pace.reset()
         if state.converged:
             self._pace.found(gravity, cables)

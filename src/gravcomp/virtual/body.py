@@ -27,9 +27,18 @@ def build_rod(robot: Robot, parameters: VirtualRobotParameters) -> RodModel:
     """Return the rod model. Raises ConfigError for a body from a file and for cables through via points."""
     if robot.body is not None:
         raise ConfigError(f"robot '{robot.name}' has a body from a file; the virtual robot needs segments")
+    for segment in robot.segments:
+        if not segment.plain:
+            raise ConfigError(
+                f"segment '{segment.name}': the virtual robot needs round segments, straight at rest, of constant section,"
+                " without lumens off the axis and without disks"
+            )
     for cable in robot.cables:
-        if cable.via_points is not None:
-            raise ConfigError(f"cable '{cable.name}' runs through via_points_mm; the virtual robot needs angle_deg and radius_mm")
+        if cable.via_points is not None or cable.tip_radius is not None:
+            raise ConfigError(
+                f"cable '{cable.name}' runs through via_points_mm or has tip_radius_mm;"
+                " the virtual robot needs angle_deg and radius_mm"
+            )
     ends = _element_ends(robot, parameters.body.element_length)
     length = np.diff(ends)
     n = len(length)

@@ -18,6 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
     )
+    parser.add_argument(
+        "--choose-mesh", action="store_true",
+        help="find elements with a tip error of at most 0.1 %% of the length (seconds to minutes)",
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,13 +29,14 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from gravcomp.description import load_robot_file
+    from gravcomp.full_model.mesh_choice import chosen_elements
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.mesh.quality import mesh_quality
     from gravcomp.simulation import Simulator
 
     file = load_robot_file(args.robot)
     simulator = Simulator(file.robot, reduced=False)
-    robot, model = file.robot, simulator.model
+    robot, model = simulator.robot, simulator.model
     quality = mesh_quality(model.mesh)
     sag = simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
     figures = {
@@ -46,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
         "reach": _reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
     }
+    if args.choose_mesh and robot.body is None:
+        figures["chosen_elements"] = dataclasses.asdict(chosen_elements(file.robot))
     output.result(figures, _text(figures))
     return 0
 
@@ -91,6 +98,7 @@ def _mesh_error(robot: "Robot", sag: "Shape") -> dict[str, Any]:
     if robot.body is not None:
         return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
     elements = robot.elements
+    assert elements is not None  # the model's robot has its mesh chosen
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
     change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve(np.array([-_GRAVITY, 0.0, 0.0]))
     error = float(np.linalg.norm(change.tip_position - sag.tip_position))
@@ -130,4 +138,7 @@ def _text(figures: dict[str, Any]) -> str:
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
+    if "chosen_elements" in figures:
+        numbers = ", ".join(f"{name}: {value}" for name, value in figures["chosen_elements"].items())
+        lines.append(f"  elements that reach 0.1 % of the length: {{{numbers}}}")
     return "\n".join(lines)

@@ -1,0 +1,277 @@
+"""Bodies of any slender shape: they rest where they are described, weigh what they should, and bend as rods do."""
+
+import csv
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gravcomp.cables.disks import disk_heights
+from gravcomp.config import ConfigError, from_mapping
+from gravcomp.description import Cable, Cap, Disks, Elements, Lumen, Material, RestShape, Robot, Section, Segment
+from gravcomp.full_model.mesh_choice import chosen_elements
+from gravcomp.full_model.modes import natural_frequencies
+from gravcomp.full_model.wrench import Wrench
+from gravcomp.mesh import MeshError, tube_mesh
+from gravcomp.mesh.embedding import embed
+from gravcomp.mesh.pieces import rest_axis
+from gravcomp.mesh.quality import mesh_quality
+from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
+
+
+def random_robot(seed: int) -> Robot:
+    """A tube or bar with a cable anywhere in its wall, tapered, bent or with a lumen off the axis."""
+    rng = np.random.default_rng(seed)
+    length, wall, lumen = rng.uniform(5e-3, 0.5), np.exp(rng.uniform(np.log(0.3e-3), np.log(10e-3))), rng.uniform(0.5e-3, 10e-3)
+    outer = lumen + 2 * wall
+    kind = seed % 4
+    extra = {"lumen_diameter": lumen}
+    if kind == 1:
+        share = rng.uniform(0.5, 1.0)
+        extra |= {"tip_outer_diameter": share * outer, "tip_lumen_diameter": share * lumen}
+    elif kind == 2:
+        shift = 0.5 * wall
+        extra = {"lumens": (Lumen(lumen, shift * np.cos(seed), shift * np.sin(seed)),)}
+    elif kind == 3:
+        extra = {"rest": RestShape(rng.uniform(0.1, min(2.5, 0.8 * length / outer)), rng.uniform(-3, 3))}
+        if seed % 8 == 3:
+            extra["tip_outer_diameter"] = 0.8 * outer
+    segment = Segment("only", length, outer, **extra)
+    angle, cables = rng.uniform(-3, 3), ()
+    for part in np.linspace(0.0, 1.0, 21):  # the first place in the wall on a ray from the axis
+        x, y = part * outer / 2 * np.array([np.cos(angle), np.sin(angle)])
+        if all(segment.contains(x, y, end) for end in (0.0, 1.0)):
+            cables = (Cable("any", angle, part * outer / 2, segment="only"),)
+            break
+    return Robot("random", segments=(segment,), cables=cables, elements=Elements(around=12, along=8, radial=2, grading=2.0))
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_a_robot_without_load_rests_where_it_is_described(seed):
+    robot = random_robot(seed)
+    simulator = Simulator(robot, reduced=False)
+    shape = simulator.solve(np.zeros(3))
+    axis = rest_axis(robot)
+    station = np.append(shape.backbone_station, 1.0) * robot.length
+    position, rotation = axis.frames(station)
+    assert shape.status == ShapeStatus.OK
+    assert shape.backbone_position == pytest.approx(position[:-1], abs=1e-9 * robot.length)
+    assert shape.tip_position == pytest.approx(position[-1], abs=1e-9 * robot.length)
+    assert shape.tip_direction == pytest.approx(rotation[-1, :, 2], abs=1e-6)
+    assert robot.cables
+
+
+BODIES = {
+    "solid": (Segment("a", 0.1, 9e-3),),
+    "solid, tapered": (Segment("a", 0.1, 9e-3, tip_outer_diameter=5e-3),),
+    "tube, tapered": (Segment("a", 0.1, 9e-3, 3e-3, tip_outer_diameter=6e-3, tip_lumen_diameter=2e-3),),
+    "tube on bar": (Segment("a", 0.03, 9e-3), Segment("b", 0.03, 9e-3, 3e-3)),
+    "steps": (Segment("a", 0.03, 9e-3), Segment("b", 0.03, 7e-3, 3e-3), Segment("c", 0.03, 5e-3, cap=Cap(2e-3, Material()))),
+    "step and taper": (Segment("a", 0.03, 10e-3, 4e-3), Segment("b", 0.03, 8e-3, 4e-3, tip_outer_diameter=6e-3)),
+    "rectangle": (Segment("a", 0.1, section=Section("rectangle", 10e-3, 4e-3)),),
+    "ellipse": (Segment("a", 0.1, section=Section("ellipse", 10e-3, 6e-3, tip_width=6e-3)),),
+    "rectangle with a lumen": (Segment("a", 0.1, section=Section("rectangle", 10e-3, 8e-3), lumen_diameter=3e-3),),
+    "lumen off the axis": (Segment("a", 0.1, 9e-3, lumens=(Lumen(3e-3, 1e-3, 0.5e-3),)),),
+    "bent": (Segment("a", 0.1, 9e-3, 3e-3, rest=RestShape(2.0, 0.5)), Segment("b", 0.05, 9e-3, 3e-3, rest=RestShape(-1.0))),
+}
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_bodies_have_their_volume_and_no_bad_elements(name):
+    mesh = tube_mesh(Robot("body", segments=BODIES[name], elements=Elements(around=16, along=12, grading=2.0)))
+    model = RobotModel(Robot("body", segments=BODIES[name]), mesh)
+    part = (np.arange(200) + 0.5) / 200
+    volume = sum(
+        s.length * np.mean([s.area(p) for p in part]) + (s.cap.length * s.area(1.0) if s.cap else 0.0) for s in BODIES[name]
+    )
+    assert model.elements.weights.sum() == pytest.approx(volume, rel=2e-4)
+    assert mesh_quality(mesh).jacobian_ratio > 0.15
+
+
+@pytest.mark.parametrize(
+    ("section", "moment"),
+    [
+        ({"outer_diameter": 8e-3}, np.pi / 64 * 8e-3**4),
+        ({"section": Section("rectangle", 4e-3, 8e-3)}, 8e-3 * 4e-3**3 / 12),
+        ({"section": Section("ellipse", 4e-3, 8e-3)}, np.pi / 64 * 8e-3 * 4e-3**3),
+        ({"outer_diameter": 8e-3, "lumens": (Lumen(3e-3, 0.0, 1.5e-3),)}, np.pi / 64 * (8e-3**4 - 3e-3**4)),
+    ],
+)
+def test_small_forces_at_the_tip_bend_a_bar_as_beam_theory_says(section, moment):
+    bar = Segment("bar", 0.2, material=Material(youngs_modulus=1e6, poissons_ratio=0.3, density=0.0), **section)
+    robot = Robot("bar", segments=(bar,), elements=Elements(around=8, along=10, radial=2, grading=1.0, equal_stiffness=True))
+    force = 1e-5
+    shape = Simulator(robot, reduced=False).solve(np.zeros(3), wrench=Wrench(force=[force, 0.0, 0.0]))
+    # Shear adds 3 E I / (k G A L^2), well below 1 %.
+    assert shape.tip_position[0] == pytest.approx(force * 0.2**3 / (3 * 1e6 * moment), rel=0.01)
+
+
+def test_a_moment_at_the_tip_bends_a_bar_into_a_circle():
+    material = Material(youngs_modulus=1e6, poissons_ratio=0.0, density=0.0)
+    bar = Segment("bar", 0.2, 4e-3, material=material)
+    robot = Robot("bar", segments=(bar,), elements=Elements(around=4, along=10, grading=1.0, equal_stiffness=True))
+    stiffness = 1e6 * np.pi / 64 * 4e-3**4
+    moment = stiffness * 0.8 / 0.2  # the tip turns by 0.8 rad
+    shape = Simulator(robot, reduced=False).solve(np.zeros(3), wrench=Wrench(moment=[0.0, moment, 0.0]))
+    assert shape.status == ShapeStatus.OK
+    assert shape.tip_direction == pytest.approx([np.sin(0.8), 0.0, np.cos(0.8)], abs=4e-3)
+    assert shape.tip_position == pytest.approx(0.25 * np.array([1 - np.cos(0.8), 0.0, np.sin(0.8)]), abs=1e-3)
+
+
+def disk_robot(case: dict, along: int) -> Robot:
+    """A robot of the table: a steel backbone whose disks guide three cables a segment, without weight."""
+    number = {key: float(value) for key, value in case.items() if key != "model"}
+    material = Material(youngs_modulus=number["youngs_modulus_pa"], poissons_ratio=0.3, density=0.0)
+    segments, cables = [], []
+    for j in (1, 2):
+        disks = Disks(int(number[f"disks{j}"]), 2.5 * number[f"pitch{j}_m"])
+        segments.append(Segment(f"s{j}", number[f"length{j}_m"], 2 * number["backbone_radius_m"], material=material, disks=disks))
+        for angle in (90.0, -30.0, 210.0):
+            cables.append(Cable(f"c{len(cables)}", np.radians(angle), number[f"pitch{j}_m"], segment=f"s{j}"))
+    elements = Elements(around=4, along=along, grading=1.0, equal_stiffness=True)
+    return Robot("disks", segments=tuple(segments), cables=tuple(cables), elements=elements)
+
+
+def disk_cases():
+    """Rows of tips that others computed (P. Rao et al., "How to model tendon-driven continuum robots and benchmark modelling
+    performance", Front. Robot. AI 2021), from the folder of measurements; none where it is missing."""
+    folder = Path(os.environ.get("GRAVCOMP_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+    if not (folder / "disks" / "tips.csv").exists():
+        return []
+    with (folder / "disks" / "tips.csv").open() as file:
+        return [row for row in csv.DictReader(file) if row["model"] == "straight_between_disks"][:3]
+
+
+@pytest.mark.parametrize("case", disk_cases(), ids=lambda case: f"case {case['case']}")
+def test_a_backbone_with_disks_goes_where_others_compute(case):
+    robot = disk_robot(case, along=40)
+    tension = [float(case[f"t{i}_n"]) for i in range(1, 7)]
+    wrench = Wrench(force=[float(case[f"f{axis}_n"]) for axis in "xyz"])
+    shape = Simulator(robot, reduced=False).solve(np.zeros(3), tension=tension, wrench=wrench)
+    expected = [float(case[f"p{axis}_m"]) for axis in "xyz"]
+    assert shape.status == ShapeStatus.OK
+    assert np.linalg.norm(shape.tip_position - expected) < 3e-3 * robot.length
+
+
+def test_disks_are_weighed_and_slow_the_robot_down():
+    segment = Segment("a", 0.1, 2e-3, material=Material(youngs_modulus=50e6), disks=Disks(4, 20e-3, mass=1e-3))
+    robot = Robot("disks", segments=(segment,), elements=Elements(around=4, along=8))
+    assert disk_heights(robot) == pytest.approx([0.0, 0.025, 0.05, 0.075, 0.1])
+    model = RobotModel(robot)
+    bare = RobotModel(dataclasses.replace(robot, segments=(dataclasses.replace(segment, disks=None),)))
+    assert model.mass == pytest.approx(bare.mass + 4e-3)
+    assert natural_frequencies(model, 1)[0] < 0.5 * natural_frequencies(bare, 1)[0]
+
+
+@pytest.mark.parametrize(
+    ("segment", "words"),
+    [
+        ({}, "neither of outer_diameter_mm"),
+        ({"outer_diameter_mm": 9, "section": {"shape": "ellipse", "width_mm": 4, "height_mm": 6}}, "both outer_diameter_mm"),
+        ({"outer_diameter_mm": 9, "tip_outer_diameter_mm": 0}, "0.05 to 1000 mm"),
+        ({"outer_diameter_mm": 9, "lumen_diameter_mm": 4, "tip_outer_diameter_mm": 4}, "below 0.98 x tip_outer_diameter_mm"),
+        ({"outer_diameter_mm": 9, "lumens": [{"diameter_mm": 3, "x_mm": 4}]}, "does not lie inside the outline"),
+        ({"outer_diameter_mm": 9, "lumens": [{"diameter_mm": 3, "x_mm": 1}, {"diameter_mm": 3}]}, "touch"),
+        ({"outer_diameter_mm": 9, "rest": {"bend_angle_deg": 360}, "length_mm": 20}, "radius of 3.18 mm"),
+        ({"outer_diameter_mm": 9, "disks": {"count": 4, "outer_diameter_mm": 8}}, "above the width of the backbone"),
+        ({"outer_diameter_mm": 2, "disks": {"count": 200, "outer_diameter_mm": 8}}, "up to the segment's length"),
+    ],
+)
+def test_a_segment_that_cannot_be_is_refused(segment, words):
+    with pytest.raises(ConfigError, match=words):
+        from_mapping(Segment, {"name": "a", "length_mm": 100} | segment, source="robot.yaml", key="segments[0]")
+
+
+@pytest.mark.parametrize(
+    ("segments", "cable", "words"),
+    [
+        ((Segment("a", 0.1, 9e-3, 5e-3), Segment("b", 0.1, 4e-3)), None, "do not touch"),
+        ((Segment("a", 0.1, 9e-3, lumens=(Lumen(3e-3, 2e-3),)),), (2e-3, 0.0), "in its lumen, circle of 3 mm at"),
+        (
+            (Segment("a", 0.1, section=Section("rectangle", 8e-3, 4e-3)),),
+            (3e-3, 90.0),
+            "outside its outline, rectangle of 8 x 4 mm",
+        ),
+        ((Segment("a", 0.1, 2e-3, disks=Disks(4, 20e-3)),), (11e-3, 0.0), "inside its disks, up to 10 mm"),
+        ((Segment("a", 0.1, 2e-3, disks=Disks(4, 20e-3)),), (0.5e-3, 0.0), "outside its backbone"),
+        ((Segment("a", 0.1, 9e-3, tip_outer_diameter=3e-3),), (3e-3, 0.0), "within its wall, 0 to 1.5 mm"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused(segments, cable, words):
+    cables = (Cable("c", np.radians(cable[1]), cable[0], segment="a"),) if cable else ()
+    with pytest.raises(ValueError, match=words):
+        Robot("robot", segments=segments, cables=cables)
+
+
+@pytest.mark.parametrize(
+    ("robot", "words"),
+    [
+        (Robot("r", segments=(Segment("a", 0.1, 9e-3),), elements=Elements(around=6)), "use 8 or 12"),
+        (
+            Robot("r", segments=(Segment("a", 0.1, 9e-3), Segment("b", 0.1, section=Section("ellipse", 9e-3, 8e-3)))),
+            "different outlines where they meet",
+        ),
+        (
+            Robot("r", segments=(Segment("a", 0.1, 2e-3, disks=Disks(12, 20e-3)),), elements=Elements(around=4)),
+            "12 distances between disks",
+        ),
+        (Robot("r", segments=(Segment("a", 0.1, 9e-3, lumens=(Lumen(2e-3, 2e-3), Lumen(2e-3, -2e-3))),)), "has 2 lumens"),
+    ],
+)
+def test_a_body_that_cannot_be_meshed_is_named(robot, words):
+    with pytest.raises(MeshError, match=words):
+        tube_mesh(robot)
+
+
+def test_a_cable_that_ends_between_disks_is_refused():
+    segment = Segment("a", 0.1, 2e-3, disks=Disks(4, 20e-3))
+    cable = Cable("c", 0.0, 8e-3, end=0.06)
+    with pytest.raises(MeshError, match="ends at 60 mm, between two disks; there are disks at 0, 25, 50, 75, 100 mm"):
+        RobotModel(Robot("r", segments=(segment,), cables=(cable,), elements=Elements(around=4, along=8)))
+
+
+def test_a_point_outside_is_refused_with_its_distance():
+    mesh = tube_mesh(Robot("r", segments=(Segment("a", 0.1, 9e-3, 3e-3),), elements=Elements()))
+    with pytest.raises(MeshError, match=r"the point \(12, 0, 50\) mm lies 7.5 mm outside the body"):
+        embed(mesh, np.array([[12e-3, 0.0, 50e-3]]))
+
+
+def test_a_cable_follows_the_taper():
+    segment = Segment("a", 0.1, 10e-3, 4e-3, tip_outer_diameter=6e-3, tip_lumen_diameter=2e-3)
+    cable = Cable("c", 0.0, 3.5e-3, tip_radius=2e-3, segment="a")
+    model = RobotModel(Robot("r", segments=(segment,), cables=(cable,), elements=Elements(along=9)))
+    assert model.tendons.rest_length == pytest.approx([np.hypot(0.1, 1.5e-3)], rel=1e-9)
+
+
+def test_hexahedra_do_not_lock_when_the_material_is_nearly_incompressible():
+    """The horizontal tube of 100 mm: a mesh twice as fine gives 28.83 mm at Poisson's ratio 0.4999."""
+    material = Material(youngs_modulus=0.8e6, poissons_ratio=0.4999, density=1150.0)
+    robot = Robot("tube", segments=(Segment("a", 0.1, 9e-3, 3e-3, material=material),), elements=Elements())
+    assert Simulator(robot, reduced=False).solve([-9.81, 0.0, 0.0]).tip_position[0] == pytest.approx(-28.83e-3, abs=0.1e-3)
+
+
+def test_the_chosen_mesh_reaches_its_accuracy(monkeypatch, tmp_path):
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    material = Material(youngs_modulus=3e6, poissons_ratio=0.45)
+    robot = Robot("tube", segments=(Segment("a", 0.08, 10e-3, 2e-3, material=material),), cables=())
+    chosen = chosen_elements(robot)
+    finer = dataclasses.replace(chosen, along=2 * chosen.along, around=chosen.around + 4)
+    tips = [
+        Simulator(dataclasses.replace(robot, elements=e), reduced=False).solve([-9.81, 0, 0]).tip_position
+        for e in (chosen, finer)
+    ]
+    assert np.linalg.norm(tips[0] - tips[1]) < 1e-3 * robot.length
+    assert len(list(tmp_path.rglob("*.json"))) == 1 and chosen_elements(robot) == chosen
+
+
+def test_elements_are_well_shaped_where_the_file_gives_none():
+    robot = Robot("thick", segments=(Segment("a", 0.15, 20e-3, 2e-3),))  # the coarsest mesh has a Jacobian ratio of 0.09
+    assert mesh_quality(RobotModel(robot).mesh).jacobian_ratio >= 0.2
+
+
+def test_a_mesh_of_wedges_is_refused_with_numbers_that_work():
+    robot = Robot("tail", segments=(Segment("a", 0.15, 20e-3, 2e-3),), elements=Elements())
+    with pytest.raises(MeshError, match=r"Jacobian ratio of 0.088.*\{around: 6, along: 10, radial: 2\} would do"):
+        RobotModel(robot)
