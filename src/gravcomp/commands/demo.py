@@ -12,6 +12,7 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from gravcomp.launcher.host_client import NodeHost
 
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.launcher import Graph
@@ -47,6 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    # Before the imports of the command: the host imports for the nodes at the same time.
+    from gravcomp.launcher.host_client import NodeHost
+
+    with NodeHost() as host:
+        return _run(args, host)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
@@ -90,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
-        with builder, Graph(specs, logs, {**domain, **builder.environment}) as processes:
+        with builder, Graph(specs, logs, {**domain, **builder.environment}, host) as processes:
             if not args.headless:
                 address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
             processes.start()
