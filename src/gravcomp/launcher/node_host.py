@@ -3,7 +3,7 @@
     python -m gravcomp.launcher.node_host SOCKET MODULES PADDING
 
 SOCKET: number of the inherited socket to the launcher (`gravcomp.launcher.host_client`). MODULES: names of the modules to import,
-with commas between them; a module that cannot be imported is left to the node, which reports the error. PADDING: room for the
+with commas between them; MODULE:FUNCTION also calls a function. What fails is left to the node, which reports the error. PADDING: room for the
 command lines of the nodes (`gravcomp.launcher.process_title`).
 
 A request and an answer are one line of JSON each:
@@ -44,9 +44,12 @@ def main(arguments: list[str]) -> int:
     connection = socket.socket(fileno=int(arguments[0]))
     connection.set_inheritable(False)
     set_title("node_host", [sys.executable, "-m", "gravcomp.launcher.node_host"])
-    for name in filter(None, arguments[1].split(",")):
-        with contextlib.suppress(ImportError):
-            importlib.import_module(name)
+    for entry in filter(None, arguments[1].split(",")):
+        name, _, function = entry.partition(":")
+        with contextlib.suppress(Exception):
+            module = importlib.import_module(name)
+            if function:
+                getattr(module, function)()
     if threading.active_count() != 1:
         # A lock that another thread holds at the moment of a fork would stay locked in the node.
         print(f"gravcomp: imports have started threads: {threading.enumerate()}", file=sys.stderr)
