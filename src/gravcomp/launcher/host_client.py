@@ -41,7 +41,6 @@ SHARED_MODULES = (
     "gravcomp_fem.inverse_controller",
     "gravcomp_estimation.imu_estimator",
     "gravcomp_hw.virtual_robot",
-    "filterpy.kalman",
     "gravcomp.launcher.preload:call_compiled",
 )
 """Modules that a host imports for the nodes of a graph. The viewer's are not among them: no other node needs them."""
