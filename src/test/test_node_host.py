@@ -122,7 +122,9 @@ def test_the_command_line_and_the_mark_of_a_node_are_visible(shared_host, execut
 
 
 def test_the_nodes_of_a_killed_host_get_sigint_and_are_named(own_host, executable, tmp_path):
-    executable("import time\ntry:\n    print('ready', flush=True); time.sleep(60)\nexcept KeyboardInterrupt:\n    print('zero')\n")
+    executable(
+        "import time\ntry:\n    print('ready', flush=True); time.sleep(60)\nexcept KeyboardInterrupt:\n    print('zero')\n"
+    )
     with Graph([NodeSpec("tiny", "node")], tmp_path, host=own_host) as graph:
         graph.start()
         process = graph.processes["node"]

@@ -12,9 +12,9 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
     from rich.console import Group
-    from gravcomp.launcher.host_client import NodeHost
 
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
 
 # s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
@@ -75,8 +75,10 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
         with builder, Graph([*specs, player], logs, {**domain, **builder.environment}, host) as processes:
             if args.viewer:
-                show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
+                processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))
             processes.start()
+            if args.viewer:
+                show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             figures = _follow(processes, result)
     output.result(figures, _summary(figures))

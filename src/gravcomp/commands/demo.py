@@ -12,10 +12,10 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
     from rich.table import Table
-    from gravcomp.launcher.host_client import NodeHost
 
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
 
 _SHORTEST = 10.0  # s: a shorter run shows neither sag nor compensation
 _TURNING = 0.2  # rad/s: above the rate of a hand at rest plus the gyroscope's bias
@@ -101,8 +101,10 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         domain = private_domain()
         with builder, Graph(specs, logs, {**domain, **builder.environment}, host) as processes:
             if not args.headless:
-                address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
+                processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port, **pictured))
             processes.start()
+            if not args.headless:
+                address = show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
             # The last one, because its motion begins with its activation.

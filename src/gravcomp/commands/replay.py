@@ -87,8 +87,10 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     begin = time.monotonic()
     with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment, host) as processes:
         if viewer:
-            show_page(processes, viewer[0], args.no_open)
+            processes.start_one(viewer[0])
         processes.start()
+        if viewer:
+            show_page(processes, args.no_open)
         _follow(processes, replay.name, recording.duration, args.speed)
         time.sleep(_SETTLE)
     figures = {

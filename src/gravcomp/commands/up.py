@@ -60,9 +60,11 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
     with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:
         if args.viewer:
-            show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
+            processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))
         begin = time.monotonic()
         processes.start()
+        if args.viewer:
+            show_page(processes, args.no_open)
         names = ", ".join(processes.processes)
         bus = f" Bus: {interface} {channel}." if interface or channel else ""
         output.note(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.")
