@@ -3,8 +3,8 @@
     python -m gravcomp.launcher.node_host SOCKET MODULES PADDING
 
 SOCKET: number of the inherited socket to the launcher (`gravcomp.launcher.host_client`). MODULES: names of the modules to import,
-with commas between them; MODULE:FUNCTION also calls a function. What fails is left to the node, which reports the error. PADDING: room for the
-command lines of the nodes (`gravcomp.launcher.process_title`).
+with commas between them; MODULE:FUNCTION also calls a function. What fails is left to the node, which reports the error. PADDING:
+room for the command lines of the nodes (`gravcomp.launcher.process_title`).
 
 A request and an answer are one line of JSON each:
 
@@ -12,8 +12,8 @@ A request and an answer are one line of JSON each:
     {"started": PID}  or  {"failed": TEXT}                                       answer to each request
     {"ended": PID, "code": CODE}                                                 for each node; negative: number of the signal
 
-A node runs the file of its executable, as `ros2 run` does, in a session of its own. The host ends when the launcher closes its end
-of the socket, also by being killed. The kernel then sends SIGINT to the nodes that still run.
+A node runs the file of its executable, as `ros2 run` does, in a session of its own. The host ends when the launcher closes its
+end of the socket, and also when the launcher is killed. The kernel then sends SIGINT to the nodes that still run.
 """
 
 import atexit

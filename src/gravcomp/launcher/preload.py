@@ -4,7 +4,10 @@ from gravcomp.launcher import compilation
 
 
 def call_compiled() -> None:
-    """Call a small compiled function, which loads what every compiled function needs (0.3 s); unless it must be compiled first."""
+    """Call a small compiled function, which loads what every compiled function needs (0.3 s).
+
+    Does nothing when the function is not compiled yet.
+    """
     if compilation.missing(["controller"]):
         return
     import numpy as np

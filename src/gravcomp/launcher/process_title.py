@@ -1,8 +1,8 @@
 """Command line of a forked process as `ps` and /proc show it.
 
-Own code, because the package setproctitle writes one string: programs that read /proc/PID/cmdline then find one argument in place
-of the list. The kernel reads the command line from the process's own memory (proc(5): arg_start and arg_end in /proc/PID/stat), so
-overwriting it there is enough.
+Own code, because the package setproctitle writes one string: programs that read /proc/PID/cmdline then find one argument in
+place of the list. The kernel reads the command line from the process's own memory (proc(5): arg_start and arg_end in
+/proc/PID/stat), so overwriting it there is enough.
 """
 
 import ctypes
