@@ -25,6 +25,14 @@ print(json.dumps(dict(
     value=os.environ.get("VALUE"), files=sorted(os.listdir("/proc/self/fd"), key=int), frozen=__import__("gc").isenabled())))
 """
 WAIT = "import time\nprint('ready', flush=True)\ntime.sleep(60)\n"
+ON_INTERRUPT = """
+import time
+try:
+    print("ready", flush=True)
+    time.sleep(60)
+except KeyboardInterrupt:
+    print("zero")
+"""
 
 
 def until(condition, timeout: float = 20.0):
@@ -122,9 +130,7 @@ def test_the_command_line_and_the_mark_of_a_node_are_visible(shared_host, execut
 
 
 def test_the_nodes_of_a_killed_host_get_sigint_and_are_named(own_host, executable, tmp_path):
-    executable(
-        "import time\ntry:\n    print('ready', flush=True); time.sleep(60)\nexcept KeyboardInterrupt:\n    print('zero')\n"
-    )
+    executable(ON_INTERRUPT)
     with Graph([NodeSpec("tiny", "node")], tmp_path, host=own_host) as graph:
         graph.start()
         process = graph.processes["node"]
@@ -149,6 +155,8 @@ def test_a_graph_starts_watches_and_ends_the_nodes_of_a_host(own_host, executabl
         assert parents == {"first": own_host.pid, "third": os.getpid()}
         assert until(graph.dead) == {"second": "ended with code 2: no bus"}
         graph.start_one(NodeSpec("tiny", "first"))  # once more
+        begin = time.monotonic()
+    assert time.monotonic() - begin < 4.0  # the node that has just begun has got the first signal
     assert {process.why() for process in graph.processes.values()} >= {"ended with code 2: no bus"}
     assert not any(is_alive(process.pid) for process in graph.processes.values()) and not is_alive(own_host.pid)
 

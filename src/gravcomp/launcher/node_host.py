@@ -100,21 +100,26 @@ class _Host:
             output = os.open(request["log"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         except OSError as error:
             return {"failed": str(error)}
+        begun, beginning = os.pipe2(os.O_CLOEXEC)
         try:
             with warnings.catch_warnings():
                 # Python counts the two threads of LTTng, which importing rclpy starts: they sleep until a tracing session begins.
                 warnings.simplefilter("ignore", DeprecationWarning)
                 pid = os.fork()
         except OSError as error:
-            os.close(output)
+            for descriptor in (output, begun, beginning):
+                os.close(descriptor)
             return {"failed": f"no process can be started: {error}"}
         if pid:
             os.close(output)
+            os.close(beginning)
+            os.read(begun, 1)  # until its end is closed: a signal to the node's process group finds it from now on
+            os.close(begun)
             return {"started": pid}
         self._selector.close()
-        for descriptor in (self._connection.detach(), self._signals, self._wakeup):
+        for descriptor in (self._connection.detach(), self._signals, self._wakeup, begun):
             os.close(descriptor)
-        _become(request["start"], output, request["environment"], host)
+        _become(request["start"], output, request["environment"], host, beginning)
 
     def _report_ends(self) -> None:
         with contextlib.suppress(ChildProcessError):
@@ -128,7 +133,7 @@ class _Host:
         self._connection.sendall(json.dumps(answer).encode() + b"\n")
 
 
-def _become(command: list[str], output: int, environment: dict[str, str], host: int) -> NoReturn:
+def _become(command: list[str], output: int, environment: dict[str, str], host: int, beginning: int) -> NoReturn:
     """Turn the forked process into the node, and end with it."""
     code = 1
     try:
@@ -140,6 +145,7 @@ def _become(command: list[str], output: int, environment: dict[str, str], host: 
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        os.close(beginning)
         gc.enable()
         nothing = os.open(os.devnull, os.O_RDONLY)
         for source, target in ((nothing, 0), (output, 1), (output, 2)):
