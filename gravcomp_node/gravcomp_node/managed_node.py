@@ -178,11 +178,16 @@ class ManagedNode(LifecycleNode):
         self._diagnostics.publish(message)
 
 
+_frozen: list[bool] = []  # one entry for each time that this process froze its memory
+
+
 def _freeze_memory() -> None:
     """Exclude existing objects (modules, compiled code, models) from garbage collection.
 
     The first full collection, a few seconds after the start, would block the node for 0.1 to 0.4 s.
     """
-    gc.unfreeze()
+    if _frozen:  # what the node froze before may be garbage now; what its host froze is left alone, the collector would copy it
+        gc.unfreeze()
+    _frozen.append(True)
     gc.collect()
     gc.freeze()

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Group
 
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
 
 # s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
@@ -42,6 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the tour. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    # Before the imports of the command: the host imports for the nodes at the same time.
+    from gravcomp.launcher.host_client import NodeHost
+
+    with NodeHost() as host:
+        return _run(args, host)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.arm.description import expanded, shipped_xacro
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
@@ -64,10 +73,12 @@ def run(args: argparse.Namespace) -> int:
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
-        with builder, Graph([*specs, player], logs, {**domain, **builder.environment}) as processes:
+        with builder, Graph([*specs, player], logs, {**domain, **builder.environment}, host) as processes:
             if args.viewer:
-                show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
+                processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))
             processes.start()
+            if args.viewer:
+                show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             figures = _follow(processes, result)
     output.result(figures, _summary(figures))

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
 
 _SHORTEST = 10.0  # s: a shorter run shows neither sag nor compensation
 _TURNING = 0.2  # rad/s: above the rate of a hand at rest plus the gyroscope's bias
@@ -47,6 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    # Before the imports of the command: the host imports for the nodes at the same time.
+    from gravcomp.launcher.host_client import NodeHost
+
+    with NodeHost() as host:
+        return _run(args, host)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
@@ -90,10 +99,12 @@ def run(args: argparse.Namespace) -> int:
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
-        with builder, Graph(specs, logs, {**domain, **builder.environment}) as processes:
+        with builder, Graph(specs, logs, {**domain, **builder.environment}, host) as processes:
             if not args.headless:
-                address = show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port, **pictured), args.no_open)
+                processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port, **pictured))
             processes.start()
+            if not args.headless:
+                address = show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
             # The last one, because its motion begins with its activation.

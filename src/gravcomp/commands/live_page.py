@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from gravcomp.commands import output
 
 if TYPE_CHECKING:
-    from gravcomp.launcher import Graph, NodeSpec
+    from gravcomp.launcher import Graph
 
 
 def add_page_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,15 +17,14 @@ def add_page_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-open", action="store_true", help="print the address of the page, but open no browser")
 
 
-def show_page(processes: "Graph", viewer: "NodeSpec", no_open: bool) -> str:
-    """Start the node `viewer`, print the address of its page, and open it in a graphical session unless `no_open`.
+def show_page(processes: "Graph", no_open: bool) -> str:
+    """Print the address of the page of the node `viewer`, which has been started; open it in a graphical session.
 
-    Returns the address. Call it before the other nodes are started: while they start, the page needs four times as long.
-    Raises LaunchError, NodeDied, TimeoutError.
+    `no_open`: open no browser. Returns the address. Start the viewer before the other nodes: its imports take longest.
+    Raises NodeDied, TimeoutError.
     """
     from gravcomp.launcher.page_address import wait_for_page
 
-    processes.start_one(viewer)
     address = wait_for_page(processes)
     output.note(f"The live page: {address}")
     if not no_open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):

@@ -10,6 +10,7 @@ from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
 
 # s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
@@ -46,6 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay. Returns 0: played to the end. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    # Before the imports of the command: the host imports for the nodes at the same time.
+    from gravcomp.launcher.host_client import NodeHost
+
+    with NodeHost() as host:
+        return _run(args, host)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.commands.preparation import prepare
     from gravcomp.commands.record import describe
     from gravcomp.config import ConfigError
@@ -76,10 +85,12 @@ def run(args: argparse.Namespace) -> int:
         "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
         wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
-    with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment) as processes:
+    with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment, host) as processes:
         if viewer:
-            show_page(processes, viewer[0], args.no_open)
+            processes.start_one(viewer[0])
         processes.start()
+        if viewer:
+            show_page(processes, args.no_open)
         _follow(processes, replay.name, recording.duration, args.speed)
         time.sleep(_SETTLE)
     figures = {

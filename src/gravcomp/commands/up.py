@@ -3,9 +3,13 @@
 import argparse
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
+
+if TYPE_CHECKING:
+    from gravcomp.launcher.host_client import NodeHost
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the graph until Ctrl-C (exit code 130). Raises ConfigError, LaunchError, NodeDied when a node ends by itself."""
+    # Before the imports of the command: the host imports for the nodes at the same time.
+    from gravcomp.launcher.host_client import NodeHost
+
+    with NodeHost() as host:
+        return _run(args, host)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
@@ -46,11 +58,13 @@ def run(args: argparse.Namespace) -> int:
     specs = graph.loop()
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
-    with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment) as processes:
+    with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:
         if args.viewer:
-            show_page(processes, graph.node("gravcomp_fem", "viewer", port=args.port), args.no_open)
+            processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))
         begin = time.monotonic()
         processes.start()
+        if args.viewer:
+            show_page(processes, args.no_open)
         names = ", ".join(processes.processes)
         bus = f" Bus: {interface} {channel}." if interface or channel else ""
         output.note(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.")

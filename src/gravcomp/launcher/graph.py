@@ -9,9 +9,9 @@ import uuid
 from collections.abc import Callable
 from pathlib import Path
 
+from gravcomp.launcher.host_client import MARK, NodeHost
 from gravcomp.launcher.node_process import NodeProcess, NodeSpec, stop_together
 
-_MARK = "GRAVCOMP_GRAPH"
 _LEFTOVER_PATIENCE = 2.0  # s between SIGTERM and SIGKILL
 
 
@@ -23,17 +23,23 @@ class Graph:
     """The processes of a graph.
 
     specs: nodes in the order of their start. logs: folder for their output, by default a new temporary one. environment:
-    variables added to the processes' environment.
+    variables added to the processes' environment. host: starts the nodes by forking; the graph ends it.
     """
 
-    def __init__(self, specs: list[NodeSpec], logs: Path | None = None, environment: dict[str, str] | None = None):
+    def __init__(
+        self,
+        specs: list[NodeSpec],
+        logs: Path | None = None,
+        environment: dict[str, str] | None = None,
+        host: NodeHost | None = None,
+    ):
         self.specs = specs
         self.logs = Path(logs or tempfile.mkdtemp(prefix="gravcomp-"))
         self.logs.mkdir(parents=True, exist_ok=True)
         self.processes: dict[str, NodeProcess] = {}
-        # Every process of the graph has this mark in its environment, also those that a node starts in a session of their own.
-        self._mark = uuid.uuid4().hex
-        self._environment = {**(environment or {}), _MARK: self._mark}
+        self._host = host
+        self._mark = host.mark if host else uuid.uuid4().hex
+        self._environment = {**(environment or {}), MARK: self._mark}
 
     def __enter__(self) -> "Graph":
         return self
@@ -53,7 +59,7 @@ class Graph:
     def start_one(self, spec: NodeSpec) -> NodeProcess:
         """Start one node, or start it again."""
         log = self.logs / (spec.name.strip("/").replace("/", "_") + ".log")
-        process = NodeProcess(spec, log, self._environment)
+        process = NodeProcess(spec, log, self._environment, self._host)
         self.processes[spec.name] = process
         return process
 
@@ -87,6 +93,8 @@ class Graph:
     def stop(self) -> None:
         """End all nodes in parallel, and the processes that they started."""
         stop_together(list(self.processes.values()))
+        if self._host is not None:
+            self._host.close()
         self._end_leftovers()
 
     def _end_leftovers(self) -> None:
@@ -103,7 +111,7 @@ class Graph:
 
 def _marked(mark: str) -> list[int]:
     """Return the ids of the processes that have the mark in their environment."""
-    needle = f"{_MARK}={mark}".encode()
+    needle = f"{MARK}={mark}".encode()
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:

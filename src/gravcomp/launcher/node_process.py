@@ -1,4 +1,8 @@
-"""One node as a process: its executable is found as `ros2 run` finds it, and its process group is ended with it."""
+"""One node as a process: its executable is found as `ros2 run` finds it, and its process group is ended with it.
+
+A Python executable of this environment is started by a node host, where there is one (`gravcomp.launcher.host_client`), any other
+by `exec`.
+"""
 
 import contextlib
 import ctypes
@@ -11,14 +15,11 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gravcomp.launcher.host_client import NODE_ENVIRONMENT, HostError, NodeHost, is_alive, runs_in_host
+
 # s that a node has to end after SIGINT, then after SIGTERM, before it is killed.
 _PATIENCE = (5.0, 3.0)
 _PR_SET_PDEATHSIG = 1
-_NODE_ENVIRONMENT = {
-    # Memory in huge pages where the kernel offers them. A node that wakes 100 times a second finds cold caches each time; with
-    # small pages the address translation costs a tenth of its CPU time and a fifth of the loop's latency.
-    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1",
-}
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
 ACTIVE_FILE = "GRAVCOMP_ACTIVE_FILE"
@@ -84,31 +85,23 @@ def find_executable(package: str, executable: str) -> str:
 
 
 class NodeProcess:
-    """A running node. log: file of its output; environment: added to that of this process."""
+    """A running node. Raises LaunchError when it cannot be started.
 
-    def __init__(self, spec: NodeSpec, log: Path, environment: dict[str, str] | None = None):
+    log: file of its output; environment: added to that of this process; host: starts it when it can.
+    """
+
+    def __init__(self, spec: NodeSpec, log: Path, environment: dict[str, str] | None = None, host: NodeHost | None = None):
         self.spec = spec
         self.log = log
         self._active = log.with_name(log.name + ".active")
         self._active.unlink(missing_ok=True)
-        with open(log, "ab") as output:
-            self._process = subprocess.Popen(
-                spec.command(),
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                # In a session of its own: Ctrl-C in the terminal reaches the launcher only, which ends the nodes.
-                start_new_session=True,
-                preexec_fn=_die_with_parent,
-                env={
-                    **_NODE_ENVIRONMENT,
-                    **os.environ,
-                    "PYTHONUNBUFFERED": "1",
-                    ACTIVE_FILE: str(self._active),
-                    **(environment or {}),
-                },
-            )
-        self.pid = self._process.pid
+        command, own = spec.command(), {ACTIVE_FILE: str(self._active), **(environment or {})}
+        self._way: _Hosted | _Executed
+        if host is not None and runs_in_host(command[0]):
+            self._way = _Hosted(host, command, log, own)
+        else:
+            self._way = _Executed(command, log, own)
+        self.pid = self._way.pid
 
     @property
     def was_active(self) -> bool:
@@ -118,13 +111,20 @@ class NodeProcess:
     @property
     def exit_code(self) -> int | None:
         """Exit code, or None while the node runs."""
-        return self._process.poll()
+        return self._way.exit_code
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process has ended. Nodes whose host has ended still run for a moment, with an exit code."""
+        return self._way.has_ended
 
     def why(self) -> str:
         """Return why the node ended: exit code or signal, and its error message or last line of output."""
         code = self.exit_code
         if code is None:
             return "running"
+        if reason := self._way.reason:
+            return reason
         how = f"ended with code {code}" if code >= 0 else f"was ended by {signal.Signals(-code).name}"
         last = self._last_words()
         return f"{how}: {last}" if last and code else how
@@ -149,15 +149,70 @@ def stop_together(processes: list[NodeProcess]) -> None:
     """End several nodes in parallel, with their process groups: SIGINT, SIGTERM, SIGKILL."""
     for number, patience in zip((signal.SIGINT, signal.SIGTERM), _PATIENCE):
         for process in processes:
-            if process.exit_code is None:
+            if not process.has_ended:
                 process.signal(number)
         end = time.monotonic() + patience
-        while any(p.exit_code is None for p in processes) and time.monotonic() < end:
+        while not all(p.has_ended for p in processes) and time.monotonic() < end:
             time.sleep(0.02)
     for process in processes:
         # Also when the node has ended: other processes of its group may still run.
         process.signal(signal.SIGKILL)
-        process._process.wait()
+        while not process.has_ended:
+            time.sleep(0.005)
+
+
+class _Executed:
+    """A process of its own, started by `exec`."""
+
+    reason = ""
+
+    def __init__(self, command: list[str], log: Path, environment: dict[str, str]):
+        with open(log, "ab") as output:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                # In a session of its own: Ctrl-C in the terminal reaches the launcher only, which ends the nodes.
+                start_new_session=True,
+                preexec_fn=_die_with_parent,
+                env={**NODE_ENVIRONMENT, **os.environ, "PYTHONUNBUFFERED": "1", **environment},
+            )
+        self.pid = self._process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        return self._process.poll()
+
+    @property
+    def has_ended(self) -> bool:
+        return self._process.poll() is not None
+
+
+class _Hosted:
+    """A process that a node host has forked."""
+
+    def __init__(self, host: NodeHost, command: list[str], log: Path, environment: dict[str, str]):
+        self._host = host
+        try:
+            self.pid = host.start(command, log, environment)
+        except HostError as error:
+            raise LaunchError(str(error)) from error
+
+    @property
+    def exit_code(self) -> int | None:
+        code = self._host.exit_code(self.pid)
+        return -signal.SIGINT if code is None and not self._host.is_running else code
+
+    @property
+    def has_ended(self) -> bool:
+        code = self._host.exit_code(self.pid)
+        return code is not None or (not self._host.is_running and not is_alive(self.pid))
+
+    @property
+    def reason(self) -> str:
+        """Why the node ended, when that is the end of its host."""
+        return self._host.why_ended() if self._host.exit_code(self.pid) is None and not self._host.is_running else ""
 
 
 def _die_with_parent() -> None:

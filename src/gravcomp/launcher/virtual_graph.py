@@ -10,6 +10,7 @@ from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.multicast import private_channel
 from gravcomp.description.hardware import CanInterface
 from gravcomp.launcher import Graph
+from gravcomp.launcher.host_client import NodeHost
 from gravcomp.launcher.page_address import wait_for_page
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
@@ -35,7 +36,7 @@ class RunningGraph:
         self._viewer = robot.node("gravcomp_fem", "viewer") if viewer else None
         self.page = ""
         self._specs = {spec.executable: spec for spec in specs}
-        self._graph = Graph(specs)
+        self._graph = Graph(specs, host=NodeHost())
 
     def __enter__(self) -> "RunningGraph":
         try:
