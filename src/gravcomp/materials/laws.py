@@ -5,8 +5,9 @@ To add a law:
 1. A file in this folder with compiled `stress(constants, e, s, d, tangent)` and `energy(constants, e)`, and the equation and
    its source in the docstring. `constants` are lambda and mu of small strain, then the law's own constants.
 2. Here: an entry in `LAWS`, and a branch in `stress` and in `energy`.
-3. Constants of the law's own: fields of `description.Material`, appended in `MaterialConstants.of`.
-4. The name in `description.Material.law`. `test/test_mechanics.py` checks the derivatives of every law in `LAWS`.
+3. In `description.Material`: the name in the choices of `law`, and a field for each constant of the law's own.
+
+`test/test_mechanics.py` checks the derivatives of every law in `LAWS`.
 """
 
 from typing import NamedTuple
@@ -23,12 +24,13 @@ class Law(NamedTuple):
 
     code: its number in compiled functions; quadratic: whether the stress is linear in Green's strain, so that the body can be
     reduced to polynomials of the strain; softening_strain: Green's strain of a compressed fibre below which the force on it
-    falls, None: nowhere.
+    falls, None: nowhere; own_constants: names of the fields of `description.Material` that are the law's own constants.
     """
 
     code: int
     quadratic: bool = False
     softening_strain: float | None = None
+    own_constants: tuple[str, ...] = ()
 
 
 LAWS = {

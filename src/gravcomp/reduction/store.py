@@ -52,8 +52,10 @@ def why_not(model: RobotModel) -> str:
     """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
     if not isinstance(model.elements, SolidElements):
         return "corotational tetrahedra have no polynomial strain: the full model is used"
-    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
-        return "the reduction needs the St. Venant-Kirchhoff law (law: svk); for neo-Hookean bodies the full model is used"
+    others = sorted({material.law for material in model.mesh.materials if not LAWS[material.law].quadratic})
+    if others:
+        allowed = " or ".join(name for name, law in LAWS.items() if law.quadratic)
+        return f"the reduction needs the law {allowed}, linear in Green's strain; for {', '.join(others)} the full model is used"
     if model.tendons.friction.any():
         return "cables with friction depend on their past motion: the full model is used"
     return ""
