@@ -6,8 +6,7 @@ t_k = e_k / l_k, its displacement (positive: pulled in), its force and its stiff
     delta = sum_k (L_k - l_k),    H_a = d(delta)/dx_a = -sum_k d_ka t_k,    force = H^T lambda,
     K_ab  = lambda sum_k d_ka d_kb (I - t_k t_k^T) / l_k.
 
-With capstan friction the tension changes along the path, lambda_k = lambda exp(-+ mu theta_k), where theta_k is the sum of the
-angles up to piece k (Euler and Eytelwein): minus while the cable is pulled in, plus while it is paid out.
+With friction the tension changes along the path: lambda_k is the share of `friction` times lambda.
 """
 
 import dataclasses
@@ -15,6 +14,7 @@ import dataclasses
 import numpy as np
 from numba import njit
 
+from gravcomp.cables.friction import Friction
 from gravcomp.description import Cable
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
 from gravcomp.mesh.embedding import Embedding
@@ -42,7 +42,7 @@ class Tendons:
 
     def __init__(self, cables: tuple[Cable, ...], routes: list[Embedding], rest: np.ndarray, pattern: BlockPattern):
         self.count = len(cables)
-        self.friction = np.array([c.friction for c in cables])
+        self.friction = Friction(cables)
         self._n_free = pattern.n // 3
         pieces = [piece for route in routes for piece in pieces_of(route)]
         self._cable = np.repeat(np.arange(self.count), [len(r.nodes) - 1 for r in routes]).astype(np.int64)
@@ -72,8 +72,8 @@ class Tendons:
         path = np.zeros(self.count)
         _tendons(x, self._cable, self._first, self._nodes, self._weights, self._n_free, length, tangent, jacobian, path)
         share, force_jacobian = np.ones(count), jacobian
-        if pulling is not None and np.any(self.friction * pulling):
-            share = self._shares(tangent, self.friction * pulling)
+        if pulling is not None and self.friction.acts(pulling):
+            share = self.friction.shares(self._cable, tangent, pulling)
             force_jacobian = np.zeros_like(jacobian)
             _force_jacobian(self._cable, self._first, self._nodes, self._weights, self._n_free, tangent, share, force_jacobian)
         return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share)
@@ -84,15 +84,6 @@ class Tendons:
             self._cable, self._first, self._weights, state.tangent, state.length, state.share, tension, self._position,
             matrix.values,
         )  # fmt: skip
-
-    def _shares(self, tangent: np.ndarray, friction: np.ndarray) -> np.ndarray:
-        """Return (s,) the tension in every piece over the tension of its cable; friction (m,) with its sign."""
-        same = self._cable[1:] == self._cable[:-1]
-        cosine = np.clip((tangent[1:] * tangent[:-1]).sum(axis=1), -1.0, 1.0)
-        turn = np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)])
-        turned = np.cumsum(turn)
-        first = np.searchsorted(self._cable, np.arange(self.count))
-        return np.exp(-friction[self._cable] * (turned - turned[first][self._cable]))
 
     def _scatter_positions(self, pieces: list, pattern: BlockPattern) -> np.ndarray:
         """Return the positions of the 3 x 3 entries of each pair of nodes a >= b; -1 if clamped or mirrored."""
