@@ -220,7 +220,9 @@ def test_a_stretched_bar_pulls_as_the_published_formula_says(law, shape):
     assert nominal(low)[0] == pytest.approx(expected, rel=5e-3)
 
 
-@pytest.mark.parametrize(("law", "shape", "found"), [("yeoh", {"c20_ratio": -0.5}, "c20_ratio: -0.5"), ("yeoh", {"c30_ratio": -0.2}, "falls")])
+@pytest.mark.parametrize(
+    ("law", "shape", "found"), [("yeoh", {"c20_ratio": -0.5}, "c20_ratio: -0.5"), ("yeoh", {"c30_ratio": -0.2}, "falls")]
+)
 def test_unstable_constants_are_refused(law, shape, found):
     mesh = patch("hex20", law)[0]
     with pytest.raises(MeshError, match=found):
