@@ -24,8 +24,8 @@ class Law(NamedTuple):
     """Properties of a law.
 
     code: its number in compiled functions; quadratic: whether the stress is linear in Green's strain, so that polynomials of
-    the strain are the whole reduced elasticity; softening_strain: Green's strain of a compressed fibre below which the force on it
-    falls, None: nowhere; own_constants: names of the fields of `description.Material` that are the law's own constants.
+    the strain are the whole reduced elasticity; softening_strain: Green's strain of a compressed fibre below which the force on
+    it falls, None: nowhere; own_constants: names of the fields of `description.Material` that are the law's own constants.
     """
 
     code: int

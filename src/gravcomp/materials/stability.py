@@ -1,8 +1,8 @@
 """Check that a law with given constants is stable in the range of use: no bar or sheet of it pulls less when stretched more.
 
-An incompressible block is stretched by l along one axis; the others follow as in a bar (l, l^(-1/2)), a wide strip (l, 1, 1/l) and
-a sheet stretched both ways (l, l, l^-2). The force along l is dW/dl (Ogden, Non-Linear Elastic Deformations, 1984, section 7.2);
-it must rise with l.
+An incompressible block is stretched by l along one axis; the others follow as in a bar (l, l^(-1/2)), a wide strip (l, 1, 1/l)
+and a sheet stretched both ways (l, l, l^-2). The force along l is dW/dl (Ogden, Non-Linear Elastic Deformations, 1984, section
+7.2); it must rise with l.
 """
 
 import numpy as np

@@ -56,7 +56,10 @@ def elastic_force(point: Point, stress: np.ndarray) -> np.ndarray:
 
 @njit(cache=True)
 def elastic_stiffness(body: Body, point: Point, stress: np.ndarray, scale: float) -> np.ndarray:
-    """Return the lower triangle of the stiffness (r, r); stress (k,) as in `elastic_force`, scale: its derivative by the strain."""
+    """Return the lower triangle of the stiffness (r, r).
+
+    stress (k,): as in `elastic_force`; scale: its derivative by the strain.
+    """
     stiffness = tangent(point.jacobian, body.quadratic, stress, scale)
     add_deviation_stiffness(body.deviation, point.deviation, stiffness)
     return stiffness

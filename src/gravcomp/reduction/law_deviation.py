@@ -27,8 +27,8 @@ class LawDeviation(NamedTuple):
     """The points of a reduced model at which the law is evaluated.
 
     gradient G^T (r, 9 p), component by component of H = du/dX (row by row) and therein point by point; weight (p,) in m^3; law
-    (p,) and constants (p, c) of `MaterialConstants`. G is in single precision, because reading it takes most of the time; force and
-    stiffness are still derivatives of one energy.
+    (p,) and constants (p, c) of `MaterialConstants`. G is in single precision, because reading it takes most of the time; the
+    force is still the exact derivative of an energy, and the stiffness is that of the force to 1e-6.
     """
 
     gradient: np.ndarray

@@ -26,8 +26,8 @@ _FORMAT = 8
 class Reduction:
     """Stored result of the training.
 
-    basis (3 n_free, r), elasticity and the cubature of the law's deviation at the Young's modulus `modulus` of the first material in Pa; reach: largest |q| to use
-    it for; modulus_low and modulus_high: trained range in Pa; samples: number of trained shapes; error_median and error_worst:
+    basis (3 n_free, r), elasticity and the cubature of the law's deviation at the Young's modulus `modulus` of the first material
+    in Pa; reach: largest |q| to use it for; modulus_low and modulus_high: trained range in Pa; samples: number of trained shapes; error_median and error_worst:
     tip error in m over shapes that were not trained.
     """
 
@@ -97,11 +97,14 @@ def load(model: RobotModel) -> Reduction | None:
     if why_not(model) or not path.exists():
         return None
     with np.load(path) as stored:
-        values = {name: stored[name].item() if stored[name].ndim == 0 else stored[name] for name in stored.files}
-    parts = {}
-    for name, kind in (("elasticity", StrainPolynomials), ("cubature", Cubature)):
-        own = [key for key in values if key.startswith(f"{name}_")]
-        parts[name] = kind(**{key.removeprefix(f"{name}_"): values.pop(key) for key in own})
-    reduction = Reduction(**parts, **values)
+        values: dict[str, Any] = {name: stored[name].item() if stored[name].ndim == 0 else stored[name] for name in stored.files}
+    reduction = Reduction(
+        elasticity=StrainPolynomials(**_taken(values, "elasticity_")), cubature=Cubature(**_taken(values, "cubature_")), **values
+    )
     covered = reduction.modulus_low * (1 - 1e-9) <= first_modulus(model) <= reduction.modulus_high * (1 + 1e-9)
     return reduction if covered else None
+
+
+def _taken(values: dict[str, Any], prefix: str) -> dict[str, Any]:
+    """Remove the values whose names begin with `prefix`, and return them without it."""
+    return {key.removeprefix(prefix): values.pop(key) for key in list(values) if key.startswith(prefix)}

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gravcomp.cache import content_key
 from gravcomp.cables.friction import Sliding
+from gravcomp.cache import content_key
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
