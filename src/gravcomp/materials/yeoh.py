@@ -1,8 +1,9 @@
 """Yeoh's law, W = c10 x + c20 x^2 + c30 x^3 + kappa/2 (J - 1)^2 with x = I1 J^(-2/3) - 3.
 
-O. H. Yeoh, Rubber Chemistry and Technology 66, 1993. 2 c10 = mu, the shear modulus of small strain; c20 / c10 and c30 / c10 are the law's own constants `c20_ratio` and `c30_ratio`.
-Published constants are therefore given as youngs_modulus = 4 (1 + nu) c10 and the two ratios. The default, 0.18 and 0, is that of
-the silicone Elastosil M4601 (c10 = 0.11 MPa, c20 = 0.02 MPa: P. Polygerinos et al., IEEE Trans. Robotics 31, 2015).
+O. H. Yeoh, Rubber Chemistry and Technology 66, 1993. 2 c10 = mu, the shear modulus of small strain; c20 / c10 and c30 / c10
+are the law's own constants `c20_ratio` and `c30_ratio`. Published constants are therefore given as youngs_modulus = 4 (1 +
+nu) c10 and the two ratios. The default, 0.18 and 0, is that of the silicone Elastosil M4601 (c10 = 0.11 MPa, c20 = 0.02 MPa:
+P. Polygerinos et al., IEEE Trans. Robotics 31, 2015).
 """
 
 import numpy as np

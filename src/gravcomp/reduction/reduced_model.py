@@ -1,7 +1,8 @@
 """A robot's model projected on a reduced basis, u = Phi q with r coordinates q.
 
 The elastic forces are polynomials in q (`strain_polynomials`), and what another law than "svk" adds (`law_deviation`). The
-weight, the straight pieces of the cables and the cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(0) + D_k q, sections(q) = sections(0) + S q.
+weight, the straight pieces of the cables and the cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) =
+e_k(0) + D_k q, sections(q) = sections(0) + S q.
 """
 
 import math
@@ -25,10 +26,10 @@ from gravcomp.rounding import REORDERED
 class ReducedModel:
     """A model in r reduced coordinates.
 
-    basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g for nodal forces
-    f with the reduced force g; elasticity, and the law's deviation from it; weight (r, 3): force of unit gravity; cables;
-    section_rest (n + 1, 3, 3) and section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| for which the model may be
-    used; error: largest tip error in m that was found when it was built.
+    basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g for nodal
+    forces f with the reduced force g; elasticity, and the law's deviation from it; weight (r, 3): force of unit gravity;
+    cables; section_rest (n + 1, 3, 3) and section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach:
+    the largest |q| for which the model may be used; error: largest tip error in m that was found when it was built.
     """
 
     basis: np.ndarray

@@ -13,7 +13,8 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.full_model.model import RobotModel
-from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.materials.laws import LAWS
+from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.reduction.cubature import Cubature
 from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
@@ -26,9 +27,9 @@ _FORMAT = 8
 class Reduction:
     """Stored result of the training.
 
-    basis (3 n_free, r), elasticity and the cubature of the law's deviation at the Young's modulus `modulus` of the first material
-    in Pa; reach: largest |q| to use it for; modulus_low and modulus_high: trained range in Pa; samples: number of trained shapes; error_median and error_worst:
-    tip error in m over shapes that were not trained.
+    basis (3 n_free, r), elasticity and the cubature of the law's deviation at the Young's modulus `modulus` of the first
+    material in Pa; reach: largest |q| to use it for; modulus_low and modulus_high: trained range in Pa; samples: number of
+    trained shapes; error_median and error_worst: tip error in m over shapes that were not trained.
     """
 
     basis: np.ndarray
@@ -52,7 +53,7 @@ class Reduction:
 
 def why_not(model: RobotModel) -> str:
     """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
-    if not isinstance(model.elements, SolidElements):
+    if isinstance(model.elements, CorotationalElements):
         return "corotational tetrahedra have no polynomial strain: the full model is used"
     return ""
 
@@ -69,6 +70,9 @@ def path_of(model: RobotModel) -> Path:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
         for viscous in ("damping_time", "creep_ratio", "creep_time"):
             del material[viscous]
+        for law in LAWS.values():  # a constant counts only for the law that has it
+            for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):
+                material.pop(name, None)
     mesh, robot = model.mesh, model.robot
     cables = [dataclasses.asdict(cable) for cable in robot.cables]
     for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
