@@ -14,7 +14,8 @@ from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.cubature import Cubature, choose
 from gravcomp.reduction.law_deviation import add_deviation_stiffness, deviation_at
-from gravcomp.reduction.reduced_model import section_changes
+from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
+from gravcomp.reduction.reduced_model import project, section_changes
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 from gravcomp.training import BuildOptions, TrainingOptions, build
@@ -223,16 +224,16 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
     _, _, basis, _ = modes
     coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
     sections = section_changes(model, basis)[:, 0] / model.length
-    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance) for tolerance in (1e-5, 1e-7))
+    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance) for tolerance in (1e-3, 3e-5))
     assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
-    assert (fine.weight > 0.0).all() and fine.error <= 1e-7 < rough.error <= 1e-5
+    assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
     few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
     for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
         assert deviation_at(few, q).force == pytest.approx(deviation_at(every, q).force, abs=0.05 * largest)
 
 
 def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(robot, cache):
-    cables = tuple(dataclasses.replace(cable, friction=0.2) for cable in robot.cables)
+    cables = tuple(dataclasses.replace(cable, friction=0.5) for cable in robot.cables)
     model = RobotModel(dataclasses.replace(robot, cables=cables).with_material(law="yeoh"))
     with alone(model):
         reduction = load(model) or build(model, SMALL)[0]
@@ -251,7 +252,27 @@ def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(ro
         served += shape.model == "reduced"
     assert served > 60
     assert shape.cable_tension == pytest.approx(exact.cable_tension, abs=0.01 * exact.cable_tension.max())
-    print(max(apart))
+    assert max(apart) > 0.05e-3  # what friction changes
+
+
+def test_reduced_cables_with_friction_are_the_full_models(robot, modes):
+    _, _, basis, shapes = modes
+    cables = tuple(dataclasses.replace(cable, friction=0.5) for cable in robot.cables)
+    model = RobotModel(dataclasses.replace(robot, cables=cables))
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=2)
+    reduced = project(model, basis, polynomials, Cubature.none(), reach=1.0, error=0.0)
+    q, pulling, tension = np.array([0.3, -0.2, 0.1]), np.array([1.0, -1.0, 0.0, 1.0, 1.0, -1.0]), np.linspace(0.5, 2.0, 6)
+    u = np.zeros_like(model.mesh.nodes)
+    model.free(u)[:] = basis @ q
+    own, exact = tendons_at(reduced.cables, q, pulling), model.tendons.state(model.mesh.nodes + u, pulling)
+    assert exact.share.min() < 0.98 and exact.share.max() > 1.02
+    assert own.share == pytest.approx(exact.share, rel=1e-9)
+    assert own.jacobian == pytest.approx(exact.jacobian @ basis, abs=1e-12)
+    assert own.force_jacobian == pytest.approx(exact.force_jacobian @ basis, abs=1e-12)
+    matrix, stiffness = model.new_matrix(), np.zeros((3, 3))
+    model.tendons.add_stiffness(exact, tension, matrix)
+    add_stiffness(reduced.cables, own, tension, stiffness)
+    assert np.tril(stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("damping", ["kelvin_voigt", "rayleigh"])
