@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gravcomp.arm.chain import STANDARD_GRAVITY, Chain, angle_between
+from gravcomp.arm.chain import Chain, angle_between
 from gravcomp.arm.description import expanded
 from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 URDF = Path(__file__).resolve().parents[2] / "gravcomp_fem" / "urdf"
 

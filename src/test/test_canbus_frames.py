@@ -8,8 +8,9 @@ import can
 import cantools
 import pytest
 
-from gravcomp.canbus import codec
-from gravcomp.canbus.bmi088 import accelerometer_scale, gyroscope_scale
+from gravcomp.canbus import c610, codec
+from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
+from gravcomp.description.hardware import MOTOR_IDS
 
 DBC = resources.files("gravcomp.canbus").joinpath("gravcomp.dbc").read_text()
 DATABASE = cantools.database.load_string(DBC, "dbc")
@@ -80,3 +81,13 @@ def test_every_frame_of_the_dbc_is_documented():
         if message.name.startswith("Motor"):
             continue  # the page lists the C610's frames as ranges of ids
         assert f"0x{message.frame_id:X}" in page and f"`{message.name}`" in page
+
+
+def test_the_ids_of_the_motor_frames_are_those_of_the_dbc():
+    assert [codec.layout(name).frame_id for name in c610.COMMANDS] == list(c610.COMMAND_IDS)
+    assert [codec.layout(name).frame_id for name in c610.FEEDBACKS] == [c610.feedback_id(can_id) for can_id in MOTOR_IDS]
+    for name, ids in c610.COMMANDS.items():
+        sent = dict.fromkeys(ids, c610.LARGEST_CURRENT)
+        assert c610.currents_of(*codec.decode(c610.command(name, sent))) == sent
+    step = codec.decode(c610.command("MotorCommand1to4", {1: 1 / c610.COUNTS_PER_AMPERE})).values
+    assert step.current_1 == codec.layout("MotorCommand1to4").signals[0].scale

@@ -14,10 +14,8 @@ from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import Mesh, MeshError, tube_mesh
-from gravcomp.mesh.elements import reference_nodes, shape_gradients, shape_values
+from gravcomp.mesh.elements import KINDS, constant_strain, is_hexahedron, reference_nodes, shape_gradients, shape_values
 from gravcomp.mesh.quadratic import raised_to_quadratic
-
-KINDS = ("hex20", "tet10", "tet4")
 
 
 def tube(law="svk", **elements) -> Robot:
@@ -29,7 +27,7 @@ def elements_of(kind: str, law: str = "svk"):
     mesh = tube_mesh(tube(law, around=4, along=2), kind)
     order, pattern = order_in_levels([mesh.elements], len(mesh.nodes), mesh.clamped)
     mesh = mesh.renumbered(order)
-    return (CorotationalElements if kind == "tet4" else SolidElements)(mesh, pattern), pattern
+    return (CorotationalElements if constant_strain(kind) else SolidElements)(mesh, pattern), pattern
 
 
 def some_displacements(mesh: Mesh, size: float = 2e-3) -> np.ndarray:
@@ -103,7 +101,7 @@ def test_patch(kind, law):
     mesh, inner = patch(kind, law)
     order, pattern = order_in_levels([mesh.elements], len(mesh.nodes), mesh.clamped)
     mesh, inner = mesh.renumbered(order), np.isin(order, inner)
-    elements = (CorotationalElements if kind == "tet4" else SolidElements)(mesh, pattern)
+    elements = (CorotationalElements if constant_strain(kind) else SolidElements)(mesh, pattern)
     gradient = np.array([[0.05, 0.08, -0.02], [0.01, -0.04, 0.03], [0.06, 0.02, 0.07]])
     force = elements.internal_force(mesh.nodes @ gradient.T)
     assert np.abs(force[inner]).max() < 1e-10 * np.abs(force).max()
@@ -118,12 +116,12 @@ def patch(kind: str, law: str) -> tuple[Mesh, np.ndarray]:
         [index[i + a, j + b, k + c] for c in (0, 1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
         for i in (0, 1) for j in (0, 1) for k in (0, 1)
     ]  # fmt: skip
-    if kind == "hex20":
-        local = reference_nodes("hex20")
+    if is_hexahedron(kind):
+        local = reference_nodes(kind)
         weights = np.prod(1 + local[:, None, :] * local[None, :8, :], axis=-1) / 8  # trilinear: the sides stay straight
         points = np.concatenate([weights @ moved[cell] for cell in cells])
         nodes, elements = np.unique(points.round(12), axis=0, return_inverse=True)
-        elements = elements.reshape(8, 20)
+        elements = elements.reshape(8, len(local))
     else:
         tets = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
         nodes, elements = moved, np.array([[cell[i] for i in tet] for cell in cells for tet in tets])

@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY, accelerometer_scale, gyroscope_scale
 from gravcomp.canbus.codec import decode
+from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.virtual.board import VirtualBoard
 from gravcomp.virtual.parameters import Board

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from virtual_article import article, virtual_robot, with_body
 
-from gravcomp.canbus.bmi088 import gyroscope_scale
 from gravcomp.canbus.codec import decode, encode
+from gravcomp.canbus.imu_scales import gyroscope_scale
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description.robot_file import load_robot_file
 from gravcomp.virtual.faults import KINDS, Fault

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gravcomp.config import ConfigError
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
-STANDARD_GRAVITY = 9.80665  # m/s^2
 _MOVING = ("revolute", "continuous", "prismatic")
 
 

@@ -4,10 +4,9 @@ import threading
 import time
 
 from gravcomp.canbus import codec
+from gravcomp.canbus.c610 import COMMAND_IDS
 from gravcomp.canbus.link import CanLink
 from gravcomp.launcher.virtual_graph import RunningGraph
-
-_CURRENT_IDS = (0x200, 0x1FF)
 
 
 class CurrentMonitor:
@@ -21,9 +20,9 @@ class CurrentMonitor:
         self.frames = self.violations = self.traces = 0
         self.largest = self.last_sample = 0.0
         self._trace_id, self._imu_id = (codec.layout(name).frame_id for name in ("CommandTrace", "ImuTime"))
-        self.link = CanLink(graph.can, [*_CURRENT_IDS, self._trace_id, self._imu_id])
+        self.link = CanLink(graph.can, [*COMMAND_IDS, self._trace_id, self._imu_id])
         self._limit = limit
-        self._zero = dict.fromkeys(_CURRENT_IDS, True)
+        self._zero = dict.fromkeys(COMMAND_IDS, True)
         self._changes: list[tuple[float, bool]] = []  # host time from which on all currents are zero, or are not
         self._last_trace = 0.0
         self._ending = threading.Event()

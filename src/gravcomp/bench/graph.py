@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.canbus import codec
+from gravcomp.canbus import c610, codec
 from gravcomp.canbus.link import CanLink
 from gravcomp.evaluation.bus_delay import delays_of
 from gravcomp.launcher.virtual_graph import NODES, RunningGraph
@@ -60,7 +60,7 @@ def _shares(graph: RunningGraph, duration: float) -> dict[str, float]:
 
 
 def _delays(graph: RunningGraph, duration: float) -> list[float]:
-    ids = [codec.layout(name).frame_id for name in ("ImuTime", "CommandTrace", "MotorCommand1to4", "MotorCommand5to8")]
+    ids = [codec.layout(name).frame_id for name in ("ImuTime", "CommandTrace", *c610.COMMANDS)]
     link, frames, end = CanLink(graph.can, ids), [], time.monotonic() + duration
     link.open()
     while time.monotonic() < end:

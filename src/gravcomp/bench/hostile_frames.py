@@ -7,12 +7,13 @@ import time
 import can
 
 from gravcomp.canbus import codec
+from gravcomp.canbus.c610 import COMMAND_IDS
 from gravcomp.canbus.imu_stream import IMU_FRAMES
 from gravcomp.canbus.link import CanLink
 from gravcomp.motors.driver import RECEIVED_FRAMES
 
 _BURST, _BURST_PAUSE = 40, 0.005  # frames, s: about 8,000 frames per second, three times the regular traffic
-_OTHER_IDS = tuple(i for i in range(0x7FF) if i not in (0x200, 0x1FF))
+_OTHER_IDS = tuple(i for i in range(0x7FF) if i not in COMMAND_IDS)
 
 
 def send_hostile_frames(link: CanLink, chance: random.Random, count: int) -> None:

@@ -1,7 +1,8 @@
 """The first and the second start in a new clone with empty caches, the start of the nodes, sizes and command times.
 
 The clone, its home folder and its caches are temporary. A client of the page's WebSocket sees what a browser would receive: the
-first rate of the model stands for the moving page, the first delay from IMU to command for the closed loop.
+first tension of a cable, which comes with the first shape, stands for the moving page, the first delay from IMU to command for
+the closed loop.
 """
 
 import os
@@ -28,16 +29,17 @@ _OURS = (
 )  # fmt: skip
 _DOWNLOADED = re.compile(r"downloaded \d+ packages? in (?:(\d+)m )?([\d.]+)(ms|s)")
 _ACTIVE = re.compile(r"All nodes are active after ([\d.]+) s")
-_MOVING = re.compile(rb">\d+ Hz</div><div[^>]*>rate of the model")
+_MOVING = re.compile(rb"border-radius:\.3em;width:\d")  # the bar of a cable's tension, from the first shape on
 _CLOSED = re.compile(rb">[\d.]+ ms</div><div[^>]*>IMU to command")
 
 
 def run(progress: Callable[[str], None], *, tests: bool = False) -> dict:
     """Return the figures of the start.
 
-    first_page_s: from the clone to the moving page, without the downloads (download_s); later_page_s and later_loop_s: the second
-    start until the page moves and until the loop is closed; nodes_active_s: from `up --virtual` starting its nodes until all are
-    active, with warm caches; venv_mb: size of .venv; command_ms: start of two commands; test_s, test_fast_s: with `tests`.
+    first_page_s: from the clone to the moving page, without the downloads (download_s). later_page_s and later_loop_s: the second
+    start until the page moves and until the loop is closed. nodes_active_s: from `up --virtual` starting its nodes until all are
+    active, with warm caches. venv_mb: size of .venv as `du -sm` prints it. command_ms: start of two commands. test_s,
+    test_fast_s: None without `tests`.
     """
     root = Path(os.environ["GRAVCOMP_ROOT"])
     with tempfile.TemporaryDirectory(prefix="gravcomp-start-") as scratch:
@@ -62,7 +64,7 @@ def run(progress: Callable[[str], None], *, tests: bool = False) -> dict:
             "later_page_s": round(later["page"], 2),
             "later_loop_s": round(later["loop"], 2),
             "nodes_active_s": round(active, 2),
-            "venv_mb": round(_size(clone / ".venv") / 1e6),
+            "venv_mb": round(_size(clone / ".venv") / 2**20),
             "command_ms": {
                 "version": round(1e3 * _command_time(clone, environment, "--version")),
                 "model_help": round(1e3 * _command_time(clone, environment, "model", "--help")),
@@ -98,19 +100,19 @@ def _demo(clone: Path, environment: dict[str, str], begin: float, patience: floa
         process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
     times: dict[str, float] = {}
     try:
-        while time.monotonic() < begin + patience and process.poll() is None and "loop" not in times:
+        while time.monotonic() < begin + patience and process.poll() is None and len(times) < 2:
             for message in _messages(port):
                 for name, pattern in (("page", _MOVING), ("loop", _CLOSED)):
                     if name not in times and pattern.search(message):
                         times[name] = time.monotonic() - begin
-                if "loop" in times:
+                if len(times) == 2:
                     break
             time.sleep(0.05)
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60.0)
     text = log.read_text(errors="replace")
-    if "loop" not in times:
+    if len(times) < 2:
         raise TimeoutError(f"the demo's loop was not closed within {patience:.0f} s; its last lines:\n{text[-1000:]}")
     return times, text
 

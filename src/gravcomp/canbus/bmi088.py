@@ -5,19 +5,13 @@ specific force [m/s^2] = counts / (LSB per g) x 9.80665        angular rate [rad
 
 import math
 
-STANDARD_GRAVITY = 9.80665
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
-ACCELEROMETER_RANGE_G = (3, 6, 12, 24)
-_LSB_PER_G = (10920.0, 5460.0, 2730.0, 1365.0)
+_LSB_PER_G = {0: 10920.0, 1: 5460.0, 2: 2730.0, 3: 1365.0}  # 3, 6, 12, 24 g
+_RANGE_DEG_S = {0: 2000, 1: 1000, 2: 500, 3: 250, 4: 125}
 
-GYROSCOPE_RANGE_DEG_S = (2000, 1000, 500, 250, 125)
+ACCELEROMETER_SCALES = {code: STANDARD_GRAVITY / counts for code, counts in _LSB_PER_G.items()}
+"""m/s^2 per count by range code."""
 
-
-def accelerometer_scale(code: int) -> float:
-    """Return m/s^2 per count for the range code 0 to 3."""
-    return STANDARD_GRAVITY / _LSB_PER_G[code]
-
-
-def gyroscope_scale(code: int) -> float:
-    """Return rad/s per count for the range code 0 to 4."""
-    return math.radians(GYROSCOPE_RANGE_DEG_S[code]) / 32767.0
+GYROSCOPE_SCALES = {code: math.radians(full) / 32767.0 for code, full in _RANGE_DEG_S.items()}
+"""rad/s per count by range code."""

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import can
 
 from gravcomp.canbus import codec
-from gravcomp.canbus.bmi088 import accelerometer_scale, gyroscope_scale
+from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale, known_ranges
 
 DRIFT = 2e-4
 """Growth of the offset, s/s: more than the difference of two crystals (2 x 50 ppm); 2 us per sample."""
@@ -143,7 +143,7 @@ class ImuStream:
             self.counters.rejected += 1
             return None
         if name == "BoardStatus":
-            if values.accelerometer_range <= 3 and values.gyroscope_range <= 4:
+            if known_ranges(values.accelerometer_range, values.gyroscope_range):
                 self.status = values
             return None
         self._parts[name] = values

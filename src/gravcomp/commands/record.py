@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     parameters = {"out": str(out), **({"topics": args.topics} if args.topics else {})}
     spec = NodeSpec("gravcomp_fem", "recorder", parameters, args.namespace)
     # In a session of its own: Ctrl-C reaches this process only, which passes it on once.
-    recorder = subprocess.Popen(spec.command(), start_new_session=True, stdout=subprocess.DEVNULL if args.quiet else sys.stderr)
+    quiet = ["--ros-args", "--log-level", "warn"] if args.quiet else []
+    recorder = subprocess.Popen([*spec.command(), *quiet], start_new_session=True, stdout=sys.stderr)
     try:
         _wait(recorder, out, args.duration)
     finally:

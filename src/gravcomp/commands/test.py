@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run pytest. Returns its exit code."""
+    """Run pytest. Returns 0: all tests passed, 1: a test failed, 2: wrong use, or no test found."""
     from gravcomp.environment.packages import provide_extra
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
@@ -46,15 +46,20 @@ def run(args: argparse.Namespace) -> int:
         how += ["-n", str(_WORKERS), "--dist", "loadscope"]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
     if not args.json:
-        return subprocess.run(command, cwd=root).returncode
+        return _exit_code(subprocess.run(command, cwd=root).returncode)
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         report = Path(scratch) / "report.xml"
         code = subprocess.run(
             [*command, f"--junitxml={report}"], cwd=root, stdout=subprocess.DEVNULL if args.quiet else sys.stderr
         ).returncode
-        figures = {"exit_code": code, **_counts(report)}
+        figures = {"passed": code == 0, **_counts(report)}
     output.result(figures, f"{figures['tests']} tests, {figures['failures'] + figures['errors']} failed")
-    return code
+    return _exit_code(code)
+
+
+def _exit_code(pytest_code: int) -> int:
+    """Convert an exit code of pytest: 1 when a test failed or could not run, 2 for wrong use or when no test is found."""
+    return {0: 0, 4: 2, 5: 2}.get(pytest_code, 1)
 
 
 def _counts(report: Path) -> dict[str, int]:

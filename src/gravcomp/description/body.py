@@ -68,7 +68,7 @@ class Segment:
 
 @dataclasses.dataclass(frozen=True)
 class MeshBody:
-    """A body from a file: a closed surface (.stl, .ply, .obj), which is meshed, or a volume mesh (.msh, .vtk, .vtu)."""
+    """A body from a file: a closed surface, which is meshed, or a volume mesh; `mesh.body` reads the formats."""
 
     file: str = parameter(description="path of the mesh, relative to the robot file")
     length: float = parameter(

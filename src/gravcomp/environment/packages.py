@@ -32,6 +32,7 @@ _SUFFICES = {"browser": "playwright", "reports": "matplotlib"}
 """Modules whose presence makes an extra superfluous."""
 
 
+_TESTED_LIBRARIES = ("numpy", "scipy", "numba")
 _SMALLEST_LINKED = 50_000  # bytes
 
 
@@ -52,6 +53,7 @@ def build(root: Path, python: Interpreter) -> Path:
     if not python.ros:
         install(root, inner, root / BUILD_LOCK, "Build tools", target=tools_folder(root))
         _repair_cmake_paths(venv, inner)
+        _remove_tests(venv)
         _link_equal_files(venv)
     return inner
 
@@ -117,6 +119,14 @@ def _repair_cmake_paths(venv: Path, inner: Path) -> None:
         replacement = path.with_suffix(".repaired")
         replacement.write_text(text, errors="surrogateescape")
         os.replace(replacement, path)
+
+
+def _remove_tests(venv: Path) -> None:
+    """Remove the tests of the large libraries, which nothing imports."""
+    for library in _TESTED_LIBRARIES:
+        for folder in venv.glob(f"lib/python3.*/site-packages/{library}"):
+            for tests in [path for path in folder.rglob("tests") if path.is_dir()]:
+                shutil.rmtree(tests, ignore_errors=True)
 
 
 def _link_equal_files(venv: Path) -> None:

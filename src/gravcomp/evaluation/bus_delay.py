@@ -9,7 +9,7 @@ import threading
 
 import can
 
-from gravcomp.canbus import codec
+from gravcomp.canbus import c610, codec
 from gravcomp.canbus.bus import BusError, open_bus
 from gravcomp.description.hardware import CanInterface
 
@@ -24,7 +24,7 @@ class DelayListener:
         self.delays: list[float] = []
         self.failure: str | None = None
         self._settings = settings
-        self._ids = [codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id, 0x200, 0x1FF]
+        self._ids = [codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id, *c610.COMMAND_IDS]
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bus delay", daemon=True)
 
@@ -61,7 +61,7 @@ def delays_of(frames: list[can.Message]) -> list[float]:
     last_current: float | None = None
     delays = []
     for frame in frames:
-        if frame.arbitration_id in (0x200, 0x1FF):
+        if frame.arbitration_id in c610.COMMAND_IDS:
             last_current = frame.timestamp
             continue
         try:

@@ -14,6 +14,7 @@ from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.mesh import Mesh, body_mesh
+from gravcomp.mesh.elements import constant_strain
 
 
 class RobotModel:
@@ -36,7 +37,7 @@ class RobotModel:
         order, self.pattern = order_in_levels(cliques, len(mesh.nodes), mesh.clamped)
         self.mesh = mesh = mesh.renumbered(order)
         self.n_free = self.pattern.n // 3
-        kind = CorotationalElements if mesh.kind == "tet4" else SolidElements
+        kind = CorotationalElements if constant_strain(mesh.kind) else SolidElements
         self.elements = kind(mesh, self.pattern)
         self.tendons = Tendons(robot.cables, [r.renumbered(order) for r in routes], mesh.nodes, self.pattern)
         self.effectors = Effectors(mesh, robot.effectors.backbone_station)

@@ -22,8 +22,8 @@ class NodeDied(RuntimeError):
 class Graph:
     """The processes of a graph.
 
-    specs: in the order in which they are started; logs: folder for their output (a new temporary one when not given);
-    environment: added to the processes' environment.
+    specs: nodes in the order of their start. logs: folder for their output, by default a new temporary one. environment:
+    variables added to the processes' environment.
     """
 
     def __init__(self, specs: list[NodeSpec], logs: Path | None = None, environment: dict[str, str] | None = None):

@@ -1,8 +1,11 @@
-"""Shape functions and quadrature of the elements.
+"""The elements by kind: nodes, edges and faces, shape functions, quadrature.
 
 hex20: serendipity hexahedron on [-1, 1]^3; tet10, tet4: tetrahedra on the unit simplex. Node order as in VTK. Reduced
 integration of hex20 has 2 x 2 x 2 points (Zienkiewicz, Taylor, Too 1971): thin walls do not lock, and its spurious modes cannot
 spread from one element to the next.
+
+To add an element: its name in `KINDS`, and a branch in each function here that asks for its kind. `tube` makes every kind of
+hexahedron; other elements need a mesher, or their name in meshio (`volume_file`). `test/test_mechanics.py` checks every kind.
 """
 
 import dataclasses
@@ -10,6 +13,8 @@ import dataclasses
 import numpy as np
 
 from gravcomp.mesh.quadratic import TET_EDGES
+
+KINDS = ("hex20", "tet10", "tet4")
 
 _HEX_NODES = np.array(
     [
@@ -19,6 +24,9 @@ _HEX_NODES = np.array(
     ],
     dtype=float,
 )
+_HEX_EDGES = np.array([(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)])
+_HEX_FACES = np.array([(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)])
+_TET_FACES = np.array([(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 # Barycentric coordinates of a tetrahedron as functions of (x, y, z): l = _BARY_0 + _BARY_D @ (x, y, z).
 _BARY_0 = np.array([1.0, 0.0, 0.0, 0.0])
 _BARY_D = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -86,19 +94,19 @@ def stiffness_quadrature(kind: str) -> Quadrature:
 
 def mass_quadrature(kind: str) -> Quadrature:
     """Return a rule that integrates products of two shape functions exactly on an undistorted element."""
-    return _gauss_cube(3) if kind == "hex20" else _conical_simplex(3)
+    return _gauss_cube(3) if is_hexahedron(kind) else _conical_simplex(3)
 
 
 def distance_outside(kind: str, points: np.ndarray) -> np.ndarray:
     """Return the distance (...,) of local points (..., 3) outside the reference element, zero or less inside."""
-    if kind == "hex20":
+    if is_hexahedron(kind):
         return np.abs(points).max(-1) - 1.0
     return -np.minimum(points.min(-1), 1.0 - points.sum(-1))
 
 
 def centre(kind: str) -> np.ndarray:
     """Return the centre (3,) of the reference element."""
-    return np.zeros(3) if kind == "hex20" else np.full(3, 0.25)
+    return np.zeros(3) if is_hexahedron(kind) else np.full(3, 0.25)
 
 
 def reference_nodes(kind: str) -> np.ndarray:
@@ -109,6 +117,26 @@ def reference_nodes(kind: str) -> np.ndarray:
     if kind == "tet4":
         return corners
     return np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in TET_EDGES]])
+
+
+def edges(kind: str) -> np.ndarray:
+    """Return the ends (e, 2) of the edges as local numbers of corner nodes."""
+    return _HEX_EDGES if is_hexahedron(kind) else TET_EDGES
+
+
+def faces(kind: str) -> np.ndarray:
+    """Return the corners (f, 3 or 4) of the faces as local node numbers, in order around each face."""
+    return _HEX_FACES if is_hexahedron(kind) else _TET_FACES
+
+
+def is_hexahedron(kind: str) -> bool:
+    """Return whether the element is a hexahedron on [-1, 1]^3, otherwise a tetrahedron on the unit simplex."""
+    return kind == "hex20"
+
+
+def constant_strain(kind: str) -> bool:
+    """Return whether the strain is constant in an element: such elements lock in bending, and are solved corotationally."""
+    return kind == "tet4"
 
 
 def _gauss_cube(n: int) -> Quadrature:

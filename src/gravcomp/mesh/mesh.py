@@ -15,7 +15,7 @@ class MeshError(ValueError):
 class Mesh:
     """A body in `soft_base`, at rest, clamped at z = 0.
 
-    kind: 'hex20', 'tet10' or 'tet4', the nodes of an element ordered as in VTK; nodes (n, 3) in m; elements (k, c) indices;
+    kind: one of `elements.KINDS`, the nodes of an element ordered as in VTK; nodes (n, 3) in m; elements (k, c) indices;
     region (k,): index into `materials`; length: rest length in m; stations (s,): heights in m, from 0 to length, at which
     cables are guided.
     """

@@ -9,17 +9,9 @@ import itertools
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.mesh.elements import is_hexahedron, reference_nodes
 from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.quadratic import TET_EDGES
-
-# Corners of a cell in (radial, around, along) half steps, in VTK's order, then the mid-edge nodes of hexahedron20.
-_HEX20 = np.array(
-    [
-        *((0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)),
-        *((1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)),
-        *((0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)),
-    ]
-)
 
 
 def tube_mesh(
@@ -27,7 +19,7 @@ def tube_mesh(
 ) -> Mesh:
     """Return the mesh of the robot's segments; numbers of elements that are not given are the robot's.
 
-    kind: 'hex20', 'tet10' or 'tet4'. Raises MeshError for fewer elements along the robot than tubes and caps.
+    kind: one of `elements.KINDS`. Raises MeshError for fewer elements along the robot than tubes and caps.
     """
     around = around or robot.elements.around
     along = along or robot.elements.along
@@ -44,7 +36,8 @@ def tube_mesh(
                 corners += [(2 * ring, 2 * sector, 2 * layer, piece) for sector in range(around)]
     cells = np.array(corners)
     origin, pieces_of_cells = cells[:, :3], cells[:, 3]
-    patterns = [_HEX20] if kind == "hex20" else _kuhn(quadratic=kind == "tet10")
+    # Nodes of an element in (radial, around, along) half steps of its cell.
+    patterns = [np.rint(reference_nodes(kind) + 1).astype(int)] if is_hexahedron(kind) else _kuhn(quadratic=kind == "tet10")
     grid = np.concatenate([origin[:, None, :] + pattern for pattern in patterns])
     region = np.concatenate([pieces_of_cells] * len(patterns))
     grid[:, :, 1] %= 2 * around

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 
 import can
 
-from gravcomp.canbus import codec
-from gravcomp.description.hardware import MOTOR_IDS, Hardware
+from gravcomp.canbus import c610, codec
+from gravcomp.description.hardware import Hardware
 from gravcomp.motors.cable_loops import CableLoops
 from gravcomp.motors.command_check import CommandCheck
 from gravcomp.motors.fault_watch import FaultWatch
@@ -135,8 +135,8 @@ class Bridge:
 
     def on_frame(self, message: can.Message, now: float) -> None:
         """Take a frame. Motor feedback is used and counted in `rejected_frames` when it is invalid; other frames are ignored."""
-        motor_id = message.arbitration_id - 0x200
-        if motor_id not in MOTOR_IDS or message.is_extended_id:
+        motor_id = c610.motor_of(message.arbitration_id)
+        if motor_id is None or message.is_extended_id:
             return
         try:
             feedback = codec.decode(message).values

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 
 import can
 
-from gravcomp.canbus import codec
+from gravcomp.canbus import c610, codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.link import CanLink, lateness
 from gravcomp.canbus.precedence import take_precedence
@@ -28,7 +28,7 @@ from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.guard_client import GuardClient
 from gravcomp.motors.state import CableSnapshot, State, ZeroRecord
 
-RECEIVED_FRAMES = [0x200 + i for i in MOTOR_IDS] + list(IMU_FRAMES)
+RECEIVED_FRAMES = [c610.feedback_id(i) for i in MOTOR_IDS] + list(IMU_FRAMES)
 """Ids of the frames that the bridge uses."""
 
 HEATER_TIMEOUT = 0.5

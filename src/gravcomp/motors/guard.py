@@ -20,7 +20,7 @@ import signal
 import socket
 import time
 
-from gravcomp.canbus import codec
+from gravcomp.canbus import c610, codec
 from gravcomp.canbus.link import CanLink, lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import CanInterface
@@ -136,7 +136,7 @@ class Guard:
         for can_id, rotor in self._record.items():
             self._encoders[can_id] = Encoder()
             self._encoders[can_id].restore(rotor)
-        self._receiver = CanLink(self._can, [0x200 + can_id for can_id in self._encoders])
+        self._receiver = CanLink(self._can, [c610.feedback_id(can_id) for can_id in self._encoders])
 
     def _stop_counting(self) -> None:
         if self._receiver is not None:
@@ -150,7 +150,8 @@ class Guard:
                 feedback = codec.decode(frame).values
             except codec.FrameError:
                 continue
-            encoder = self._encoders.get(frame.arbitration_id - 0x200)
+            motor = c610.motor_of(frame.arbitration_id)
+            encoder = None if motor is None else self._encoders.get(motor)
             if encoder is not None:
                 encoder.update(feedback.angle, feedback.speed, feedback.current, now - lateness(frame, wall))
         if any(now - encoder.time > self._settings.zero_timeout for encoder in self._encoders.values()):

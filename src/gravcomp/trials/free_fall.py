@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from gravcomp.calibration.measured import Measured
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.calibration_run import CAMERA_NOISE
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.dynamics import MovingRod

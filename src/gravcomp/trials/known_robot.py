@@ -8,8 +8,8 @@ import numpy as np
 from gravcomp.calibration.fit import StaticFit, fit_statics
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.motion import fit_motion
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.context import Context
 from gravcomp.trials.free_fall import free_fall
 from gravcomp.virtual.body import build_rod

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gravcomp.canbus.bmi088 import accelerometer_scale, gyroscope_scale
 from gravcomp.canbus.codec import decode
+from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
 from gravcomp.orientation import EstimatorOptions, GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.thermal import HeaterControl, HeaterOptions, ThermalPlantOptions

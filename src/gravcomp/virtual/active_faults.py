@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 
+from gravcomp.canbus import c610
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware
 from gravcomp.virtual.faults import Fault
-
-_FIRST_FEEDBACK = 0x200  # frame id of a motor's feedback minus the motor's CAN id
 
 
 class ActiveFaults:
@@ -16,7 +15,7 @@ class ActiveFaults:
 
     def __init__(self, hardware: Hardware):
         self._cables = hardware.cables
-        self._feedback_id = {motor.cable: _FIRST_FEEDBACK + motor.can_id for motor in hardware.motors}
+        self._feedback_id = {motor.cable: c610.feedback_id(motor.can_id) for motor in hardware.motors}
         self._faults: list[tuple[Fault, float]] = []
 
     @property

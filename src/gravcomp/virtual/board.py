@@ -11,8 +11,9 @@ import math
 import can
 import numpy as np
 
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY, accelerometer_scale, gyroscope_scale
 from gravcomp.canbus.codec import PROTOCOL, encode
+from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.thermal.plant import ThermalPlant
 from gravcomp.virtual.motion import turned
 from gravcomp.virtual.parameters import Board

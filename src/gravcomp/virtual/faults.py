@@ -7,6 +7,7 @@ applies faults of frames, robot.py the others. Everything random comes from one 
 from dataclasses import dataclass
 from typing import Any
 
+from gravcomp.canbus import c610
 from gravcomp.config import from_mapping, parameter
 
 FRAME_KINDS = ("drop", "delay", "corrupt", "duplicate", "reorder", "wrong_id", "bus_off")
@@ -25,9 +26,9 @@ KINDS = FRAME_KINDS + CABLE_KINDS + BOARD_KINDS
 
 FRAME_GROUPS = {
     "imu": ("ImuAccelerometer", "ImuGyroscope", "ImuTime"),
-    "feedback": tuple(f"MotorFeedback{i}" for i in range(1, 9)),
+    "feedback": c610.FEEDBACKS,
     "status": ("BoardStatus",),
-    "command": ("MotorCommand1to4", "MotorCommand5to8"),
+    "command": tuple(c610.COMMANDS),
     "heater": ("HeaterCommand",),
 }
 

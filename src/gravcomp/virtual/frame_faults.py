@@ -5,7 +5,9 @@ import heapq
 import can
 import numpy as np
 
+from gravcomp.canbus import c610
 from gravcomp.canbus.codec import layouts
+from gravcomp.description.hardware import MOTOR_IDS
 from gravcomp.virtual.faults import FRAME_GROUPS, FRAME_KINDS, Fault
 
 
@@ -86,7 +88,8 @@ def _concerns(fault: Fault, feedback_id: int | None, frame: can.Message) -> bool
 def _renamed(frame: can.Message) -> can.Message:
     """Return the frame as if the id of the next motor had been set on the speed controller."""
     identifier = frame.arbitration_id
-    return _copy(frame, identifier + 1 if 0x201 <= identifier < 0x208 else identifier ^ 1, frame.data)
+    motor = c610.motor_of(identifier)
+    return _copy(frame, identifier ^ 1 if motor in (None, MOTOR_IDS[-1]) else identifier + 1, frame.data)
 
 
 def _copy(frame: can.Message, identifier: int, data: bytes | bytearray) -> can.Message:

@@ -17,11 +17,11 @@ import math
 import numpy as np
 from numba import njit
 
+from gravcomp.canbus.c610 import LARGEST_CURRENT
 from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
 from gravcomp.virtual.parameters import Motors
 
 TICK = 0.5e-3  # s
-_MAXIMUM_CURRENT = 10.0  # A, of the C610
 
 
 class MotorBank:
@@ -125,12 +125,12 @@ def _step(
 ) -> None:
     half = 0.5 * backlash
     for c in range(rotor.shape[0]):
-        command = direction[c] * min(_MAXIMUM_CURRENT, max(-_MAXIMUM_CURRENT, commanded[c]))
+        command = direction[c] * min(LARGEST_CURRENT, max(-LARGEST_CURRENT, commanded[c]))
         offset = shortened[c] + slack[c]
         for _ in range(ticks):
             current[c] += current_gain * (command - current[c])
             # The back-EMF limits the current, the more the faster the rotor turns in the direction of the current.
-            room = 10.0 * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
+            room = LARGEST_CURRENT * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
             force = spring[c] * max(0.0, radius * capstan[c] - offset)
             at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9

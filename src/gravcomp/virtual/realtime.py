@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gravcomp.canbus import c610
 from gravcomp.canbus.codec import layout
 from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.precedence import take_precedence
@@ -25,7 +26,7 @@ _BURST = 0.02  # s of frames sent together after a pause; receivers' socket buff
 _LONGEST_LAG = 0.1  # s
 _STEER_PERIOD = 0.01  # s
 
-RECEIVED_FRAMES = ("MotorCommand1to4", "MotorCommand5to8", "HeaterCommand")
+RECEIVED_FRAMES = (*c610.COMMANDS, "HeaterCommand")
 
 
 class RealtimeRobot:

@@ -13,11 +13,12 @@ from collections.abc import Iterable
 import can
 import numpy as np
 
-from gravcomp.canbus.bmi088 import STANDARD_GRAVITY
-from gravcomp.canbus.codec import FrameError, decode, encode
+from gravcomp.canbus import c610
+from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
 from gravcomp.virtual.board import SAMPLE_PERIOD, STATUS_PERIOD, VirtualBoard
@@ -77,7 +78,6 @@ class VirtualRobot:
         self._faults = ActiveFaults(hardware)
         self._tick = 0
         self._elapsed = 0.0
-        self._feedback_names = [f"MotorFeedback{motor.can_id}" for motor in hardware.motors]
         self._feedback_ticks = round(1.0 / parameters.motors.feedback_rate / TICK)
         self.refused = 0  # frames that could not be decoded
         self.unresolved = 0  # steps of the rod that did not converge
@@ -184,12 +184,11 @@ class VirtualRobot:
         except FrameError:
             self.refused += 1
             return
-        if name.startswith("MotorCommand"):
-            for index, motor in enumerate(self._hardware.motors):
-                current = getattr(values, f"current_{motor.can_id}", None)
-                if current is not None:
-                    self._motors.commanded[index] = current
-        elif name == "HeaterCommand":
+        currents = c610.currents_of(name, values)
+        for index, motor in enumerate(self._hardware.motors):
+            if motor.can_id in currents:
+                self._motors.commanded[index] = currents[motor.can_id]
+        if name == "HeaterCommand":
             self._board.command_heater(values.duty)
 
     def _act(self) -> list[can.Message]:
@@ -199,8 +198,8 @@ class VirtualRobot:
             orientation, position = self._base.advance(self.time)
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
         if self._tick % self._feedback_ticks == 0:
-            for name, values in zip(self._feedback_names, self._motors.feedback()):
-                sent.append(encode(name, **values))
+            for motor, values in zip(self._hardware.motors, self._motors.feedback()):
+                sent.append(c610.feedback(motor.can_id, **values))
         if self._tick % _SAMPLE_TICKS == 0:
             rate, force = self._base.imu(self.time)
             sent += self._board.sample(rate, force, self._base.recorded)

@@ -11,13 +11,6 @@ if TYPE_CHECKING:
 
     from gravcomp.mesh import Mesh
 
-# Corners of an element's faces, in VTK's node order.
-_FACES: dict[str, list[tuple[int, ...]]] = {
-    "hex20": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
-    "tet10": [(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
-}
-_FACES["tet4"] = _FACES["tet10"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
@@ -66,6 +59,9 @@ def _surface(mesh: "Mesh") -> "np.ndarray":
     """Return the corner nodes (f, 3 or 4) of the faces that belong to a single element."""
     import numpy as np
 
-    faces = mesh.elements[:, np.array(_FACES[mesh.kind])].reshape(-1, len(_FACES[mesh.kind][0]))
-    _, index, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return faces[index[count == 1]]
+    from gravcomp.mesh.elements import faces
+
+    corners = faces(mesh.kind)
+    found = mesh.elements[:, corners].reshape(-1, corners.shape[1])
+    _, index, count = np.unique(np.sort(found, axis=1), axis=0, return_index=True, return_counts=True)
+    return found[index[count == 1]]
