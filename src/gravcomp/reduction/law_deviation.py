@@ -106,13 +106,16 @@ def add_deviation_stiffness(of: LawDeviation, point: DeviationPoint, matrix: np.
     row = np.empty(size, dtype=np.float32)
     for i in range(r):
         gradient = of.gradient[i]
+        g_0, g_1, g_2 = gradient[:count], gradient[count : 2 * count], gradient[2 * count : 3 * count]
+        g_3, g_4, g_5 = gradient[3 * count : 4 * count], gradient[4 * count : 5 * count], gradient[5 * count : 6 * count]
+        g_6, g_7, g_8 = gradient[6 * count : 7 * count], gradient[7 * count : 8 * count], gradient[8 * count :]
         for a in range(9):
-            to = row[a * count : (a + 1) * count]
-            to[:] = np.float32(0.0)
-            for b in range(9):
-                entry, part = elasticity[a, b], gradient[b * count : (b + 1) * count]
-                for p in range(count):
-                    to[p] += entry[p] * part[p]
+            e, to = elasticity[a], row[a * count : (a + 1) * count]
+            for p in range(count):
+                to[p] = (
+                    e[0, p] * g_0[p] + e[1, p] * g_1[p] + e[2, p] * g_2[p] + e[3, p] * g_3[p] + e[4, p] * g_4[p]
+                    + e[5, p] * g_5[p] + e[6, p] * g_6[p] + e[7, p] * g_7[p] + e[8, p] * g_8[p]
+                )  # fmt: skip
         line, j = matrix[i], 0
         while j + 4 <= i + 1:  # four entries at a time: the row is read less often
             g_0, g_1, g_2, g_3 = of.gradient[j], of.gradient[j + 1], of.gradient[j + 2], of.gradient[j + 3]
