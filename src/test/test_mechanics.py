@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Elements, Material, Robot, Segment
-from gravcomp.materials.laws import LAWS
+from gravcomp.materials.constants import MaterialConstants
+from gravcomp.materials.laws import LAWS, stress
 from gravcomp.mechanics.block_matrix import BlockMatrix, NotPositiveDefinite, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.mechanics.viscous_strain import ViscousStrain
-from gravcomp.mesh import Mesh, tube_mesh
+from gravcomp.mesh import Mesh, MeshError, tube_mesh
 from gravcomp.mesh.elements import KINDS, constant_strain, is_hexahedron, reference_nodes, shape_gradients, shape_values
 from gravcomp.mesh.quadratic import raised_to_quadratic
 
@@ -183,3 +184,44 @@ def test_an_indefinite_matrix_is_refused():
     matrix.add_diagonal(-2.0 * matrix.mean_diagonal())
     with pytest.raises(NotPositiveDefinite):
         matrix.factor()
+
+
+@pytest.mark.parametrize(
+    ("law", "shape"),
+    [
+        ("neo_hookean", {}),
+        ("mooney_rivlin", {"c01_ratio": 0.4}),
+        ("yeoh", {"c20_ratio": 0.3, "c30_ratio": 0.02}),
+    ],
+)
+def test_a_stretched_bar_pulls_as_the_published_formula_says(law, shape):
+    """Nominal stress of an incompressible bar: 2 (l - l^-2) (dW/dI1 + dW/dI2 / l), Treloar 1975, section 10.1."""
+    young, nu, stretch = 0.6e6, 0.499, 1.6
+    material = Material(law=law, youngs_modulus=young, poissons_ratio=nu, **shape)
+    constants = MaterialConstants.of(dataclasses.replace(patch("hex20", law)[0], materials=(material,))).values[0]
+    c10 = young / (4 * (1 + nu)) / (1 + (material.c01_ratio if law == "mooney_rivlin" else 0.0))
+    x = stretch**2 + 2 / stretch - 3
+    first = c10 * (1 + 2 * material.c20_ratio * x + 3 * material.c30_ratio * x**2) if law == "yeoh" else c10
+    second = c10 * material.c01_ratio if law == "mooney_rivlin" else 0.0
+    expected = 2 * (stretch - stretch**-2) * (first + second / stretch)
+
+    def nominal(across: float) -> tuple[float, float]:
+        e, s, d = np.zeros(6), np.empty(6), np.empty((6, 6))
+        e[:3] = 0.5 * (np.array([stretch, across, across]) ** 2 - 1)
+        stress(LAWS[law].code, constants, e, s, d, False)
+        return stretch * s[0], s[1]
+
+    low, high = 0.98 * stretch**-0.5, 1.02 * stretch**-0.5
+    for _ in range(60):  # no stress across
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if nominal(middle)[1] < 0.0 else (low, middle)
+    assert nominal(low)[0] == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("law", "shape", "found"), [("yeoh", {"c20_ratio": -0.5}, "c20_ratio: -0.5"), ("yeoh", {"c30_ratio": -0.2}, "falls")]
+)
+def test_unstable_constants_are_refused(law, shape, found):
+    mesh = patch("hex20", law)[0]
+    with pytest.raises(MeshError, match=found):
+        MaterialConstants.of(dataclasses.replace(mesh, materials=(Material(law=law, **shape),)))

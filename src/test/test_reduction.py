@@ -8,10 +8,14 @@ import pytest
 
 from gravcomp.description import Elements, load_robot_file
 from gravcomp.inverse import InverseController, straight_target
-from gravcomp.mesh import MeshError
+from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.cubature import Cubature, choose
+from gravcomp.reduction.law_deviation import add_deviation_stiffness, deviation_at
+from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
+from gravcomp.reduction.reduced_model import project, section_changes
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 from gravcomp.training import BuildOptions, TrainingOptions, build
@@ -181,13 +185,94 @@ def test_a_large_measured_error_ends_the_use_of_the_reduced_model(built):
     assert "the tip error of the reduced model is" in serving.reason
 
 
-def test_robots_without_polynomial_strain_are_refused_with_the_reason(robot, cache):
-    neo_hookean = RobotModel(robot.with_material(law="neo_hookean"))
-    assert "neo_hookean" in why_not(neo_hookean)
+def test_a_robot_of_linear_tetrahedra_is_refused_with_the_reason(robot, cache):
+    linear = RobotModel(robot, tube_mesh(robot, "tet4"))
+    assert "corotational" in why_not(linear)
     with pytest.raises(MeshError, match="full model is used"):
-        build(neo_hookean, SMALL)
-    cables = tuple(dataclasses.replace(cable, friction=0.1) for cable in robot.cables)
-    assert "friction" in why_not(RobotModel(dataclasses.replace(robot, cables=cables)))
+        build(linear, SMALL)
+
+
+def with_law(modes, law: str):
+    """The model of another law on the same three modes; its polynomials of all strains; its cubature of all points."""
+    model, _, basis, shapes = modes
+    model = RobotModel(model.robot.with_material(law=law))
+    element, point = (index.ravel() for index in np.indices(model.elements.weights.shape))
+    every = Cubature(element, point, model.elements.weights.ravel())
+    return model, strain_polynomials(model.elements, basis, shapes, extra=6), every.deviation(model.elements, basis)
+
+
+@pytest.mark.parametrize("law", ["neo_hookean", "mooney_rivlin", "yeoh"])
+def test_with_all_points_forces_and_stiffness_of_a_law_are_those_of_the_elements(modes, law):
+    model, polynomials, deviation = with_law(modes, law)
+    _, _, basis, _ = modes
+    matrix = model.new_matrix()
+    for q in 0.1 * np.random.default_rng(1).normal(size=(3, 3)):
+        u = np.zeros_like(model.mesh.nodes)
+        model.free(u)[:] = basis @ q
+        matrix.values[:] = 0.0
+        force = basis.T @ model.free(model.elements.assemble(u, matrix))
+        own_force, own_stiffness, _ = polynomials.evaluate(q)
+        at = deviation_at(deviation, q)
+        add_deviation_stiffness(deviation, at, own_stiffness)
+        assert np.abs(at.force).max() > 1e-4 * np.abs(own_force).max()
+        assert own_force + at.force == pytest.approx(force, rel=1e-6, abs=1e-8)
+        assert np.tril(own_stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-5, abs=1e-6)
+
+
+def test_few_points_with_positive_weights_carry_the_deviation(modes):
+    model, _, every = with_law(modes, "neo_hookean")
+    _, _, basis, _ = modes
+    coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
+    sections = section_changes(model, basis)[:, 0] / model.length
+    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance) for tolerance in (1e-3, 3e-5))
+    assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
+    assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
+    few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
+    for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
+        assert deviation_at(few, q).force == pytest.approx(deviation_at(every, q).force, abs=0.05 * largest)
+
+
+def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(robot, cache):
+    cables = tuple(dataclasses.replace(cable, friction=0.5) for cable in robot.cables)
+    model = RobotModel(dataclasses.replace(robot, cables=cables).with_material(law="yeoh"))
+    with alone(model):
+        reduction = load(model) or build(model, SMALL)[0]
+    assert 0 < len(reduction.cubature.weight) < model.elements.weights.size
+    reduced, full = Simulator(model), Simulator(RobotModel(model.robot), reduced=False)
+    without = Simulator(robot.with_material(law="yeoh"), reduced=False)
+    controller, target = InverseController(model.robot), straight_target(model.length, tip_direction_weight=1e-3)
+    served, displacement, apart = 0, None, []
+    for angle in np.radians(0.9) * np.arange(70):
+        gravity = 9.81 * np.array([-np.cos(angle), 0.6 * np.sin(angle), -0.8 * np.sin(angle)])
+        shape, exact = reduced.step(gravity, displacement), full.step(gravity, displacement)
+        apart.append(np.linalg.norm(without.step(gravity, displacement).tip_position - exact.tip_position))
+        command = controller.step(shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension)
+        displacement = command.displacement
+        assert np.linalg.norm(shape.tip_position - exact.tip_position) < 0.1e-3
+        served += shape.model == "reduced"
+    assert served > 60
+    assert shape.cable_tension == pytest.approx(exact.cable_tension, abs=0.01 * exact.cable_tension.max())
+    assert max(apart) > 0.05e-3  # what friction changes
+
+
+def test_reduced_cables_with_friction_are_the_full_models(robot, modes):
+    _, _, basis, shapes = modes
+    cables = tuple(dataclasses.replace(cable, friction=0.5) for cable in robot.cables)
+    model = RobotModel(dataclasses.replace(robot, cables=cables))
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=2)
+    reduced = project(model, basis, polynomials, Cubature.none(), reach=1.0, error=0.0)
+    q, pulling, tension = np.array([0.3, -0.2, 0.1]), np.array([1.0, -1.0, 0.0, 1.0, 1.0, -1.0]), np.linspace(0.5, 2.0, 6)
+    u = np.zeros_like(model.mesh.nodes)
+    model.free(u)[:] = basis @ q
+    own, exact = tendons_at(reduced.cables, q, pulling), model.tendons.state(model.mesh.nodes + u, pulling)
+    assert exact.share.min() < 0.98 and exact.share.max() > 1.02
+    assert own.share == pytest.approx(exact.share, rel=1e-9)
+    assert own.jacobian == pytest.approx(exact.jacobian @ basis, abs=1e-12)
+    assert own.force_jacobian == pytest.approx(exact.force_jacobian @ basis, abs=1e-12)
+    matrix, stiffness = model.new_matrix(), np.zeros((3, 3))
+    model.tendons.add_stiffness(exact, tension, matrix)
+    add_stiffness(reduced.cables, own, tension, stiffness)
+    assert np.tril(stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("damping", ["kelvin_voigt", "rayleigh"])

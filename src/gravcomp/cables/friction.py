@@ -4,9 +4,14 @@ Capstan friction (Euler and Eytelwein): lambda_k = lambda exp(-+ mu theta_k), wh
 k; minus while the cable is pulled in, plus while it is paid out.
 """
 
+import dataclasses
+
 import numpy as np
 
 from gravcomp.description import Cable
+
+# A change in m, or in N, that is rounding error.
+_AT_REST = 1e-9
 
 
 class Friction:
@@ -14,6 +19,11 @@ class Friction:
 
     def __init__(self, cables: tuple[Cable, ...]):
         self._coefficient = np.array([cable.friction for cable in cables])
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        """(m,) friction coefficient of each cable."""
+        return self._coefficient
 
     def any(self) -> bool:
         """Return whether any cable has friction; its forces then depend on the past motion."""
@@ -33,3 +43,36 @@ class Friction:
         turned = np.cumsum(np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)]))
         first = np.searchsorted(cable, np.arange(len(pulling)))
         return np.exp(-(self._coefficient * pulling)[cable] * (turned - turned[first][cable]))
+
+
+@dataclasses.dataclass(frozen=True)
+class Sliding:
+    """Direction in which m cables slide, and the input that it follows from.
+
+    direction (m,): 1 pulled in, -1 paid out, 0 not moved yet; wound (m,): last displacement that was given in m, NaN: none.
+    """
+
+    direction: np.ndarray
+    wound: np.ndarray
+
+    @staticmethod
+    def none(count: int) -> "Sliding":
+        """Return the state of `count` cables that have not moved."""
+        return Sliding(np.zeros(count), np.full(count, np.nan))
+
+    def after(
+        self, wound: np.ndarray | None, given: np.ndarray | None, tension: np.ndarray, displacement: np.ndarray
+    ) -> "Sliding":
+        """Return the state after an input: displacements `wound` (m,), tensions `given` (m,), or neither for released cables.
+
+        tension and displacement (m,): of the cables before. A cable whose input does not change keeps its direction.
+        """
+        if given is not None:
+            change = given - tension
+        elif wound is None:
+            change = -tension
+        else:
+            before = np.where(np.isnan(self.wound), displacement, self.wound)
+            change = np.where(np.isnan(wound), -tension, wound - before)
+        direction = np.where(np.abs(change) > _AT_REST, np.sign(change), self.direction)
+        return Sliding(direction, self.wound if wound is None else wound)

@@ -9,9 +9,16 @@ from gravcomp.config import parameter
 class Material:
     """An isotropic soft material."""
 
-    law: str = parameter("svk", choices=("svk", "neo_hookean"), description="St. Venant-Kirchhoff, or compressible neo-Hookean")
+    law: str = parameter(
+        "svk",
+        choices=("svk", "neo_hookean", "mooney_rivlin", "yeoh"),
+        description="St. Venant-Kirchhoff, neo-Hookean, Mooney-Rivlin or Yeoh; all but the first for large strains",
+    )
     youngs_modulus: float = parameter(0.8, edge="MPa", minimum=1e-3, maximum=1e6, description="Young's modulus")
     poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.4999, description="Poisson's ratio")
+    c01_ratio: float = parameter(0.25, minimum=0.0, maximum=100.0, description="Mooney-Rivlin: c01 / c10")
+    c20_ratio: float = parameter(0.18, minimum=-1.0, maximum=100.0, description="Yeoh: c20 / c10")
+    c30_ratio: float = parameter(0.0, minimum=-1.0, maximum=100.0, description="Yeoh: c30 / c10")
     density: float = parameter(1145.0, unit="kg/m^3", minimum=0.0, maximum=30000.0, description="density")
     damping_time: float = parameter(
         20.0, edge="ms", minimum=0.0, maximum=10000.0, description="Kelvin-Voigt damping: viscosity over stiffness"

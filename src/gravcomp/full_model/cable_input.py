@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import taut_tensions
 
 
@@ -24,6 +25,10 @@ class CableInput:
         if self.wound is None:
             return np.zeros(len(free))
         return taut_tensions(compliance, free, self.wound, taut)
+
+    def sliding(self, before: Sliding, tension: np.ndarray, displacement: np.ndarray) -> Sliding:
+        """Return the sliding after this input to cables with `tension` and `displacement` (m,)."""
+        return before.after(self.wound, self.tension, tension, displacement)
 
     def part(self, origin: np.ndarray, fraction: float) -> "CableInput":
         """Return the input at a fraction of the load: interpolated from the displacements `origin` (m,), or from tension 0."""

@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
@@ -38,7 +39,7 @@ _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
 
 
 class StaticTracker:
-    """Tracks the equilibrium of a model. Owns the stiffness matrix and the current `state`."""
+    """Tracks the equilibrium of a model. Owns the stiffness matrix, the current `state`, and the `sliding` of the cables."""
 
     def __init__(self, model: RobotModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
         """Start from the straight robot.
@@ -53,7 +54,6 @@ class StaticTracker:
         self._matrix = model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         self._stiffness = self._matrix.mean_diagonal()
-        self._pulling = np.zeros(model.tendons.count)
         self.reset()
 
     def reset(self) -> None:
@@ -62,7 +62,7 @@ class StaticTracker:
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
         tendons = self.model.tendons.state(self.model.mesh.nodes)
-        self._pulling[:] = 0.0
+        self.sliding = Sliding.none(count)
         self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
 
     def track(
@@ -84,7 +84,8 @@ class StaticTracker:
         if exact:
             self._kept = None
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
-        self._update_pulling(state, cables)
+        if self.model.tendons.friction.any():
+            self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement)
         dead = self.model.weight(gravity)
         weight = dead if loads is None else dead + loads.at(state.u, fraction)
         if loads is not None and not loads.constant:
@@ -106,18 +107,6 @@ class StaticTracker:
             state.converged &= settled and state.residual <= self._allowed_residual(state, weight)
         self.state = state
         return state
-
-    def _update_pulling(self, state: Equilibrium, cables: CableInput) -> None:
-        """Update the direction in which each cable slides, for its friction."""
-        if not self.model.tendons.friction.any():
-            return
-        if cables.tension is not None:
-            change = cables.tension - state.tension
-        elif cables.wound is not None:
-            change = np.nan_to_num(cables.wound - state.tendons.displacement)
-        else:
-            change = -state.tension
-        self._pulling = np.where(np.abs(change) > 1e-9, np.sign(change), self._pulling)
 
     def _newton_step(
         self,
@@ -187,7 +176,7 @@ class StaticTracker:
                 state.u[:] = start
                 return None
         state.tension = state.tension + damping * (tension - state.tension)
-        state.tendons = model.tendons.state(model.mesh.nodes + state.u, self._pulling)
+        state.tendons = model.tendons.state(model.mesh.nodes + state.u, self.sliding.direction)
         return start, damping == 1.0
 
     def _correct(
@@ -224,7 +213,7 @@ class StaticTracker:
             start = state.u.copy()
             model.free(state.u)[:] += correction
             state.tension = tension
-            state.tendons = model.tendons.state(model.mesh.nodes + state.u, self._pulling)
+            state.tendons = model.tendons.state(model.mesh.nodes + state.u, self.sliding.direction)
             ratio = length / size if corrected else 0.5
             if length * ratio / (1.0 - ratio) < tolerance:
                 state.converged = True

@@ -6,40 +6,63 @@ import numpy as np
 from numba import njit
 
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.reduction.law_deviation import DeviationPoint, LawDeviation, add_deviation_stiffness, deviation_at
 from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.strain_polynomials import strain_at
+from gravcomp.reduction.strain_polynomials import strain_at, tangent
 
 
 class Body(NamedTuple):
-    """Arrays of a reduced model: linear and quadratic of the elasticity; force_norm (r, r); tip (3, r): d tip / dq; cables."""
+    """Arrays of a reduced model.
+
+    linear and quadratic of the elasticity, and the law's deviation from it; force_norm (r, r); tip (3, r): d tip / dq; cables.
+    """
 
     linear: np.ndarray
     quadratic: np.ndarray
+    deviation: LawDeviation
     force_norm: np.ndarray
     tip: np.ndarray
     cables: ReducedCables
 
 
 class Point(NamedTuple):
-    """A reduced model at coordinates q: J^T (r, k) and strain (k,) of the elasticity, and the cables."""
+    """A reduced model at coordinates q: J^T (r, k) and strain (k,) of the elasticity, the law's deviation, and the cables."""
 
     jacobian: np.ndarray
     strain: np.ndarray
+    deviation: DeviationPoint
     tendons: ReducedTendons
 
 
 def body_of(model: ReducedModel) -> Body:
     """Return the arrays of the model for compiled functions."""
     elasticity, tip = model.elasticity, np.ascontiguousarray(model.section_change[-1, 0])
-    return Body(elasticity.linear, elasticity.quadratic, model.force_norm, tip, model.cables)
+    return Body(elasticity.linear, elasticity.quadratic, model.deviation, model.force_norm, tip, model.cables)
 
 
 @njit(cache=True)
-def point_at(body: Body, q: np.ndarray) -> Point:
-    """Return the model at q (r,)."""
+def point_at(body: Body, q: np.ndarray, pulling: np.ndarray) -> Point:
+    """Return the model at q (r,). pulling (m,): sliding direction of each cable, see `tendons_at`."""
     jacobian, strain = strain_at(body.linear, body.quadratic, q)
-    return Point(jacobian, strain, tendons_at(body.cables, q))
+    return Point(jacobian, strain, deviation_at(body.deviation, q), tendons_at(body.cables, q, pulling))
+
+
+@njit(cache=True)
+def elastic_force(point: Point, stress: np.ndarray) -> np.ndarray:
+    """Return the internal force (r,) for the stress (k,) of the elasticity: the strain, and damping and creep in motion."""
+    return point.jacobian @ stress + point.deviation.force
+
+
+@njit(cache=True)
+def elastic_stiffness(body: Body, point: Point, stress: np.ndarray, scale: float) -> np.ndarray:
+    """Return the lower triangle of the stiffness (r, r).
+
+    stress (k,): as in `elastic_force`; scale: its derivative by the strain.
+    """
+    stiffness = tangent(point.jacobian, body.quadratic, stress, scale)
+    add_deviation_stiffness(body.deviation, point.deviation, stiffness)
+    return stiffness
 
 
 def cable_arrays(cables: CableInput, count: int) -> tuple[np.ndarray, np.ndarray]:

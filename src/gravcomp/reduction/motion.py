@@ -1,6 +1,6 @@
 """Motion in reduced coordinates, with the scheme of the full model (`full_model.dynamics`) in r unknowns.
 
-    M_r = Phi^T M Phi,     g(q) = J^T (eps + beta d eps / dt + rho eta) - Phi^T f_weight - H^T lambda,
+    M_r = Phi^T M Phi,     g(q) = J^T (eps + beta d eps / dt + rho eta) + f_deviation - Phi^T f_weight - H^T lambda,
 
 integrated by generalized-alpha. The strains eps(q) of the reduced elasticity are objective; so are Kelvin-Voigt damping with
 their second backward difference and the creep of `full_model.viscosity` (rho, held strain eta). beta, rho and T are the same in
@@ -14,7 +14,7 @@ import numpy as np
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
 from gravcomp.full_model.viscosity import branch
-from gravcomp.reduction.body import Point, body_of, cable_arrays, point_at
+from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.motion_step import motion_step
 from gravcomp.reduction.reduced_cables import ReducedTendons
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -91,8 +91,8 @@ class ReducedDynamicSolver:
 
     def place(self, q: np.ndarray, tension: np.ndarray, gravity: np.ndarray) -> None:
         """Start at rest at q (r,) under the tensions (m,) and gravity (3,), with the acceleration that they cause."""
-        point = point_at(self._body, q)
-        force = point.jacobian @ point.strain - self.model.weight @ gravity - tension @ point.tendons.jacobian
+        point = point_at(self._body, q, np.zeros(len(tension)))
+        force = elastic_force(point, point.strain) - self.model.weight @ gravity - tension @ point.tendons.jacobian
         acceleration = np.linalg.solve(self._mass, -force)
         self.state = ReducedMotion(
             q, np.zeros_like(q), acceleration, tension, point, force, point.strain, np.zeros_like(point.strain)
@@ -103,8 +103,8 @@ class ReducedDynamicSolver:
 
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
-        force = -self._mass @ acceleration - self._rayleigh(q) @ velocity
-        point = point_at(self._body, q)
+        point = point_at(self._body, q, np.zeros(len(tension)))
+        force = -self._mass @ acceleration - self._rayleigh(point) @ velocity
         self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, np.zeros_like(point.strain))
 
     def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> ReducedMotion:
@@ -117,7 +117,7 @@ class ReducedDynamicSolver:
         scale = 1.0 + self._damping_time * rate + self._creep_ratio * gain
         strain = last.point.strain
         offset = self._damping_time * history + self._creep_ratio * (decay * last.held - gain * strain)
-        drag = self._rayleigh(last.q)
+        drag = self._rayleigh(last.point)
         velocity_0, acceleration_0 = scheme.predict(last.velocity, last.acceleration)
         # Contribution of the last step's forces, including inertia, to the balance of this step.
         rest = self._mass @ ((1.0 - scheme.alpha_m) * acceleration_0 + scheme.alpha_m * last.acceleration) + before * last.force
@@ -145,12 +145,12 @@ class ReducedDynamicSolver:
         )
         return self.state
 
-    def _rayleigh(self, q: np.ndarray) -> np.ndarray:
-        """Return alpha M + beta K(q) (r, r); zeros without Rayleigh damping."""
+    def _rayleigh(self, point: Point) -> np.ndarray:
+        """Return alpha M + beta K (r, r) at a point; zeros without Rayleigh damping."""
         options = self.options
         if options.damping != "rayleigh":
             return np.zeros_like(self._mass)
-        stiffness = np.tril(self.model.elasticity.evaluate(q)[1])
+        stiffness = np.tril(elastic_stiffness(self._body, point, point.strain, 1.0))
         stiffness += np.tril(stiffness, -1).T
         return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 

@@ -4,10 +4,9 @@ import numpy as np
 from numba import njit
 
 from gravcomp.cables.slack import pivoted
-from gravcomp.reduction.body import Body, Point, point_at
+from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
-from gravcomp.reduction.strain_polynomials import tangent
 from gravcomp.rounding import REORDERED
 
 _MOST_ITERATIONS = 16
@@ -47,17 +46,18 @@ def motion_step(
 
     """
     m, r, start, cables = len(tension), len(q), q, body.cables
+    frictionless = np.zeros(m)
     compliance, answer, of_tip = np.zeros((m, m)), np.zeros((m, r)), np.zeros((3, r))
     for iteration in range(_MOST_ITERATIONS + 1):
         stress = scale * point.strain + offset
-        force = point.jacobian @ stress - weight - tension @ point.tendons.jacobian
+        force = elastic_force(point, stress) - weight - tension @ point.tendons.jacobian
         out = rest + inertia @ (q - start) + now * force
         if iteration > 0:
             pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
             left = of_tip @ out - body.tip @ (pull @ answer)
             if (left**2).sum() < tolerance**2:
                 return True, q, tension, point, force, np.sqrt(out @ (body.force_norm @ out))
-        elastic = now * tangent(point.jacobian, body.quadratic, stress, scale) + inertia
+        elastic = now * elastic_stiffness(body, point, stress, scale) + inertia
         matrix = elastic.copy()
         add_stiffness(cables, point.tendons, now * tension, matrix)
         definite, factor = factorise(matrix)
@@ -84,5 +84,5 @@ def motion_step(
         q = q + y + (wanted - tension) @ answer
         if not np.isfinite(q.sum()):
             break
-        tension, point = wanted, point_at(body, q)
+        tension, point = wanted, point_at(body, q, frictionless)
     return False, q, tension, point, weight, np.inf

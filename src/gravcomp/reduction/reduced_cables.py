@@ -12,7 +12,7 @@ class ReducedCables(NamedTuple):
     """The cables of a reduced model.
 
     rest (s, 3): e_k(0) in m; change (3 s, r): D_k; cable (s,): cable of each straight piece; rest_length (m,) of the paths in m;
-    axial_compliance (m,) of the cables in m/N.
+    axial_compliance (m,) of the cables in m/N; friction (m,) coefficient.
     """
 
     rest: np.ndarray
@@ -20,23 +20,27 @@ class ReducedCables(NamedTuple):
     cable: np.ndarray
     rest_length: np.ndarray
     axial_compliance: np.ndarray
+    friction: np.ndarray
 
 
 class ReducedTendons(NamedTuple):
     """The cables at coordinates q.
 
-    tangent (s, 3) and length (s,) of the pieces; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q.
+    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that of the cable; displacement (m,) of the paths in m;
+    jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose times the tensions is the cables' force.
     """
 
     tangent: np.ndarray
     length: np.ndarray
+    share: np.ndarray
     displacement: np.ndarray
     jacobian: np.ndarray
+    force_jacobian: np.ndarray
 
 
 @njit(cache=True, fastmath=REORDERED)
-def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
-    """Return the cables at q (r,)."""
+def tendons_at(cables: ReducedCables, q: np.ndarray, pulling: np.ndarray) -> ReducedTendons:
+    """Return the cables at q (r,). pulling (m,): 1 for a cable that is pulled in, -1 for one paid out, 0 for no friction."""
     count, r = len(cables.cable), len(q)
     tangent, length = np.empty((count, 3)), np.empty(count)
     displacement, jacobian = cables.rest_length.copy(), np.zeros((len(cables.rest_length), r))
@@ -54,7 +58,37 @@ def tendons_at(cables: ReducedCables, q: np.ndarray) -> ReducedTendons:
         row = jacobian[cables.cable[k]]
         for a in range(r):
             row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
-    return ReducedTendons(tangent, length, displacement, jacobian)
+    share, force_jacobian = np.ones(count), jacobian
+    for i in range(len(pulling)):
+        if cables.friction[i] * pulling[i] != 0.0:
+            force_jacobian = _with_friction(cables, tangent, cables.friction * pulling, share, r)
+            break
+    return ReducedTendons(tangent, length, share, displacement, jacobian, force_jacobian)
+
+
+@njit(cache=True, fastmath=REORDERED)
+def _with_friction(cables: ReducedCables, tangent: np.ndarray, friction: np.ndarray, share: np.ndarray, r: int) -> np.ndarray:
+    """Write the share (s,) of capstan friction, as `cables.friction` does, and return the force Jacobian (m, r).
+
+    friction (m,): coefficient with the sign of the sliding direction.
+    """
+    jacobian = np.zeros((len(friction), r))
+    turned = 0.0
+    for k in range(len(cables.cable)):
+        i = cables.cable[k]
+        x, y, z = tangent[k]
+        if k > 0 and cables.cable[k - 1] == i:
+            before = tangent[k - 1]
+            turned += np.arccos(max(-1.0, min(1.0, x * before[0] + y * before[1] + z * before[2])))
+        else:
+            turned = 0.0
+        share[k] = np.exp(-friction[i] * turned)
+        x, y, z = share[k] * x, share[k] * y, share[k] * z
+        row = jacobian[i]
+        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
+        for a in range(r):
+            row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
+    return jacobian
 
 
 @njit(cache=True, fastmath=REORDERED)
@@ -67,7 +101,7 @@ def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.nd
     r = len(matrix)
     rows, used = np.empty((2 * len(cables.cable) + 3, r)), 0
     for k in range(len(cables.cable)):
-        root = np.sqrt(tension[cables.cable[k]] / tendons.length[k])
+        root = np.sqrt(tendons.share[k] * tension[cables.cable[k]] / tendons.length[k])
         if root == 0.0:
             continue
         x, y, z = tendons.tangent[k]

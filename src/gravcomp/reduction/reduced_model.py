@@ -1,7 +1,8 @@
 """A robot's model projected on a reduced basis, u = Phi q with r coordinates q.
 
-The elastic forces are polynomials in q (`strain_polynomials`). The weight, the straight pieces of the cables and the
-cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) = e_k(0) + D_k q, sections(q) = sections(0) + S q.
+The elastic forces are polynomials in q (`strain_polynomials`), and what another law than "svk" adds (`law_deviation`). The
+weight, the straight pieces of the cables and the cross-sections are linear in the nodes and so in q: Phi^T (m x g), e_k(q) =
+e_k(0) + D_k q, sections(q) = sections(0) + S q.
 """
 
 import math
@@ -14,6 +15,8 @@ from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import pieces_of
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
+from gravcomp.reduction.cubature import Cubature
+from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_cables import ReducedCables
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 from gravcomp.rounding import REORDERED
@@ -23,16 +26,17 @@ from gravcomp.rounding import REORDERED
 class ReducedModel:
     """A model in r reduced coordinates.
 
-    basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g for nodal forces
-    f with the reduced force g; elasticity; weight (r, 3): force of unit gravity; cables; section_rest (n + 1, 3, 3) and
-    section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach: the largest |q| for which the model may be
-    used; error: largest tip error in m that was found when it was built.
+    basis (3 n_free, r); coordinates_of (r, 3 n_free): q = coordinates_of u; force_norm G (r, r): |f|^2 = g G g for nodal
+    forces f with the reduced force g; elasticity, and the law's deviation from it; weight (r, 3): force of unit gravity;
+    cables; section_rest (n + 1, 3, 3) and section_change (n + 1, 3, 3, r): as in `Effectors.sections`, the tip last; reach:
+    the largest |q| for which the model may be used; error: largest tip error in m that was found when it was built.
     """
 
     basis: np.ndarray
     coordinates_of: np.ndarray
     force_norm: np.ndarray
     elasticity: StrainPolynomials
+    deviation: LawDeviation
     weight: np.ndarray
     cables: ReducedCables
     section_rest: np.ndarray
@@ -91,11 +95,12 @@ def _observed(
     return sections, values, change, orientation
 
 
-def project(model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, reach: float, error: float) -> ReducedModel:
+def project(
+    model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials, cubature: Cubature, reach: float, error: float
+) -> ReducedModel:
     """Return the model on a basis (3 n_free, r). reach: largest |q| to use it for; error: known tip error in m."""
     r = basis.shape[1]
-    fields = np.zeros((r, len(model.mesh.nodes), 3))
-    fields[:, : model.n_free] = basis.T.reshape(r, model.n_free, 3)
+    fields = _fields(model, basis)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     weighted = matrix.multiply(basis)
@@ -107,6 +112,7 @@ def project(model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials,
         coordinates_of=coordinates_of,
         force_norm=coordinates_of @ coordinates_of.T,
         elasticity=elasticity,
+        deviation=cubature.deviation(model.elements, basis),
         weight=np.einsum("anj,n->aj", fields, model.nodal_weight),
         cables=ReducedCables(
             rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
@@ -114,9 +120,22 @@ def project(model: RobotModel, basis: np.ndarray, elasticity: StrainPolynomials,
             cable=np.array([cable for cable, _, _ in pieces], dtype=np.int64),
             rest_length=model.tendons.rest_length,
             axial_compliance=model.tendons.axial_compliance,
+            friction=model.tendons.friction.coefficient,
         ),
         section_rest=model.effectors.sections(model.mesh.nodes),
-        section_change=np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in fields], axis=-1)),
+        section_change=section_changes(model, basis),
         reach=reach,
         error=error,
     )
+
+
+def section_changes(model: RobotModel, basis: np.ndarray) -> np.ndarray:
+    """Return changes (n + 1, 3, 3, r) of the sections of `Effectors.sections` by the coordinates of a basis (3 n_free, r)."""
+    return np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in _fields(model, basis)], axis=-1))
+
+
+def _fields(model: RobotModel, basis: np.ndarray) -> np.ndarray:
+    """Return the modes (r, n, 3) of a basis (3 n_free, r) on all nodes."""
+    fields = np.zeros((basis.shape[1], len(model.mesh.nodes), 3))
+    fields[:, : model.n_free] = basis.T.reshape(-1, model.n_free, 3)
+    return fields

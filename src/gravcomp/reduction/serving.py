@@ -109,7 +109,7 @@ class ReducedServing:
         if not state.converged:
             return
         q = self.reduced.coordinates_of @ self._model.free(state.u)
-        self._tracker.place(q, state.tension)
+        self._tracker.place(q, state.tension, self._full.sliding)
         own = self._tracker.track(gravity, cables, iterations=10)
         error = float(np.linalg.norm(self.reduced.tip(own.q) - self._tip(state.u)))
         if own.converged and self.reduced.outside(own.q) <= 1.0 and error < 0.5 * self._tolerance:
@@ -122,12 +122,13 @@ class ReducedServing:
 
     def _hand_over(self) -> None:
         """Set the full model to the reduced model's shape."""
-        u = self.displacements
+        u, sliding = self.displacements, self._tracker.sliding
+        self._full.sliding = sliding
         self._full.state = dataclasses.replace(
             self._full.state,
             u=u,
             tension=self._tracker.state.tension.copy(),
-            tendons=self._model.tendons.state(self._model.mesh.nodes + u),
+            tendons=self._model.tendons.state(self._model.mesh.nodes + u, sliding.direction),
         )
 
     def _measured_error(self, gravity: np.ndarray, cables: CableInput) -> float:

@@ -7,6 +7,7 @@ for.
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,25 +15,27 @@ from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Robot
 from gravcomp.full_model.model import RobotModel
 from gravcomp.materials.laws import LAWS
-from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.mechanics.corotational import CorotationalElements
+from gravcomp.reduction.cubature import Cubature
 from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 7
+_FORMAT = 8
 
 
 @dataclass(frozen=True)
 class Reduction:
     """Stored result of the training.
 
-    basis (3 n_free, r) and elasticity at the Young's modulus `modulus` of the first material in Pa; reach: largest |q| to use
-    it for; modulus_low and modulus_high: trained range in Pa; samples: number of trained shapes; error_median and error_worst:
-    tip error in m over shapes that were not trained.
+    basis (3 n_free, r), elasticity and the cubature of the law's deviation at the Young's modulus `modulus` of the first
+    material in Pa; reach: largest |q| to use it for; modulus_low and modulus_high: trained range in Pa; samples: number of
+    trained shapes; error_median and error_worst: tip error in m over shapes that were not trained.
     """
 
     basis: np.ndarray
     elasticity: StrainPolynomials
+    cubature: Cubature
     reach: float
     modulus: float
     modulus_low: float
@@ -46,19 +49,13 @@ class Reduction:
         # With moduli s times as large, a basis of energy 1 is sqrt(s) times smaller, and so are the products of its gradients.
         root = float(np.sqrt(first_modulus(model) / self.modulus))
         elasticity = StrainPolynomials(self.elasticity.linear, self.elasticity.quadratic / root)
-        return project(model, self.basis / root, elasticity, self.reach * root, self.error_worst)
+        return project(model, self.basis / root, elasticity, self.cubature, self.reach * root, self.error_worst)
 
 
 def why_not(model: RobotModel) -> str:
     """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
-    if not isinstance(model.elements, SolidElements):
+    if isinstance(model.elements, CorotationalElements):
         return "corotational tetrahedra have no polynomial strain: the full model is used"
-    others = sorted({material.law for material in model.mesh.materials if not LAWS[material.law].quadratic})
-    if others:
-        allowed = " or ".join(name for name, law in LAWS.items() if law.quadratic)
-        return f"the reduction needs the law {allowed}, linear in Green's strain; for {', '.join(others)} the full model is used"
-    if model.tendons.friction.any():
-        return "cables with friction depend on their past motion: the full model is used"
     return ""
 
 
@@ -74,6 +71,9 @@ def path_of(model: RobotModel) -> Path:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
         for viscous in ("damping_time", "creep_ratio", "creep_time"):
             del material[viscous]
+        for law in LAWS.values():  # a constant counts only for the law that has it
+            for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):
+                material.pop(name, None)
     mesh, robot = model.mesh, model.robot
     cables = [dataclasses.asdict(cable) for cable in robot.cables]
     for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
@@ -92,9 +92,15 @@ def _disks(robot: Robot) -> list:
 
 def save(reduction: Reduction, path: Path) -> None:
     """Write the reduction atomically."""
-    values = {f.name: getattr(reduction, f.name) for f in dataclasses.fields(Reduction) if f.name != "elasticity"}
+    parts: dict[str, Any] = {}
+    for name in ("elasticity", "cubature"):
+        part_of = getattr(reduction, name)
+        parts |= {f"{name}_{f.name}": getattr(part_of, f.name) for f in dataclasses.fields(part_of)}
+    values = {
+        f.name: getattr(reduction, f.name) for f in dataclasses.fields(Reduction) if f.name not in ("elasticity", "cubature")
+    }
     part = path.with_name(path.stem + ".part.npz")
-    np.savez(part, strain_linear=reduction.elasticity.linear, strain_quadratic=reduction.elasticity.quadratic, **values)
+    np.savez(part, **parts, **values)
     part.replace(path)
 
 
@@ -104,9 +110,14 @@ def load(model: RobotModel) -> Reduction | None:
     if why_not(model) or not path.exists():
         return None
     with np.load(path) as stored:
-        values = {name: stored[name] for name in stored.files}
-    elasticity = StrainPolynomials(values.pop("strain_linear"), values.pop("strain_quadratic"))
-    numbers = {name: value.item() if value.ndim == 0 else value for name, value in values.items()}
-    reduction = Reduction(elasticity=elasticity, **numbers)
+        values: dict[str, Any] = {name: stored[name].item() if stored[name].ndim == 0 else stored[name] for name in stored.files}
+    reduction = Reduction(
+        elasticity=StrainPolynomials(**_taken(values, "elasticity_")), cubature=Cubature(**_taken(values, "cubature_")), **values
+    )
     covered = reduction.modulus_low * (1 - 1e-9) <= first_modulus(model) <= reduction.modulus_high * (1 + 1e-9)
     return reduction if covered else None
+
+
+def _taken(values: dict[str, Any], prefix: str) -> dict[str, Any]:
+    """Remove the values whose names begin with `prefix`, and return them without it."""
+    return {key.removeprefix(prefix): values.pop(key) for key in list(values) if key.startswith(prefix)}

@@ -1,5 +1,7 @@
 """Reduced elasticity of the St. Venant-Kirchhoff law: the strain as exact polynomials of the reduced coordinates.
 
+For the other laws it is the elasticity that is linear in Green's strain, to which `law_deviation` adds the rest.
+
 With u = sum_i phi_i q_i and G_i = grad phi_i, Green's strain is quadratic, E = sum e_i q_i + 1/2 sum e_ij q_i q_j with
 e_i = sym G_i and e_ij = sym G_i^T G_j. It is taken in a basis of strains s_m that is orthonormal in the elastic energy
 <a, b> = int a : C : b, as in the methods of assumed strain (Simo and Rifai 1990):
@@ -22,6 +24,7 @@ from numba import njit
 
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.basis import principal_combinations
+from gravcomp.reduction.point_gradients import on_nodes
 from gravcomp.rounding import REORDERED
 
 # Voigt's order 11 22 33 12 23 13 with doubled shear, as in the elements.
@@ -166,7 +169,7 @@ def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) ->
     """Yield the quadrature points in parts that fit into memory."""
     count = elements.weights.shape[1]
     at_once = max(1, _POINTS_AT_ONCE // count)
-    modes, shapes = _on_nodes(elements, basis), _on_nodes(elements, snapshots.T)
+    modes, shapes = on_nodes(elements, basis), on_nodes(elements, snapshots.T)
     for start in range(0, len(elements.weights), at_once):
         part = slice(start, start + at_once)
         gradient, moved = _gradient(elements, part, modes), _gradient(elements, part, shapes)
@@ -178,13 +181,6 @@ def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) ->
             shear=np.repeat(elements.constants.shear[part], count),
             weight=elements.weights[part].ravel(),
         )
-
-
-def _on_nodes(elements: SolidElements, columns: np.ndarray) -> np.ndarray:
-    """Return fields (n, 3, k) of the unknowns (3 n_free, k), zero at the clamp."""
-    fields = np.zeros((len(elements.mesh.nodes), 3, columns.shape[1]))
-    fields[: elements.n_free] = columns.reshape(elements.n_free, 3, -1)
-    return fields
 
 
 def _gradient(elements: SolidElements, part: slice, fields: np.ndarray) -> np.ndarray:

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, point_at
+from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.strain_polynomials import tangent
 from gravcomp.rounding import REORDERED
 
 
@@ -40,7 +40,7 @@ class ReducedState:
 
 
 class ReducedTracker:
-    """Tracks the equilibrium of a reduced model. Owns the current `state`."""
+    """Tracks the equilibrium of a reduced model. Owns the current `state`, and the `sliding` of the cables."""
 
     def __init__(
         self, model: ReducedModel, length: float, tolerance: float = 5e-5, longest_step: float = 0.12, near: float = 0.02
@@ -55,19 +55,31 @@ class ReducedTracker:
         self._body = body_of(model)
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
-    def place(self, q: np.ndarray, tension: np.ndarray) -> None:
-        """Start from the coordinates q (r,) under the tensions (m,)."""
+    def place(self, q: np.ndarray, tension: np.ndarray, sliding: Sliding | None = None) -> None:
+        """Start from the coordinates q (r,) under the tensions (m,). sliding: of the cables, default none."""
         m = len(tension)
+        self.sliding = sliding or Sliding.none(m)
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
-        self._point = point_at(self._body, q)
+        self._point = point_at(self._body, q, self.sliding.direction)
 
     def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4) -> ReducedState:
         """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`."""
         state = self.state
+        if self.model.cables.friction.any():
+            self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
         wound, given = cable_arrays(cables, state.tension.size)
         weight = self.model.weight @ gravity
         converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
-            self._body, self._point, state.q, state.tension, weight, wound, given, iterations, *self._limits
+            self._body,
+            self._point,
+            state.q,
+            state.tension,
+            weight,
+            wound,
+            given,
+            self.sliding.direction,
+            iterations,
+            *self._limits,
         )
         if not converged:
             return replace(state, residual=np.inf, converged=False)
@@ -78,24 +90,24 @@ class ReducedTracker:
 @njit(cache=True, fastmath=REORDERED)
 def _tracked(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
-    iterations: int, longest_step: float, near: float, tolerance: float,
+    pulling: np.ndarray, iterations: int, longest_step: float, near: float, tolerance: float,
 ) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
     """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
-    wound and given: of `body.cable_arrays`; the last three in m.
+    wound and given: of `body.cable_arrays`; pulling (m,): of `tendons_at`; the last three in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual = False, np.inf
     for _ in range(iterations):
-        matrix = tangent(point.jacobian, body.quadratic, point.strain, 1.0)
+        matrix = elastic_stiffness(body, point, point.strain, 1.0)
         add_stiffness(cables, point.tendons, tension, matrix)
         definite, factor = factorise(matrix)
         if not definite:
             break
         columns = np.empty((r, m + 4))
-        columns[:, 0] = weight - point.jacobian @ point.strain
-        columns[:, 1 : m + 1] = point.tendons.jacobian.T
+        columns[:, 0] = weight - elastic_force(point, point.strain)
+        columns[:, 1 : m + 1] = point.tendons.force_jacobian.T
         columns[:, m + 1 :] = body.tip.T
         solve(factor, columns)
         solved = np.ascontiguousarray(columns.T)
@@ -114,8 +126,8 @@ def _tracked(
             break
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
         q, tension = q + share * step, tension + share * (wanted - tension)
-        point = point_at(body, q)
-        out = weight - point.jacobian @ point.strain + tension @ point.tendons.jacobian
+        point = point_at(body, q, pulling)
+        out = weight - elastic_force(point, point.strain) + tension @ point.tendons.force_jacobian
         pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
         left = of_tip @ out + body.tip @ (answer.T @ pull)
         if size < near and (left**2).sum() < tolerance**2:

@@ -9,12 +9,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.cache import content_key
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError
 from gravcomp.reduction.basis import energy_basis
+from gravcomp.reduction.cubature import Cubature, choose
+from gravcomp.reduction.reduced_model import section_changes
 from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
@@ -30,12 +34,15 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to
-    decompose; training and test: motions to train and to test with.
+    decompose; integrated: number of shapes to choose the cubature of the law's deviation with, and cubature its tolerance;
+    training and test: motions to train and to test with.
     """
 
     modes: int = 44
     strains: int = 36
     decomposed: int = 1100
+    integrated: int = 150
+    cubature: float = 3e-4
     training: TrainingOptions = field(default_factory=TrainingOptions)
     test: TrainingOptions = field(default_factory=lambda: TrainingOptions(paths=6, steps=20, seed=1000))
 
@@ -61,8 +68,7 @@ def build(
             " the robot may be too soft for its weight"
         )
     progress("decomposing", 0.0)
-    shapes = np.array([sample.unknowns for sample in trained])
-    shapes = shapes[np.linspace(0, len(shapes) - 1, min(options.decomposed, len(shapes))).astype(int)]
+    shapes = evenly(np.array([sample.unknowns for sample in trained]), options.decomposed)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     basis = energy_basis(shapes, matrix.multiply, options.modes)
@@ -71,9 +77,14 @@ def build(
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
     coordinates = np.array([sample.unknowns for sample in trained]) @ matrix.multiply(basis)
+    cubature = Cubature.none()
+    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
+        sections = section_changes(model, basis)[:, 0] / model.length
+        cubature = choose(model.elements, basis, evenly(coordinates, options.integrated), sections, options.cubature)
     reduction = Reduction(
         basis=basis,
         elasticity=elasticity,
+        cubature=cubature,
         reach=_MARGIN * float(np.linalg.norm(coordinates, axis=1).max()),
         modulus=modulus,
         modulus_low=low * modulus,
@@ -92,6 +103,11 @@ def build(
     save(reduction, path_of(model))
     shutil.rmtree(kept.parent, ignore_errors=True)
     return reduction, time.perf_counter() - started
+
+
+def evenly(rows: np.ndarray, count: int) -> np.ndarray:
+    """Return at most `count` of the rows, evenly spaced."""
+    return rows[np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int)]
 
 
 @contextlib.contextmanager
@@ -116,7 +132,11 @@ def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) ->
     u = np.zeros_like(model.mesh.nodes)
     errors = []
     for sample in unseen:
-        tracker.place(reduced.coordinates_of @ sample.unknowns, sample.tension)
+        tracker.place(
+            reduced.coordinates_of @ sample.unknowns,
+            sample.tension,
+            Sliding(sample.pulling, np.full_like(sample.pulling, np.nan)),
+        )
         state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10)
         if state.converged:
             model.free(u)[:] = sample.unknowns

@@ -40,16 +40,20 @@ class TrainingOptions:
     seed: int = 1
 
 
-_ARRAYS = ("unknowns", "gravity", "tension")
+_ARRAYS = ("unknowns", "gravity", "tension", "pulling")
 
 
 @dataclass(frozen=True)
 class Sample:
-    """An equilibrium of the full model: unknowns (3 n_free,) in m, gravity (3,) in m/s^2, tension (m,) in N."""
+    """An equilibrium of the full model.
+
+    unknowns (3 n_free,) in m; gravity (3,) in m/s^2; tension (m,) in N; pulling (m,): sliding direction of each cable.
+    """
 
     unknowns: np.ndarray
     gravity: np.ndarray
     tension: np.ndarray
+    pulling: np.ndarray
 
 
 def samples(
@@ -111,7 +115,8 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     for step in range(options.steps):
         shape = simulator.step(gravity, displacement)
         if shape.status == ShapeStatus.OK:
-            yield Sample(model.free(simulator.displacements).copy(), gravity, shape.cable_tension.copy())
+            unknowns = model.free(simulator.displacements).copy()
+            yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction)
         if step % _STEPS_A_TURN == 0:
             axis = _direction(rng)
         gravity = _rotated(gravity, axis, _TURN)

@@ -1,0 +1,166 @@
+"""Choice of the integration points and weights for the deviation of a law (`law_deviation`): empirical cubature.
+
+The points are Gauss points of the elements. With a_ps = B_p^T T_p (r,), the deviation's force at point p in the trained shape s,
+the weights solve
+
+    min |W (sum_p w_p a_p - b)|,    b = sum over all points with their true weights,    w >= 0,    few of them not zero.
+
+The stiffness is nearly the identity in the coordinates q, so a force df that is in error moves the observed sections by S df:
+W^T W = S^T S / (n L^2) + beta^2 I measures the error of n sections as a fraction of the length L, and a little of all others.
+
+Of the two usual methods, energy-conserving sampling of elements (C. Farhat et al., IJNME 98, 2014) and empirical cubature at
+points (J. A. Hernandez, M. A. Caicedo, A. Ferrer, CMAME 313, 2017), this is the second: an element has eight points, so a choice
+of single points evaluates the law less often for the same error. The non-negative least squares of the first method are kept,
+because they need no singular values of all integrands: the active set of Lawson and Hanson (1974), stopped as soon as the error
+is small enough (T. Chapman et al., IJNME 109, 2017), on the normal equations. Positive weights keep the sum a sum of energies of
+real points, which is stable where the law is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from gravcomp.mechanics.kinematics import green_strain
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.law_deviation import LawDeviation, deviating_stress
+from gravcomp.reduction.point_gradients import mode_gradients
+from gravcomp.rounding import REORDERED
+
+# Largest number of points to choose from (a larger body offers a random part of its points), and of points at once.
+_CANDIDATES, _AT_ONCE = 3000, 200
+_ROUNDING = 1e-14
+# beta as a fraction of the root of the trace of the sections' part.
+_OTHERS = 0.1
+
+
+@dataclass(frozen=True)
+class Cubature:
+    """Chosen points: element (p,), number of the point in its element (p,), weight (p,) in m^3; error: that of the choice.
+
+    The error is the displacement of the sections that it causes, as a fraction of the length, root mean square over the shapes
+    that it was chosen with.
+    """
+
+    element: np.ndarray
+    point: np.ndarray
+    weight: np.ndarray
+    error: float = 0.0
+
+    @staticmethod
+    def none() -> "Cubature":
+        """Return the cubature of a law without deviation."""
+        empty = np.zeros(0, dtype=np.int64)
+        return Cubature(empty, empty, np.zeros(0))
+
+    def deviation(self, elements: SolidElements, basis: np.ndarray) -> LawDeviation:
+        """Return the arrays of the points for a basis (3 n_free, r)."""
+        gradient = mode_gradients(elements, basis, self.element, self.point)
+        constants = elements.constants
+        return LawDeviation(
+            np.ascontiguousarray(gradient.transpose(3, 1, 2, 0).reshape(basis.shape[1], -1), dtype=np.float32),
+            self.weight,
+            constants.law[self.element],
+            constants.values[self.element],
+        )
+
+
+def choose(
+    elements: SolidElements, basis: np.ndarray, coordinates: np.ndarray, sections: np.ndarray, tolerance: float
+) -> Cubature:
+    """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
+
+    sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length; tolerance: largest `error` of
+    the result.
+    """
+    observed = sections.reshape(-1, basis.shape[1])
+    metric = observed.T @ observed / len(sections)
+    metric += _OTHERS**2 * np.trace(metric) * np.eye(len(metric))
+    weighing = np.linalg.cholesky(metric).T
+    element, point = (index.ravel() for index in np.indices(elements.weights.shape))
+    weight = elements.weights.ravel()
+    shuffled = np.random.default_rng(0).permutation(len(weight))
+    candidates = np.sort(shuffled[:_CANDIDATES])
+    is_candidate = np.isin(np.arange(len(weight)), candidates)
+    total, columns = np.zeros(coordinates.size), []
+    for start in range(0, len(weight), _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        forces = _forces(elements, basis, weighing, coordinates, element[part], point[part])
+        total += forces @ weight[part]
+        columns.append(forces[:, is_candidate[part]])
+    forces = np.hstack(columns)
+    root = np.sqrt(len(coordinates))
+    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root)
+    at = candidates[chosen]
+    return Cubature(element[at], point[at], found, left / root)
+
+
+def sparse_weights(gram: np.ndarray, products: np.ndarray, square: float, allowed: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return indices (p,), positive weights (p,) and remaining |A w - b| of few columns of A for which it is at most `allowed`.
+
+    gram A^T A (c, c); products A^T b (c,); square b^T b.
+    """
+    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    weights = np.zeros(len(products))
+    active = np.zeros(len(products), dtype=bool)
+    left = np.sqrt(square)
+    for _ in range(3 * len(products)):
+        if left <= max(allowed, 1e-7 * np.sqrt(square)):
+            break
+        gain = np.where(active, -np.inf, (products - gram @ weights) / scale)
+        best = int(np.argmax(gain))
+        if gain[best] <= _ROUNDING * np.sqrt(square):
+            break
+        active[best] = True
+        while True:
+            index = np.flatnonzero(active)
+            block = gram[np.ix_(index, index)] / np.outer(scale[index], scale[index])
+            solved = np.linalg.lstsq(block, products[index] / scale[index], rcond=1e-12)[0] / scale[index]
+            if (solved > 0.0).all():
+                weights[:] = 0.0
+                weights[index] = solved
+                break
+            # Go toward the solution until the first weight is zero, and leave that column out.
+            before, falling = weights[index], solved <= 0.0
+            share = (before[falling] / (before[falling] - solved[falling])).min()
+            weights[index] = before + share * (solved - before)
+            active[index[falling & (weights[index] <= 1e-12 * weights.max())]] = False
+            weights[~active] = 0.0
+        left = np.sqrt(max(0.0, square - 2.0 * products @ weights + weights @ gram @ weights))
+    index = np.flatnonzero(weights)
+    return index, weights[index], float(left)
+
+
+def _forces(
+    elements: SolidElements,
+    basis: np.ndarray,
+    weighing: np.ndarray,
+    coordinates: np.ndarray,
+    element: np.ndarray,
+    point: np.ndarray,
+) -> np.ndarray:
+    """Return W a (s r, p) of some points, for W (r, r) and coordinates (s, r)."""
+    gradient = mode_gradients(elements, basis, element, point)
+    deformation = np.einsum("pija,sa->spij", gradient, coordinates, optimize=True) + np.eye(3)
+    piola = np.empty_like(deformation)
+    _piola(deformation, elements.constants.law[element], elements.constants.values[element], piola)
+    weighed = np.einsum("pija,ka->pijk", gradient, weighing, optimize=True)
+    return np.einsum("spij,pijk->skp", piola, weighed, optimize=True).reshape(-1, len(element))
+
+
+@njit(cache=True, fastmath=REORDERED)
+def _piola(deformation: np.ndarray, law: np.ndarray, constants: np.ndarray, piola: np.ndarray) -> None:
+    """Write F T (s, p, 3, 3) for F (s, p, 3, 3)."""
+    s, d, e, t = np.empty(6), np.empty((6, 6)), np.empty(6), np.empty((3, 3))
+    for k in range(deformation.shape[0]):
+        for p in range(deformation.shape[1]):
+            f = deformation[k, p]
+            green_strain(f, e)
+            deviating_stress(law[p], constants[p], e, s, d, False)
+            t[0, 0], t[1, 1], t[2, 2] = s[0], s[1], s[2]
+            t[0, 1] = t[1, 0] = s[3]
+            t[1, 2] = t[2, 1] = s[4]
+            t[0, 2] = t[2, 0] = s[5]
+            for i in range(3):
+                for j in range(3):
+                    piola[k, p, i, j] = f[i, 0] * t[0, j] + f[i, 1] * t[1, j] + f[i, 2] * t[2, j]
