@@ -4,7 +4,16 @@ setup(
     name="gravcomp",
     version="0.1.0",
     packages=find_packages(include=["gravcomp", "gravcomp.*"]),
-    package_data={"gravcomp": ["robots/*", "canbus/*.dbc", "environment/*.in", "environment/*.xml", "references/*.csv"]},
+    package_data={
+        "gravcomp": [
+            "robots/*",
+            "canbus/*.dbc",
+            "environment/*.in",
+            "environment/*.xml",
+            "references/*.csv",
+            "experiments/measured/*.yaml",
+        ]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/gravcomp"]),
         ("share/gravcomp", ["package.xml"]),

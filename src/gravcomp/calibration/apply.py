@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gravcomp.calibration.pose_prediction import moved
+from gravcomp.calibration.poses import PoseParameters
 from gravcomp.calibration.statics import StaticParameters
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
@@ -37,8 +39,17 @@ def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Har
     return dataclasses.replace(hardware, motors=motors, drive=drive)
 
 
-def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardware: Hardware) -> None:
-    """Write the robot's file `source` to `target` with the calibrated values of `robot` and `hardware`.
+def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
+    """Return the robot with the modulus and the places of the cables that were fitted to poses."""
+    cables = tuple(
+        moved(cable, float(angle), float(radius))
+        for cable, angle, radius in zip(robot.cables, parameters.angle, parameters.tip_radius)
+    )
+    return dataclasses.replace(robot.with_material(youngs_modulus=parameters.youngs_modulus), cables=cables)
+
+
+def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardware: Hardware | None) -> None:
+    """Write the robot's file `source` to `target` with the calibrated values of `robot` and, if given, `hardware`.
 
     Comments and order are kept. Raises ConfigError if it cannot be written.
     """
@@ -50,13 +61,17 @@ def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardw
         if segment.material.creep_ratio:
             material["creep_ratio"] = round(segment.material.creep_ratio, 5)
             material["creep_time"] = round(segment.material.creep_time, 4)
-    for entry, cable in zip(document["robot"]["cables"], robot.cables):
+    for entry, cable in zip(document["robot"].get("cables", []), robot.cables):
         if cable.axial_stiffness is not None:
             entry["axial_stiffness"] = round(cable.axial_stiffness, 2)
-    motors = document.get("hardware") or {}
-    for entry, motor in zip(motors.get("motors", []), hardware.motors):
-        entry["offset_mm"] = round(motor.offset * 1e3, 4)
-    if motors:
+        if cable.angle is not None and abs(math.degrees(cable.angle) - entry["angle_deg"]) > 1e-6:
+            entry["angle_deg"] = round(math.degrees(cable.angle), 3)
+        if cable.tip_radius is not None:
+            entry["tip_radius_mm"] = round(1e3 * cable.tip_radius, 4)
+    motors = document.get("hardware") or {} if hardware is not None else {}
+    if hardware is not None and motors:
+        for entry, motor in zip(motors.get("motors", []), hardware.motors):
+            entry["offset_mm"] = round(motor.offset * 1e3, 4)
         motors.setdefault("drive", {})["capstan_radius_mm"] = round(hardware.drive.capstan_radius * 1e3, 5)
     _write(document, target)
 

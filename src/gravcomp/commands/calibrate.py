@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from gravcomp.calibration.measured import Measured
     from gravcomp.closed_loop.setup import Setup
+    from gravcomp.description import RobotFile
     from gravcomp.report.result import Result
     from gravcomp.sweep import Sweep
 
@@ -31,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
         " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
-        " measured/tip (geometry_msgs/PoseStamped in soft_base)."
+        " measured/tip (geometry_msgs/PoseStamped in soft_base). With --mapping, DATA is a table of poses at rest with any"
+        " columns, measured by markers anywhere on the robot, under tensions or displacements and hung weights."
     )
     parser.add_argument(
         "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual' measures the virtual robot of the robot file"
@@ -51,6 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-offsets", action="store_true", help="keep the cable offsets of the robot file")
     parser.add_argument("--no-compliance", action="store_true", help="keep the cable elasticity of the robot file")
     parser.add_argument("--no-winding", action="store_true", help="keep the capstan radius of the robot file")
+    parser.add_argument(
+        "--mapping",
+        metavar="YAML",
+        help="DATA is a table of poses at rest with any columns; this file says what they mean, and what is fitted",
+    )
     parser.add_argument("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
 
 
@@ -71,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.sweep import Sweep
 
     file = load_robot_file(args.robot)
+    if args.mapping:
+        return _poses(args, file)
     setup = Setup.of(file)
     prepare_model(args.robot)
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
@@ -110,6 +119,45 @@ def run(args: argparse.Namespace) -> int:
     )
     if not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
+    result.seconds = time.perf_counter() - started
+    page = write_report(result, Path(args.out).expanduser())
+    output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))
+    return 0
+
+
+def _poses(args: argparse.Namespace, file: "RobotFile") -> int:
+    """Fit to a table of poses, and write. Returns 0. Raises ConfigError."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from gravcomp.calibration.apply import robot_of_poses, write_calibrated
+    from gravcomp.calibration.mapping import load_mapping
+    from gravcomp.calibration.measured import MeasurementError
+    from gravcomp.calibration.pose_fit import fit_poses
+    from gravcomp.calibration.pose_report import pose_result
+    from gravcomp.calibration.pose_table import read_poses
+    from gravcomp.calibration.pose_unknowns import unknowns_of
+    from gravcomp.config import ConfigError
+    from gravcomp.mesh import MeshError
+    from gravcomp.report.page import write_report
+
+    mapping = load_mapping(args.mapping)
+    target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
+    started = time.perf_counter()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=output.console(), transient=True) as progress:
+        task = progress.add_task("reading")
+        try:
+            poses = read_poses(args.data, mapping, file.robot.cable_names)
+            fit = fit_poses(
+                file.robot,
+                poses,
+                unknowns_of(mapping.fit, file.robot),
+                progress=lambda stage: progress.update(task, description=stage),
+            )
+        except (MeasurementError, MeshError) as error:
+            raise ConfigError(str(error)) from error
+    write_calibrated(file.source, target, robot_of_poses(file.robot, fit.parameters), None)
+    result = pose_result(poses, fit, str(target))
     result.seconds = time.perf_counter() - started
     page = write_report(result, Path(args.out).expanduser())
     output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
-from gravcomp.experiments import EXPERIMENTS, experiment
+from gravcomp.experiments import EXPERIMENTS, MEASURED, experiment
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -20,10 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     lines = "\n".join(f"  {name:<14}{summary}" for name, summary in EXPERIMENTS.items())
     parser.description = (
         "Reproduce the article's experiments on the virtual robot, or evaluate a recording of your own robot (--bag):"
-        f"\n\n{lines}\n  {'all':<14}all of them, with an index page"
+        f"\n\n{lines}\n  {'all':<14}all of them, with an index page\n  {'measured':<14}{MEASURED}"
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("name", choices=[*EXPERIMENTS, "all"], metavar="NAME", help="name of the experiment, or all")
+    parser.add_argument(
+        "name", choices=[*EXPERIMENTS, "all", "measured"], metavar="NAME", help="name of the experiment, all or measured"
+    )
+    parser.add_argument(
+        "data",
+        nargs="?",
+        metavar="DATA",
+        help="with measured: folder of the measurements (default: GRAVCOMP_DATA, else ../shared/data)",
+    )
     parser.add_argument("--out", metavar="DIR", default="reports", help="folder for the pages and JSON (default: reports)")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     parser.add_argument("--seed", type=int, help="seed of the virtual robot's noise (default: the robot file's)")
@@ -60,6 +68,10 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.trials.context import Context
 
     names = list(EXPERIMENTS) if args.name == "all" else [args.name]
+    if args.data and args.name != "measured":
+        raise ConfigError(f"DATA is {args.data}: only measured takes a folder of measurements, {args.name} does not")
+    if args.bag and args.name == "measured":
+        raise ConfigError("--bag does not apply to measured, which evaluates the measurements in DATA")
     if args.write and args.bag:
         raise ConfigError("--write and --bag exclude each other: a document takes the figures of the virtual robot")
     if args.write and args.brief:
@@ -72,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"--out is {folder}: cannot be created: {error.strerror}") from error
+    if args.name == "measured":
+        return _measured(args, folder)
     file = load_robot_file(args.robot)
     if args.bag:
         return _evaluate_bag(args, Setup.of(file), folder)
@@ -104,6 +118,31 @@ def run(args: argparse.Namespace) -> int:
     if len(results) > 1:
         pages.append(write_index(results, folder))
     return _print(results, pages)
+
+
+def _measured(args: argparse.Namespace, folder: Path) -> int:
+    """Evaluate what others measured. Returns the exit code."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from gravcomp.experiments import measured
+    from gravcomp.report import figures_table
+    from gravcomp.report.page import write_report
+
+    started = time.perf_counter()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=output.console(), transient=True) as progress:
+        task = progress.add_task("measured")
+        result = measured.run(
+            Path(args.data).expanduser() if args.data else measured.default_folder(),
+            lambda stage: progress.update(task, description=stage),
+            brief=args.brief,
+        )
+    result.seconds = time.perf_counter() - started
+    if args.brief:
+        result.notes.insert(0, "Run with --brief: fewer cases on coarser meshes.")
+    if args.write:
+        figures_table.renew(Path(args.write), "reproduce measured", result.figures)
+    return _print([result], [write_report(result, folder)])
 
 
 def _evaluate_bag(args: argparse.Namespace, setup: "Setup", folder: Path) -> int:

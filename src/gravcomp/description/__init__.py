@@ -11,6 +11,7 @@ from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
 from gravcomp.description.outline import Outline
+from gravcomp.description.point_load import PointLoad
 from gravcomp.description.rest_shape import RestShape
 from gravcomp.description.robot import Effectors, Payload, Robot
 from gravcomp.description.robot_file import RobotFile, load_robot_file, shipped_robots
@@ -19,5 +20,5 @@ from gravcomp.description.segment import Segment
 
 __all__ = [
     "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
-    "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
+    "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
 ]  # fmt: skip

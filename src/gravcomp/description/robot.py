@@ -15,6 +15,7 @@ from gravcomp.description.cable import Cable
 from gravcomp.description.cable_path import check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.point_load import PointLoad
 from gravcomp.description.segment import Segment, check_joint
 
 
@@ -54,6 +55,7 @@ class Robot:
     effectors: Effectors = parameter(default_factory=Effectors, description="observed points")
     limits: Limits = parameter(default_factory=Limits, description="limits of every cable")
     payload: Payload = parameter(default_factory=Payload, description="weight at the tip")
+    loads: tuple[PointLoad, ...] = parameter((), description="weights hung from points of the body")
     imu_mount: ImuMount = parameter(default_factory=ImuMount, description="mount of the IMU")
 
     def __post_init__(self) -> None:

@@ -1,6 +1,7 @@
 """The article's experiments, one module per experiment with `TITLE` and `run(context) -> Result`.
 
 EXPERIMENTS lists them in the order of the article; a module is imported when its experiment runs.
+`measured` is a package for measurements of other authors, which the user provides.
 `gravcomp.evaluation.recorded` evaluates a bag of your own robot by the same measures.
 """
 
@@ -19,6 +20,8 @@ EXPERIMENTS = {
     "colonoscopy": "reaching into a colon, patient supine and left lateral",
     "delay": "latency from gravity to motor current, its cost, and the effect of prediction",
 }
+
+MEASURED = "the model against what others measured, in the folder DATA"
 
 
 def experiment(name: str) -> ModuleType:

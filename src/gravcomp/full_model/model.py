@@ -11,6 +11,7 @@ from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import Tendons, pieces_of
 from gravcomp.description import Robot
 from gravcomp.full_model.effectors import Effectors
+from gravcomp.full_model.hung_loads import hung_weights
 from gravcomp.full_model.mesh_choice import with_elements
 from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
@@ -23,7 +24,8 @@ class RobotModel:
     """The finite-element model of a robot.
 
     Attributes: robot; mesh, renumbered; pattern of the stiffness; elements; tendons; effectors; body_weight and nodal_weight
-    (n,): mass in kg that gravity acts on at each node, without and with the payload; n_free: number of free nodes; length in m.
+    (n,): mass in kg that gravity acts on at each node, without and with payload, loads and disks; n_free: number of free nodes;
+    length in m.
     """
 
     def __init__(self, robot: Robot, mesh: Mesh | None = None):
@@ -46,6 +48,9 @@ class RobotModel:
         self.effectors = Effectors(mesh, robot.effectors.backbone_station)
         self.body_weight = self.elements.nodal_mass()
         self.nodal_weight = self.body_weight + robot.payload.mass * self.effectors.tip_weights
+        self._hung = hung_weights(robot, mesh)
+        for load, weights in zip(robot.loads, self._hung):
+            self.nodal_weight = self.nodal_weight + load.mass * weights
         if self.disks is not None:
             self.nodal_weight = self.nodal_weight + self.disks.mass @ self.disks.rows[:, 0]
         self.length = robot.length
@@ -65,6 +70,8 @@ class RobotModel:
         self.elements.add_mass(matrix, 1.0)
         if self.robot.payload.mass > 0.0:
             self._add_point_mass(matrix, self.robot.payload.mass, self.effectors.tip_weights)
+        for load, weights in zip(self.robot.loads, self._hung):
+            self._add_point_mass(matrix, load.mass, weights)
         if self.disks is not None:
             for mass, inertia, rows in zip(self.disks.mass, self.disks.inertia, self.disks.rows):
                 for factor, weights in zip((mass, inertia, inertia), rows):

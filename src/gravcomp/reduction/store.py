@@ -79,9 +79,23 @@ def path_of(model: RobotModel) -> Path:
     for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
         del cable["axial_stiffness"]
     key = content_key(
-        _FORMAT, mesh.kind, mesh.nodes, mesh.elements, mesh.region, materials, cables, robot.payload, *_disks(robot)
+        _FORMAT,
+        mesh.kind,
+        mesh.nodes,
+        mesh.elements,
+        mesh.region,
+        materials,
+        cables,
+        robot.payload,
+        *_loads(robot),
+        *_disks(robot),
     )
     return cache_path("reduction", key, ".npz")
+
+
+def _loads(robot: Robot) -> list:
+    """Return the weights hung from the body; empty without any, so that such robots keep their keys."""
+    return [[dataclasses.asdict(load) for load in robot.loads]] if robot.loads else []
 
 
 def _disks(robot: Robot) -> list:

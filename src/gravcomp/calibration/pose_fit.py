@@ -1,0 +1,192 @@
+"""Least-squares fit to measured poses, with intervals and cross-validation.
+
+    min over x of  sum |marker(x) - measured|^2 / sigma^2 + sum_i x_i^2
+
+x holds the logarithm of the modulus, which has no prior, and the other unknowns in units of the standard deviation of their
+priors. Intervals hold at 95 %, from the Jacobian at the solution as in `fit`.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.pose_prediction import PosePredictor
+from gravcomp.calibration.poses import PoseParameters, Poses
+from gravcomp.description import Robot
+
+NOISE = 3e-3  # m: expected error of model and markers; weighs the data against the priors
+_DIFFERENCE = 1e-2  # step of difference quotients, in x
+_FARTHEST = 5.0  # bound of unknowns with a prior
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseUnknown:
+    """One entry of x: `field` of PoseParameters at `index` (None: all entries alike).
+
+    scale: the prior's standard deviation in SI.
+    """
+
+    name: str
+    unit: str
+    field: str
+    index: int | None
+    scale: float
+    factor: float = 1.0  # from SI to `unit`
+
+    @property
+    def free(self) -> bool:
+        """Whether there is no prior."""
+        return self.field == "youngs_modulus"
+
+    def added(self, parameters: PoseParameters, x: float) -> PoseParameters:
+        """Return the parameters changed by x."""
+        if self.free:
+            return dataclasses.replace(parameters, youngs_modulus=parameters.youngs_modulus * float(np.exp(x)))
+        value = getattr(parameters, self.field).copy()
+        value[slice(None) if self.index is None else self.index] += x * self.scale
+        return dataclasses.replace(parameters, **{self.field: value})
+
+
+MODULUS = PoseUnknown("Young's modulus", "kPa", "youngs_modulus", None, 1.0, 1e-3)
+BASE = tuple(
+    PoseUnknown(f"base {field[5:]} {axis}", unit, field, index, scale, factor)
+    for field, unit, scale, factor in (("base_position", "mm", 5e-3, 1e3), ("base_rotation", "deg", 0.05, 180 / np.pi))
+    for index, axis in enumerate("xyz")
+)
+"""The rigid offset of the base: 5 mm and 0.05 rad."""
+
+
+def tension_gain(cable: int | None = None, name: str = "tension gain") -> PoseUnknown:
+    """Return the gain of one cable, or of all alike: 10 %."""
+    return PoseUnknown(name, "", "gain", cable, 0.1)
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseEstimate:
+    """A fitted value with its half interval at 95 %, both in `unit`."""
+
+    name: str
+    unit: str
+    initial: float
+    value: float
+    interval: float
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseFit:
+    """Result of a fit: x, parameters, estimates, the predicted markers (k, p, 3) in m, and the root mean square distance in m."""
+
+    x: np.ndarray
+    parameters: PoseParameters
+    estimates: tuple[PoseEstimate, ...]
+    predicted: np.ndarray
+    rms_before: float
+    rms: float
+    evaluations: int
+
+
+def fit_poses(
+    robot: Robot,
+    poses: Poses,
+    unknowns: Sequence[PoseUnknown],
+    *,
+    noise: float = NOISE,
+    start: np.ndarray | None = None,
+    predictor: PosePredictor | None = None,
+    progress: Callable[[str], None] = lambda sentence: None,
+) -> PoseFit:
+    """Fit the unknowns to the poses. Raises MeasurementError if the described robot has no equilibrium in a pose."""
+    from scipy.optimize import least_squares
+    from scipy.stats import t as student
+
+    predictor = predictor or PosePredictor(robot, poses)
+    initial = predictor.initial()
+    prior = np.array([not unknown.free for unknown in unknowns])
+    count = 0
+
+    def at(x: np.ndarray) -> PoseParameters:
+        parameters = initial
+        for unknown, entry in zip(unknowns, x):
+            parameters = unknown.added(parameters, float(entry))
+        return parameters
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += 1
+        error = predictor.predict(at(x)) - poses.measured
+        progress(f"evaluation {count}: {1e3 * distance(error):.3f} mm RMS")
+        return np.concatenate([error.ravel() / noise, x[prior]])
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        here, columns = residuals(x), []
+        for step in _DIFFERENCE * np.eye(len(x)):
+            column = (residuals(x + step) - here) / _DIFFERENCE
+            if not np.isfinite(column).all():  # beyond the end of a branch of equilibria
+                column = (here - residuals(x - step)) / _DIFFERENCE
+            columns.append(np.nan_to_num(column))
+        return np.column_stack(columns)
+
+    x = np.zeros(len(unknowns)) if start is None else np.asarray(start, dtype=float)
+    before = residuals(x)
+    if not np.isfinite(before).all():
+        lost = np.flatnonzero(np.isnan(before[: poses.measured.size].reshape(poses.count, -1)).any(axis=1))
+        raise MeasurementError(f"{poses.source}: the robot has no equilibrium in pose {poses.name[lost[0]]}")
+    solution = least_squares(residuals, x, jac=jacobian, bounds=(-_FARTHEST, _FARTHEST), xtol=1e-3, ftol=1e-4, max_nfev=15)
+    parameters = at(solution.x)
+    predicted = predictor.predict(parameters)
+    freedom = max(1, poses.measured.size - len(unknowns))
+    data = solution.jac[: poses.measured.size]
+    misfit = (predicted - poses.measured).ravel() / noise
+    precision = data.T @ data / max(float(misfit @ misfit) / freedom, 1e-12) + np.diag(prior.astype(float))
+    half = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(np.linalg.pinv(precision)))
+    estimates = tuple(
+        _estimate(unknown, initial, parameters, float(value), float(width))
+        for unknown, value, width in zip(unknowns, solution.x, half)
+    )
+    rms_before = distance(before[: poses.measured.size].reshape(poses.measured.shape) * noise)
+    return PoseFit(solution.x, parameters, estimates, predicted, rms_before, distance(predicted - poses.measured), count)
+
+
+def held_out(
+    robot: Robot,
+    poses: Poses,
+    unknowns: Sequence[PoseUnknown],
+    folds: Sequence[np.ndarray],
+    *,
+    noise: float = NOISE,
+    start: np.ndarray | None = None,
+    progress: Callable[[str], None] = lambda sentence: None,
+) -> np.ndarray:
+    """Return the markers (k, p, 3) predicted for the poses of each fold by a fit to all the others."""
+    predicted = np.full_like(poses.measured, np.nan)
+    for number, fold in enumerate(folds):
+        rest = np.setdiff1d(np.arange(poses.count), fold)
+
+        def show(sentence: str, number: int = number) -> None:
+            progress(f"fold {number + 1} of {len(folds)}, {sentence}")
+
+        fit = fit_poses(robot, poses.rows(rest), unknowns, noise=noise, start=start, progress=show)
+        predicted[fold] = PosePredictor(robot, poses.rows(fold)).predict(fit.parameters)
+    return predicted
+
+
+def distance(error: np.ndarray) -> float:
+    """Return the root mean square length of errors (..., 3)."""
+    return float(np.sqrt((error**2).sum(axis=-1).mean()))
+
+
+def _estimate(unknown: PoseUnknown, initial: PoseParameters, final: PoseParameters, x: float, half: float) -> PoseEstimate:
+    if unknown.free:
+        value = unknown.factor * final.youngs_modulus
+        return PoseEstimate(unknown.name, unknown.unit, unknown.factor * initial.youngs_modulus, value, value * half)
+    index = 0 if unknown.index is None else unknown.index
+    before = float(getattr(initial, unknown.field)[index])
+    return PoseEstimate(
+        unknown.name,
+        unknown.unit,
+        unknown.factor * before,
+        unknown.factor * (before + x * unknown.scale),
+        unknown.factor * half * unknown.scale,
+    )

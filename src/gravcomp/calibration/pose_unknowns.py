@@ -1,0 +1,35 @@
+"""The unknowns that a mapping's `fit` stands for."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gravcomp.calibration.pose_fit import BASE, MODULUS, PoseUnknown, tension_gain
+from gravcomp.description import Robot
+
+ZERO_PRIOR = 1e-3  # m
+RADIUS_PRIOR = 0.5e-3  # m
+ANGLE_PRIOR = np.radians(4.0)
+
+
+def unknowns_of(fit: Sequence[str], robot: Robot) -> tuple[PoseUnknown, ...]:
+    """Return the unknowns of the entries of `fit`, in the order of `mapping.FITTED`."""
+    names = robot.cable_names
+    found: list[PoseUnknown] = []
+    if "modulus" in fit:
+        found.append(MODULUS)
+    if "gain" in fit:
+        found.append(tension_gain())
+    if "gain_per_cable" in fit:
+        found += [tension_gain(index, f"gain of {name}") for index, name in enumerate(names)]
+    if "zeros" in fit:
+        found += [PoseUnknown(f"zero of {name}", "mm", "zero", index, ZERO_PRIOR, 1e3) for index, name in enumerate(names)]
+    if "angles" in fit:
+        found += [
+            PoseUnknown(f"angle of {name}", "deg", "angle", index, ANGLE_PRIOR, 180 / np.pi) for index, name in enumerate(names)
+        ]
+    if "tip_radius" in fit:
+        found.append(PoseUnknown("pitch radius at the cables' ends", "mm", "tip_radius", None, RADIUS_PRIOR, 1e3))
+    if "base" in fit:
+        found += BASE
+    return tuple(found)
