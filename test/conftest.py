@@ -1,5 +1,6 @@
 """Fixtures of the tests that run the product as a user does: by its commands, as processes."""
 
+import functools
 import json
 import os
 import shutil
@@ -123,3 +124,18 @@ def recording():
     if not files:
         pytest.skip(f"no recordings with ground truth. {WHERE}")
     return files[0]
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
+
+    @functools.cache
+    def run(words: tuple[str, ...]) -> tuple[int, str]:
+        done = subprocess.run([*words, "--brief"], cwd=folder, capture_output=True, text=True, timeout=800)
+        return done.returncode, done.stderr + done.stdout
+
+    def made(line: str) -> tuple[int, str]:
+        return run(tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md")))
+
+    return made

@@ -3,8 +3,7 @@
 A value replaces each placeholder (FILE, ROBOT.yaml), and what a line writes goes into a folder of the test. Lines for a CAN
 device must give the error of a machine without one; lines that start other programmes are not run.
 
-This file runs lines that need no running graph. `test_documented_graph`, `test_documented_nodes` and `test_documented_figures`
-run the others.
+This file runs lines that need no running graph. The other files `test_documented_*` run the others.
 """
 
 import os
