@@ -1,4 +1,4 @@
-"""The division of segments into elements: a well-shaped one, and the one that reaches an accuracy.
+"""The division of segments into elements that reaches an accuracy.
 
 The tip is computed under the robot's own weight, horizontally, and bent by a cable. A coarse mesh is refined in one direction
 after the other (along, around, radially) until the remaining error of that direction is within its share of `ACCURACY`: the
@@ -40,17 +40,6 @@ _RATIO = 0.4
 _SAFE, _PARTS = 0.7, 4
 # The bent robot's tip is turned by up to this angle (rad).
 _BENT = 1.6
-
-
-def with_elements(robot: Robot) -> Robot:
-    """Return the robot with well-shaped elements, where it consists of segments and its file gives none.
-
-    They cost nothing to find, but their error is not known: `chosen_elements` finds those that reach `ACCURACY`.
-    """
-    if robot.body is not None or robot.elements is not None:
-        return robot
-    coarse = coarse_elements(robot)
-    return dataclasses.replace(robot, elements=well_shaped(robot, coarse) or coarse)
 
 
 def chosen_elements(robot: Robot) -> Elements:
