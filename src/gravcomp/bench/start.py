@@ -143,9 +143,11 @@ def _messages(port: int) -> Iterator[bytes]:
 def _nodes_active(clone: Path, environment: dict[str, str]) -> float:
     """Return the seconds (s) that `up --virtual` takes from starting its nodes until all are active."""
     command = [str(clone / "gravcomp"), "up", "--virtual", "--channel", private_channel(), "--interface", "udp_multicast"]
-    process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     try:
-        for line in process.stderr or ():
+        for line in process.stdout or ():
             if found := _ACTIVE.search(line):
                 return float(found.group(1))
     finally:
