@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = pytest.mark.timeout(1600)
 
 
 @pytest.mark.parametrize(

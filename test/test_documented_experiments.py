@@ -2,7 +2,7 @@
 
 import pytest
 
-pytestmark = pytest.mark.timeout(1000)
+pytestmark = pytest.mark.timeout(1600)
 
 
 @pytest.mark.parametrize(

@@ -112,8 +112,8 @@ def test_a_node_finds_itself_as_in_a_process_of_its_own(shared_host, executable,
 def test_a_node_ends_as_the_interpreter_ends(shared_host, executable, text, code, words):
     path = executable(text)
     ended, output = run(shared_host, path)
-    heed = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731 (a background job ignores SIGINT)
-    apart = subprocess.run([str(path)], capture_output=True, text=True, check=False, preexec_fn=heed)
+    interruptible = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731 (a background job ignores SIGINT)
+    apart = subprocess.run([str(path)], capture_output=True, text=True, check=False, preexec_fn=interruptible)
     assert ended == apart.returncode == code
     assert words in output and words in apart.stdout + apart.stderr
 
