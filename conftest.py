@@ -32,23 +32,13 @@ def _own_priority():
         os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Run the tests of the graph one after the other, next to the others: two graphs on two cores miss their rates."""
+    graph = item.path.parent == Path(__file__).parent / "test"
+    item.add_marker(pytest.mark.xdist_group("graph" if graph else item.path.stem))
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Spread the modules that run the graph evenly among the others, those with the longest timeout first.
-
-    They mostly wait, the others compute: side by side they use the cores best, and several graphs at a time would slow each other
-    down. The order within a module, and of the modules of each kind, stays that of pytest-randomly.
-    """
-    modules: dict[Path, list[pytest.Item]] = {}
-    for item in items:
-        modules.setdefault(item.path, []).append(item)
-    folder = Path(__file__).parent / "test"
-    graph = sorted((m for m in modules if m.parent == folder), key=lambda m: -max(map(_timeout, modules[m])))
-    others = [m for m in modules if m.parent != folder]
-    places = [((i + 0.5) / len(group), m) for group in (graph, others) for i, m in enumerate(group)]
-    items[:] = [item for _, module in sorted(places, key=lambda place: place[0]) for item in modules[module]]
-
-
-def _timeout(item: pytest.Item) -> float:
-    mark = item.get_closest_marker("timeout")
-    return mark.args[0] if mark else 0.0
+    """Begin with the tests of the graph, which take longest; otherwise keep the order of pytest-randomly."""
+    items.sort(key=lambda item: item.path.parent != Path(__file__).parent / "test")

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     how = ["-q", "--no-header"] if args.quiet else ["-ra", "--durations=10"]
     if targets:
         # A module's tests share a process, because they share what takes long to make: a graph, a model, a browser.
-        how += ["-n", str(_WORKERS), "--dist", "loadscope", "--no-loadscope-reorder"]
+        how += ["-n", str(_WORKERS), "--dist", "loadgroup", "--no-loadscope-reorder"]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
     if not args.json:
         return _exit_code(subprocess.run(command, cwd=root).returncode)
