@@ -90,8 +90,10 @@ def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, delay, monkeyp
 def test_the_nodes_of_a_killed_launcher_end(gravcomp_process, monkeypatch):
     mark = f"{os.getpid()}-kill"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
-    process = gravcomp_process("demo", "--headless", "--duration", "60")
-    time.sleep(6.0)
+    process = gravcomp_process("demo", "--headless", "--duration", "120")
+    deadline = time.monotonic() + 60.0
+    while len(marked(f"GRAVCOMP_TEST={mark}")) <= 4 and time.monotonic() < deadline:
+        time.sleep(0.2)
     assert len(marked(f"GRAVCOMP_TEST={mark}")) > 4
     process.kill()
     process.wait()
