@@ -48,7 +48,7 @@ def lumen_grid(outlines: Sequence[Outline | BlendedOutline], channels: list[Chan
     if best[0] <= 0.0:
         raise MeshError(
             "the lumens of neighbouring segments are too different for one division of their sections: let those that go on"
-            " coincide where the segments meet, and the others lie farther apart, or put a solid segment between"
+            " coincide where the segments meet, and the others lie farther apart"
         )
     return best[1]
 
