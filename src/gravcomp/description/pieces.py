@@ -174,9 +174,8 @@ def _transition(before: Piece, segment: Segment, start: float) -> Piece:
         segment.name, "transition", start, length, outer, lumens, segment.material, tuple(sorted(marks))
     )  # fmt: skip
     for share in np.linspace(0.0, 1.0, 9):
-        outline, lumens = piece.section(start + float(share) * length)
         try:
-            require_room(outline, lumens)
+            require_room(*piece.section(start + float(share) * length))
         except ValueError as error:
             raise ValueError(
                 f"between the segments '{before.segment}' and '{segment.name}' no channel fits: {error};"
