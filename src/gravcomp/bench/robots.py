@@ -21,24 +21,25 @@ from gravcomp.mesh import MeshError
 Progress = Callable[[str], None]
 
 
-def run(
-    progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str] = (), whole: bool = True, every: int = 1
-) -> dict:
+def run(progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str] = (), every: int = 1) -> dict:
     """Return `robots`, the figures of `robot_figures.FIGURES` of every robot by name, and the figures of `whole_figures`.
 
-    files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists;
-    figures: names of the figures wanted, none: all; whole: whether the figures that belong to no single robot are computed if
-    no file is given; every: compute every `every`-th row and path only.
+    files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists. The
+    figures of `whole_figures` are computed if no file is given, or if they are asked for. figures: names of the figures wanted,
+    none: all; every: compute every `every`-th row and path only. Raises ConfigError for a figure that does not exist.
     """
+    allowed = [*robot_figures.FIGURES, *whole_figures.FIGURES]
+    for name in figures:
+        if name not in allowed:
+            raise ConfigError(f"--figures has '{name}'; allowed: {', '.join(allowed)}")
     wanted = [name for name in robot_figures.FIGURES if not figures or name in figures]
     result: dict[str, Any] = {"robots": {}}
     if wanted:
         for file in files or _all_files(progress):
             name, measured = _of(str(file), wanted, progress, every)
             result["robots"][name] = measured
-    if whole and not files:
-        result |= whole_figures.run(progress, [name for name in whole_figures.FIGURES if not figures or name in figures], every)
-    return result
+    whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
+    return result | whole_figures.run(progress, whole, every)
 
 
 def _all_files(progress: Progress) -> list[str]:

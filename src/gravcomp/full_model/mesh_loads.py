@@ -32,7 +32,7 @@ class MeshLoad:
 
 
 def mesh_loads(model: RobotModel) -> list[MeshLoad]:
-    """Return the loads of a robot: its weight across its first, and where the section is not round its second axis, and the bend."""
+    """Return the loads of a robot: its weight across its axis, in two directions where it is not round, and the bend."""
     robot, none = model.robot, np.zeros(len(model.robot.cables))
     loads = [MeshLoad("horizontal", np.array([-_GRAVITY, 0.0, 0.0]), none)]
     if robot.body is not None or any(not segment.outline(0.0).round for segment in robot.segments):
@@ -48,7 +48,11 @@ def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
     solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
     for index, load in enumerate(loads):
         solver.reset()
-        state = solver.solve(load.gravity, CableInput(tension=load.tension), _PARTS)
+        for part in (0.25, 0.5, 0.75, 1.0) if load.tension.any() else (1.0,):
+            state = solver.track(part * load.gravity, CableInput(tension=part * load.tension), iterations=15)
+        if not state.converged:
+            solver.reset()
+            state = solver.solve(load.gravity, CableInput(tension=load.tension), _PARTS)
         if state.converged:
             tips[index] = model.effectors.sections(model.mesh.nodes + state.u)[-1, 0]
     return tips
