@@ -30,10 +30,9 @@ ACCURACY = 1e-3
 
 _FORMAT = 2  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
-_USED = 0.8
-# The power of the number of elements with which the change of a direction falls. Through the wall it falls slowly: a cable is
-# pressed on a line of the wall, into which it sinks a little farther with every refinement.
-_ORDER = {"along": 1.5, "around": 2.0, "radial": 0.3}
+_USED = 0.9
+# The power of the number of elements with which the change of a direction falls.
+_ORDER = {"along": 1.5, "around": 2.0, "radial": 1.0}
 _START_ALONG = 8
 _MOST_UNKNOWNS = 15000
 # A load that a finer mesh does not carry is made smaller by this factor, so often.
