@@ -65,8 +65,10 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
         parts.append(holes(points[at_section, :2], sections))
     if not at_section.all():
         try:
-            inside = _in_channel(robot, mesh, points[~at_section]) if cable.via_points is None else embed(
-                mesh, mesh.axis.points(points[~at_section])
+            inside = (
+                _in_channel(robot, mesh, points[~at_section])
+                if cable.via_points is None
+                else embed(mesh, mesh.axis.points(points[~at_section]))
             )
         except MeshError as error:
             raise MeshError(f"cable '{cable.name}' leaves the body: {error}") from error

@@ -1,9 +1,9 @@
 """The division of segments into elements that reaches an accuracy at the least cost.
 
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
-loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, its change of the tip is scaled to twice
-the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The direction that
-loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`. Around the axis the comparison has twice
+loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, the others staying as coarse as can be,
+its change of the tip is scaled to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the
+changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`. Around the axis the comparison has twice
 as many elements, so that the cables keep their places in the elements.
 
 The choice is kept in the cache, by content. Young's moduli enter rounded down to a power of two, so that a calibrated robot
@@ -95,8 +95,8 @@ def _rounded(robot: Robot) -> Robot:
 
 def _choose(robot: Robot) -> MeshChoice:
     tips = _Tips(robot)
-    here = _start(robot)
-    tips.prepare(here)
+    start = here = _start(robot)
+    tips.prepare(start)
     changes: dict[str, np.ndarray] = {}  # of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction
     while True:
         gains = {}
@@ -105,14 +105,14 @@ def _choose(robot: Robot) -> MeshChoice:
             if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
                 continue
             if direction not in changes:
-                compared = _twice_around(robot, here) if direction == "around" else finer
-                ratio = getattr(here, direction) / getattr(compared, direction)
-                changes[direction] = tips.change(here, compared) * (1.0 - 0.5**order) / (1.0 - ratio**order)
+                number = getattr(here, direction)
+                compared = 2 * number if direction == "around" else getattr(finer, direction)
+                change = tips.change(*(_with(robot, start, direction, value) for value in (number, compared)))
+                changes[direction] = change * (1.0 - 0.5**order) / (1.0 - (number / compared) ** order)
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
         error = _largest(np.sum(list(changes.values()), axis=0)) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
-        # The other directions keep their changes, which hardly depend on this one.
         best = max(gains, key=lambda direction: gains[direction])
         here = _finer(robot, here, best)
         del changes[best]
@@ -194,20 +194,18 @@ def _around(robot: Robot, multiple: int) -> int:
     return 8 if multiple == 4 else 6
 
 
-def _twice_around(robot: Robot, elements: Elements) -> Elements:
-    finer = dataclasses.replace(elements, around=2 * elements.around)
-    return finer if any(segment.disks for segment in robot.segments) else with_grading(robot, finer)
-
-
 def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
     """The next numbers in a direction; the same where there are none."""
-    disks = any(segment.disks for segment in robot.segments)
     if direction == "around":
-        finer = dataclasses.replace(elements, around=min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
-    elif direction == "radial":
-        finer = dataclasses.replace(elements, radial=min(elements.radial + 1, 8))
-    else:
-        parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
-        along = elements.along + parts if disks else math.ceil(1.4 * elements.along)
-        finer = dataclasses.replace(elements, along=min(along, 500))
-    return finer if disks else with_grading(robot, finer)
+        return _with(robot, elements, "around", min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
+    if direction == "radial":
+        return _with(robot, elements, "radial", min(elements.radial + 1, 8))
+    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    disks = any(segment.disks for segment in robot.segments)
+    return _with(robot, elements, "along", min(elements.along + parts if disks else math.ceil(1.4 * elements.along), 500))
+
+
+def _with(robot: Robot, elements: Elements, direction: str, number: int) -> Elements:
+    """The elements with another number in a direction, and the grading that suits it."""
+    changed = dataclasses.replace(elements, **{direction: number})
+    return changed if any(segment.disks for segment in robot.segments) else with_grading(robot, changed)

@@ -18,6 +18,8 @@ _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
 _SAFE, _PARTS = 0.7, 8
+# The steps in which the bend is followed.
+_STEPS = 8
 # The tension grows by this factor from step to step, from this part of its limit.
 _FACTOR, _FIRST = 1.35, 0.01
 
@@ -48,7 +50,7 @@ def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
     solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
     for index, load in enumerate(loads):
         solver.reset()
-        for part in (0.25, 0.5, 0.75, 1.0) if load.tension.any() else (1.0,):
+        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:] if load.tension.any() else (1.0,):
             state = solver.track(part * load.gravity, CableInput(tension=part * load.tension), iterations=15)
         if not state.converged:
             solver.reset()
