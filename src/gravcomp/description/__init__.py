@@ -7,6 +7,7 @@ file.section("hardware")               # another section as a plain mapping
 
 from gravcomp.description.body import Cap, Elements, Material, MeshBody
 from gravcomp.description.cable import Cable
+from gravcomp.description.cable_line import CableLine
 from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
@@ -19,6 +20,6 @@ from gravcomp.description.section import Lumen, Section
 from gravcomp.description.segment import Segment
 
 __all__ = [
-    "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
+    "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
     "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
 ]  # fmt: skip

@@ -69,7 +69,7 @@ def _rounded(robot: Robot) -> Robot:
         )
         for s in robot.segments
     )
-    cables = tuple(dataclasses.replace(c, axial_stiffness=None, friction=0.0) for c in robot.cables)
+    cables = tuple(c.without_line() for c in robot.cables)
     return Robot("chosen", segments=segments, cables=cables, limits=robot.limits, payload=robot.payload)
 
 

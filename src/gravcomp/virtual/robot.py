@@ -63,7 +63,7 @@ class VirtualRobot:
         self._robot, self._hardware = robot, hardware
         slack = parameters.tendons.slack + parameters.tendons.slack_spread * start.standard_normal(len(robot.cables))
         self._model = build_rod(robot, parameters)
-        self._rod = MovingRod(self._model, build_material(self._model, parameters), build_friction(parameters))
+        self._rod = MovingRod(self._model, build_material(self._model, parameters), build_friction(robot, parameters))
         self._motors = MotorBank(parameters.motors, hardware, slack, motors)
         self._board = VirtualBoard(parameters.board, board)
         self._base = MovingBase(

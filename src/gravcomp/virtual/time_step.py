@@ -64,8 +64,8 @@ def time_step(
     damping_time: float,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
-    mu: float,
-    guide_angle: float,
+    mu: np.ndarray,
+    guide_angle: np.ndarray,
     presliding: float,
 ) -> tuple[bool, int]:
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
