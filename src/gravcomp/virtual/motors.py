@@ -46,7 +46,7 @@ class MotorBank:
         return self._capstan * self._parameters.capstan_radius - self._slack
 
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
-        """Advance by `ticks` of TICK s; the cable paths are `shortened` (m,) m, the cables are springs of `spring` (m,) N/m."""
+        """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack at displacements up to `shortened` (m,) m."""
         p = self._parameters
         _step(
             ticks,
