@@ -5,6 +5,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gravcomp.calibration.pose_prediction import moved
 from gravcomp.calibration.poses import PoseParameters
 from gravcomp.calibration.statics import StaticParameters
@@ -31,9 +33,11 @@ def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: f
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
     """Return the motors with the fitted capstan radius and cable offsets, relative to those of `hardware`."""
+    # Of cables that share a motor it takes the offset that comes nearest to theirs.
+    offsets = np.linalg.pinv(hardware.transmission.matrix) @ parameters.offset
     motors = tuple(
         dataclasses.replace(motor, offset=float(parameters.winding * motor.offset + offset))
-        for motor, offset in zip(hardware.motors, parameters.offset)
+        for motor, offset in zip(hardware.motors, offsets)
     )
     drive = dataclasses.replace(hardware.drive, capstan_radius=hardware.drive.capstan_radius * float(parameters.winding))
     return dataclasses.replace(hardware, motors=motors, drive=drive)
