@@ -122,7 +122,7 @@ def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
     pieces = pieces_of(robot)
     parts = sum(len(piece.marks) + 1 for piece in pieces)
-    disks = any(piece.marks for piece in pieces)
+    disks = any(segment.disks for segment in robot.segments)
     coarse = coarse_elements(robot)
     around = 4 if coarse.around == 8 else 6
     along = parts if disks else max(6, parts)
