@@ -10,7 +10,7 @@ class Material:
     """An isotropic soft material."""
 
     law: str = parameter(
-        "svk",
+        "neo_hookean",
         choices=("svk", "neo_hookean", "mooney_rivlin", "yeoh"),
         description="St. Venant-Kirchhoff, neo-Hookean, Mooney-Rivlin or Yeoh; all but the first for large strains",
     )
