@@ -147,7 +147,7 @@ def _via_points(robot: Robot, cable: Cable, stations: np.ndarray, guided: np.nda
                 f"cable '{cable.name}' {'ends' if index else 'starts'} at {s[index] * 1e3:g} mm, between two disks;"
                 f" there are disks at {', '.join(f'{1e3 * height:g}' for height in guided)} mm"
             )
-    place = np.array([cable.place(value, end) for value in s])
+    place = np.array([robot.cable_place(cable, value) for value in s])
     return np.column_stack([place, s]), at_disk
 
 

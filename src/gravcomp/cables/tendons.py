@@ -11,7 +11,12 @@ length is that of two tangents, by Gauss's rule with two points, which take the 
 
     e = (P_1 - P_0) / 2 -+ (P_0 - 2 P_m + P_1) / sqrt(3).
 
-With friction the tension changes along the path: lambda_k is the share of `friction` times lambda.
+lambda is the tension at the capstan. With friction it changes along the path: lambda_k is the share of `friction` times lambda. A
+line of stiffness E A is wound in by more than its path shortens, by its stretch along free length L_f and path:
+
+    wound = delta + c lambda,    c = (L_f + sum_k L_k) / (E A) times the mean share.
+
+Without tension there is no stretch.
 """
 
 import dataclasses
@@ -35,7 +40,7 @@ class TendonState:
 
     displacement (m,) in m; jacobian (m, n): its derivative by the unknowns; force_jacobian (m, n): its transpose times the
     tensions is the cables' force (without friction it is the same array); tangent (s, 3) and length (s,) of every piece; share
-    (s,): tension in the piece over tension of the cable.
+    (s,): tension in the piece over that at the capstan; mean_share (m,): mean of it along each cable, which stretches it.
     """
 
     displacement: np.ndarray
@@ -44,6 +49,7 @@ class TendonState:
     tangent: np.ndarray
     length: np.ndarray
     share: np.ndarray
+    mean_share: np.ndarray
 
 
 class Tendons:
@@ -61,9 +67,12 @@ class Tendons:
         self._position = self._scatter_positions(pieces, pattern)
         self._rest_length = np.zeros(self.count)
         self._rest_length = -self.state(rest).displacement
-        stiffness = np.array([c.axial_stiffness or np.inf for c in cables])
-        # m/N: elongation under unit tension, zero for an inextensible cable.
-        self.axial_compliance = self._rest_length / stiffness
+        # m/N: elongation from capstan to end under unit tension without friction, zero for a cable without stretch.
+        self.axial_compliance = (self.friction.free_length + self._rest_length) / np.array([c.stiffness for c in cables])
+
+    def stretch(self, state: TendonState) -> np.ndarray:
+        """Return the elongation (m,) of each cable under unit tension at its capstan, in m/N."""
+        return self.axial_compliance * state.mean_share
 
     @property
     def rest_length(self) -> np.ndarray:
@@ -80,12 +89,13 @@ class Tendons:
         jacobian = np.zeros((self.count, 3 * self._n_free))
         path = np.zeros(self.count)
         _tendons(x, self._cable, self._first, self._nodes, self._weights, self._n_free, length, tangent, jacobian, path)
-        share, force_jacobian = np.ones(count), jacobian
+        share, mean_share, force_jacobian = np.ones(count), np.ones(self.count), jacobian
         if pulling is not None and self.friction.acts(pulling):
             share = self.friction.shares(self._cable, tangent, pulling)
+            mean_share = self.friction.mean_shares(self._cable, length, share, pulling)
             force_jacobian = np.zeros_like(jacobian)
             _force_jacobian(self._cable, self._first, self._nodes, self._weights, self._n_free, tangent, share, force_jacobian)
-        return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share)
+        return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share, mean_share)
 
     def add_stiffness(self, state: TendonState, tension: np.ndarray, matrix: BlockMatrix) -> None:
         """Add the geometric stiffness of the cables under `tension` (m,) to `matrix`."""

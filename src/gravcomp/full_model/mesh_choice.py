@@ -89,7 +89,7 @@ def _rounded(robot: Robot) -> Robot:
         )
         for s in robot.segments
     )
-    cables = tuple(dataclasses.replace(c, axial_stiffness=None, friction=0.0) for c in robot.cables)
+    cables = tuple(c.without_line() for c in robot.cables)
     return Robot("chosen", segments=segments, cables=cables, limits=robot.limits, payload=robot.payload, loads=robot.loads)
 
 
@@ -169,7 +169,7 @@ class _Tips:
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    pieces = pieces_of(robot)
     disks = any(segment.disks for segment in robot.segments)
     around = _around(robot, 4 if coarse_elements(robot).around == 8 else 1)
     along = parts if disks else max(_START_ALONG, parts)

@@ -160,7 +160,7 @@ class Simulator:
         model = self.model
         sections = model.effectors.sections(model.mesh.nodes + state.u)
         effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-        displacement = state.tendons.displacement + model.tendons.axial_compliance * state.tension
+        displacement = state.tendons.displacement + model.tendons.stretch(state.tendons) * state.tension
         response = Response(
             state.compliance,
             compliance_ea,
