@@ -17,8 +17,9 @@ def beyond_range(model: RobotModel, u: np.ndarray) -> str:
         softening = LAWS[material.law].softening_strain
         least = strains[mesh.region == number].min(initial=0.0)
         if softening is not None and least < softening:
+            stretch, limit = (100 * np.sqrt(max(1 + 2 * strain, 0.0)) for strain in (least, softening))
             return (
-                f"the body is compressed to {100 * np.sqrt(max(1 + 2 * least, 0.0)):.0f} % of its length at a point, where the law"
-                f" '{material.law}' softens (below {100 * np.sqrt(1 + 2 * softening):.0f} %); choose another law for such loads"
+                f"the body is compressed to {stretch:.0f} % of its length at a point, where the law '{material.law}' softens"
+                f" (below {limit:.0f} %); choose another law for such loads"
             )
     return ""

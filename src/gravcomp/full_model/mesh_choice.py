@@ -3,8 +3,8 @@
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, the others staying as coarse as can be,
 its change of the tip is scaled to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the
-changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`. Around the axis the comparison has twice
-as many elements, so that the cables keep their places in the elements.
+changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`.
+Around the axis the comparison has twice as many elements, so that the cables keep their places in the elements.
 
 The choice is kept in the cache, by content. Young's moduli enter rounded down to a power of two, so that a calibrated robot
 has the mesh of the robot from which it was calibrated. `mesh_error` measures what is only estimated here.
@@ -169,7 +169,7 @@ class _Tips:
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    pieces = pieces_of(robot)
+    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
     disks = any(segment.disks for segment in robot.segments)
     around = _around(robot, 4 if coarse_elements(robot).around == 8 else 1)
     along = parts if disks else max(_START_ALONG, parts)

@@ -1,9 +1,10 @@
 """Steps of the reduced model, as long as its error is small.
 
-The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured
-every few seconds and after every large motion, and whether the law's range is left, with the full model: one Newton step with its own factorised stiffness from the
-reduced shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. Otherwise
-the full model computes the steps, and from time to time both are compared, until they agree again.
+The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured every
+few seconds and after every large motion, with the full model: one Newton step with its own factorised stiffness from the reduced
+shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. The same measurement
+says whether the shape leaves the range of a material's law. Otherwise the full model computes the steps, and from time to time
+both are compared, until they agree again.
 """
 
 import dataclasses
