@@ -69,7 +69,7 @@ def path_of(model: RobotModel) -> Path:
     materials = [dataclasses.asdict(material) for material in model.mesh.materials]
     for material in materials:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
-        for viscous in ("damping_time", "creep_ratio", "creep_time"):
+        for viscous in ("damping_time", "creep_ratio", "creep_time", "prony"):
             del material[viscous]
         for law in LAWS.values():  # a constant counts only for the law that has it
             for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gravcomp.description import Material
 from gravcomp.mesh import Mesh
 
 GRAVITY = 9.81  # m/s^2
@@ -79,8 +80,7 @@ def deck(mesh: Mesh, inclination: float) -> str:
         lines += [f"*NSET, NSET={name}", *(f"{node + 1}," for node in nodes)]
     lines += [
         "*MATERIAL, NAME=SOFT",
-        "*ELASTIC",
-        f"{material.youngs_modulus:.9e}, {material.poissons_ratio:.6f}",
+        *_law(material),
         "*DENSITY",
         f"{material.density:.9e}",
         "*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT",
@@ -96,6 +96,16 @@ def deck(mesh: Mesh, inclination: float) -> str:
         "*END STEP",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _law(material: Material) -> list[str]:
+    """Return the lines of a law that CalculiX has in the same form. Raises ValueError for another one."""
+    young, nu = material.youngs_modulus, material.poissons_ratio
+    if material.law == "svk":
+        return ["*ELASTIC", f"{young:.9e}, {nu:.6f}"]
+    if material.law == "neo_hookean":  # mu/2 (I1' - 3) + kappa/2 (J - 1)^2, written with C10 and D1
+        return ["*HYPERELASTIC, NEO HOOKE", f"{young / (4 * (1 + nu)):.9e}, {6 * (1 - 2 * nu) / young:.9e}"]
+    raise ValueError(f"the law '{material.law}' is not compared with CalculiX; allowed are 'svk' and 'neo_hookean'")
 
 
 def last_displacements(output: str) -> np.ndarray:
