@@ -13,7 +13,7 @@ import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
+from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.motion_step import motion_step
 from gravcomp.reduction.reduced_cables import ReducedTendons
@@ -85,7 +85,7 @@ class ReducedDynamicSolver:
         self._mass = mass
         self._damping_time, self._branches = (damping_time, branches) if options.damping == "kelvin_voigt" else (0.0, ())
         self._tolerance = tolerance * length
-        self._body = body_of(model)
+        self._body, self._kept = body_of(model), kept_stiffness(model)
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)), np.zeros(3))
 
     def place(self, q: np.ndarray, tension: np.ndarray, gravity: np.ndarray) -> None:
@@ -104,7 +104,7 @@ class ReducedDynamicSolver:
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         point = point_at(self._body, q, np.zeros(len(tension)))
-        force = -self._mass @ acceleration - self._rayleigh(point) @ velocity
+        force = -self._mass @ acceleration - self._rayleigh(point, q) @ velocity
         memory = memory or Memory.of(self._branches, q, point.strain)
         self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, memory)
 
@@ -118,7 +118,7 @@ class ReducedDynamicSolver:
         scale = 1.0 + self._damping_time * rate + stiffer
         strain = last.point.strain
         offset = self._damping_time * history + held
-        drag = self._rayleigh(last.point)
+        drag = self._rayleigh(last.point, last.q)
         velocity_0, acceleration_0 = scheme.predict(last.velocity, last.acceleration)
         # Contribution of the last step's forces, including inertia, to the balance of this step.
         rest = self._mass @ ((1.0 - scheme.alpha_m) * acceleration_0 + scheme.alpha_m * last.acceleration) + before * last.force
@@ -126,7 +126,7 @@ class ReducedDynamicSolver:
         inertia = ((1.0 - scheme.alpha_m) * scheme.acceleration_rate) * self._mass + (now * scheme.velocity_rate) * drag
         converged, q, tension, point, force, residual = motion_step(
             self._body, last.point, last.q, last.tension, rest, inertia, model.weight @ gravity,
-            *cable_arrays(cables, last.tension.size), now, scale, offset, self._tolerance,
+            *cable_arrays(cables, last.tension.size), now, scale, offset, self._kept, self._tolerance,
         )  # fmt: skip
         if not converged:
             self.state = dataclasses.replace(last, converged=False)
@@ -146,12 +146,12 @@ class ReducedDynamicSolver:
         )
         return self.state
 
-    def _rayleigh(self, point: Point) -> np.ndarray:
-        """Return alpha M + beta K (r, r) at a point; zeros without Rayleigh damping."""
+    def _rayleigh(self, point: Point, q: np.ndarray) -> np.ndarray:
+        """Return alpha M + beta K (r, r) at q (r,), where the model is `point`; zeros without Rayleigh damping."""
         options = self.options
         if options.damping != "rayleigh":
             return np.zeros_like(self._mass)
-        stiffness = np.tril(elastic_stiffness(self._body, point, point.strain, 1.0))
+        stiffness = np.tril(elastic_stiffness(self._body, point, q, point.strain, 1.0, self._kept))
         stiffness += np.tril(stiffness, -1).T
         return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 

@@ -16,8 +16,9 @@ from numba import njit
 from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
+from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.law_deviation import KeptStiffness
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
@@ -54,6 +55,7 @@ class ReducedTracker:
         self.model = model
         self._limits = longest_step * length, near * length, tolerance * length
         self._body = body_of(model)
+        self._kept = kept_stiffness(model)
         self._no_offset = np.zeros(model.elasticity.linear.shape[1])
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
@@ -93,6 +95,7 @@ class ReducedTracker:
             self.sliding.direction,
             1.0 + stiffer,
             offset,
+            self._kept,
             iterations,
             *self._limits,
         )
@@ -105,19 +108,20 @@ class ReducedTracker:
 @njit(cache=True, fastmath=REORDERED)
 def _tracked(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
-    pulling: np.ndarray, scale: float, offset: np.ndarray, iterations: int, longest_step: float, near: float, tolerance: float,
+    pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
+    iterations: int, longest_step: float, near: float, tolerance: float,
 ) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
     """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
     wound and given: of `body.cable_arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
-    offset; the last three in m.
+    offset; kept: of `elastic_stiffness`; the last three in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual = False, np.inf
     for _ in range(iterations):
         stress = scale * point.strain + offset
-        matrix = elastic_stiffness(body, point, stress, scale)
+        matrix = elastic_stiffness(body, point, q, stress, scale, kept)
         add_stiffness(cables, point.tendons, tension, matrix)
         definite, factor = factorise(matrix)
         if not definite:
