@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from gravcomp.description import Elements, PronyTerm, load_robot_file
+from gravcomp.description import Elements, Fibres, PronyTerm, load_robot_file
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
@@ -190,6 +190,31 @@ def test_a_robot_of_linear_tetrahedra_is_refused_with_the_reason(robot, cache):
     assert "corotational" in why_not(linear)
     with pytest.raises(MeshError, match="full model is used"):
         build(linear, SMALL)
+
+
+@pytest.mark.parametrize(
+    ("kind", "material"),
+    [("tet10", {"poissons_ratio": 0.4999}), ("hex20", {"fibres": Fibres(5.0, 0.5)})],
+    ids=["mean pressure", "fibres"],
+)
+def test_polynomials_hold_the_mean_pressure_of_tetrahedra_and_the_fibres(robot, kind, material):
+    robot = robot.with_material(**material)
+    model = RobotModel(robot, tube_mesh(robot, kind))
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    x, y, z = model.mesh.nodes[: model.n_free].T / model.length
+    raw = np.array([np.stack(f, axis=1).ravel() for f in ((z**2, 0 * z, -2 * x * z), (-y * z, x * z, 0 * z), (x, y, z))])
+    basis = energy_basis(raw, matrix.multiply, 3)
+    shapes = np.random.default_rng(0).normal(size=(30, 3)) @ (0.1 * basis.T)
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=6)
+    q = 0.1 * np.random.default_rng(1).normal(size=3)
+    u = np.zeros_like(model.mesh.nodes)
+    model.free(u)[:] = basis @ q
+    matrix.values[:] = 0.0
+    force = basis.T @ model.free(model.elements.assemble(u, matrix))
+    own_force, own_stiffness, _ = polynomials.evaluate(q)
+    assert own_force == pytest.approx(force, rel=1e-5, abs=1e-8)
+    assert np.tril(own_stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-5, abs=1e-6)
 
 
 def with_law(modes, law: str):

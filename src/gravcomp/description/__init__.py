@@ -5,7 +5,7 @@ file.robot.segments[0].length          # m
 file.section("hardware")               # another section as a plain mapping
 """
 
-from gravcomp.description.body import Cap, Elements, Material, MeshBody, PronyTerm
+from gravcomp.description.body import Cap, Elements, Fibres, Material, MeshBody, PronyTerm
 from gravcomp.description.cable import Cable
 from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
@@ -19,6 +19,7 @@ from gravcomp.description.section import Lumen, Section
 from gravcomp.description.segment import Segment
 
 __all__ = [
-    "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
-    "PointLoad", "PronyTerm", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
+    "Cable", "Cap", "Disks", "Effectors", "Elements", "Fibres", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline",
+    "Payload", "PointLoad", "PronyTerm", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file",
+    "shipped_robots",
 ]  # fmt: skip

@@ -14,8 +14,18 @@ class PronyTerm:
 
 
 @dataclasses.dataclass(frozen=True)
+class Fibres:
+    """Fibres in the body, evenly spread: along the axis, around it, or wound about it both ways, as in a braid."""
+
+    ratio: float = parameter(
+        minimum=0.0, maximum=1e4, description="stiffness of all fibres along themselves, over Young's modulus of the body"
+    )
+    angle: float = parameter(0.0, edge="deg", minimum=0.0, maximum=90.0, description="angle to the axis; 0: along it, 90: hoops")
+
+
+@dataclasses.dataclass(frozen=True)
 class Material:
-    """An isotropic soft material."""
+    """A soft material, isotropic but for its fibres."""
 
     law: str = parameter(
         "svk",
@@ -43,6 +53,8 @@ class Material:
     prony: tuple[PronyTerm, ...] = parameter(
         (), description="Prony series, instead of creep_ratio; the modulus is the long-term one"
     )
+
+    fibres: Fibres | None = parameter(None, description="fibres that make the material stiffer along themselves")
 
     def __post_init__(self) -> None:
         if not self.prony:
