@@ -25,7 +25,7 @@ from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
 from gravcomp_fem.conversion import deformation_message, pose_message
-from gravcomp_fem.markers import markers_of
+from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
@@ -63,6 +63,7 @@ class FemSimulator(ManagedNode):
         self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
         self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
+        self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
 
     def activate(self) -> None:
@@ -185,7 +186,7 @@ class FemSimulator(ManagedNode):
             return
         self._last_markers = stamp
         if self._markers.get_subscription_count():
-            self._markers.publish(markers_of(shape, self.robot_file.robot, header))
+            self._markers.publish(self._robot_markers.of(shape, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
 
     def _refuse(self, sentence: str) -> None:

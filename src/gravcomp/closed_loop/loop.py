@@ -65,7 +65,7 @@ class ClosedLoop:
         ambient = setup.truth.board.thermal.ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot)
-        self._problem = InverseController(setup.robot, setup.controller.inverse)
+        self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
         self._target: Target | None = None
         self._weightless = False
         self._cables = np.zeros(len(setup.robot.cables))  # m, displacement of the model's cables
@@ -170,7 +170,7 @@ class ClosedLoop:
         displacement = (
             self._cables if self._waiting else within_limits(free, self._cables, self.setup.robot.limits, SAMPLE_PERIOD)
         )
-        return displacement, np.zeros(len(free))
+        return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free), dtype=bool)), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
         command = self._problem.step(
@@ -185,7 +185,8 @@ class ClosedLoop:
 
     def _idle_released(self, tension: np.ndarray) -> np.ndarray:
         wanted = np.where(tension > _IDLE, self._cables, self._cables - RELEASE_SLACK)
-        return within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
+        paid_out = within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
+        return self.setup.hardware.transmission.possible(paid_out, tension > _IDLE)
 
     def _record(self, shape: Shape) -> None:
         truth = self._virtual.truth

@@ -28,7 +28,7 @@ class Material:
     """A soft material, isotropic but for its fibres."""
 
     law: str = parameter(
-        "svk",
+        "neo_hookean",
         choices=("svk", "neo_hookean", "mooney_rivlin", "yeoh"),
         description="St. Venant-Kirchhoff, neo-Hookean, Mooney-Rivlin or Yeoh; all but the first for large strains",
     )

@@ -108,7 +108,7 @@ class DynamicSolver:
                     break
                 fresh, jacobian = True, tendons.jacobian
                 answer = factor.solve((1.0 - scheme.alpha_f) * tendons.force_jacobian.T)
-                compliance = jacobian @ answer + np.diag(model.tendons.axial_compliance)
+                compliance = jacobian @ answer + np.diag(model.tendons.stretch(tendons))
             moved = model.free(u) - model.free(last.u)
             velocity = velocity_0 + scheme.velocity_rate * moved
             acceleration = acceleration_0 + scheme.acceleration_rate * moved

@@ -4,7 +4,7 @@ Unknown are the displacements u and the tensions lambda with
 
     f_int(u) = f_weight + H(u)^T lambda,
     driven by tension:       lambda given;
-    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: the cable's own elongation).
+    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: stretch of the cable from capstan to end).
 
 Newton's step solves A y = r and A X = H^T with A = K(u, lambda), so that the step is y + X dlambda and the compliance of the
 cables is W = H X; the tensions follow from the small complementarity problem (Coevoet et al. 2017, section IV). From the second
@@ -144,7 +144,7 @@ class StaticTracker:
         out = weight - model.free(force)
         solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
         y, state.answer = solved[:, 0], solved[:, 1:]
-        state.compliance = jacobian @ state.answer + np.diag(model.tendons.axial_compliance)
+        state.compliance = jacobian @ state.answer + np.diag(model.tendons.stretch(state.tendons))
         free = state.tendons.displacement + jacobian @ y
         if not math.isfinite(state.compliance.sum() + free.sum()):
             return None
@@ -235,7 +235,10 @@ class StaticTracker:
         out = weight - model.free(force) + state.tension @ state.tendons.force_jacobian
         y = factor.solve(out)
         free = state.tendons.displacement + jacobian @ y
-        shift = (state.compliance - np.diag(model.tendons.axial_compliance)) @ state.tension
+        body = jacobian @ state.answer
+        # The stretch of the present shape: with friction the mean tension along a cable changes with its bends.
+        state.compliance = body + np.diag(model.tendons.stretch(state.tendons))
+        shift = body @ state.tension
         tension = cables.tensions(state.compliance, free - shift, state.tension > 0.0)
         return y + state.answer @ (tension - state.tension), tension
 

@@ -7,7 +7,7 @@ from gravcomp.cables.slack import pivoted
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.law_deviation import KeptStiffness
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking
+from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.rounding import REORDERED
 
 _MOST_ITERATIONS = 16
@@ -80,9 +80,9 @@ def motion_step(
             wanted = given
         else:
             free = point.tendons.displacement + point.tendons.jacobian @ y - compliance @ tension
-            held = np.isfinite(wound)
+            held, own = np.isfinite(wound), stretch(cables, point.tendons)
             for i in range(m):
-                compliance[i, i] += cables.axial_compliance[i]
+                compliance[i, i] += own[i]
             wanted = pivoted(compliance, wound - free, held, held & (tension > 0.0))
         q = q + y + (wanted - tension) @ answer
         if not np.isfinite(q.sum()):

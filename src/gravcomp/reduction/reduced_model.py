@@ -126,6 +126,8 @@ def project(
             rest_length=model.tendons.rest_length,
             axial_compliance=model.tendons.axial_compliance,
             friction=model.tendons.friction.coefficient,
+            sheath_angle=model.tendons.friction.sheath_angle,
+            free_length=model.tendons.friction.free_length,
         ),
         section_rest=model.effectors.sections(model.mesh.nodes),
         section_change=section_changes(model, basis),

@@ -1,7 +1,7 @@
 """Steps of the reduced model, as long as its error is small.
 
 The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured
-every few seconds and after every large motion, with the full model: one Newton step with its own factorised stiffness from the
+every few seconds and after every large motion, and whether the law's range is left, with the full model: one Newton step with its own factorised stiffness from the
 reduced shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. Otherwise
 the full model computes the steps, and from time to time both are compared, until they agree again.
 """
@@ -14,6 +14,7 @@ import numpy as np
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
@@ -54,7 +55,7 @@ class ReducedServing:
     def reset(self) -> None:
         """Return to the straight robot; the reduced model is used."""
         self._tracker.place(np.zeros(self.reduced.size), np.zeros(self._model.tendons.count))
-        self._error = self.reduced.error
+        self._error, self._beyond_range = self.reduced.error, ""
         self._since_check = _CHECK_EVERY - _CHECK_AT_LEAST
         self._checked_at = self._tracker.state.q
         self._memory = self._memory.relaxed(self._tracker.state.q, self._tracker.strain)
@@ -176,6 +177,7 @@ class ReducedServing:
         self._hand_over()
         self._full.viscous = None if h is None or self._creep is None else self._creep.step(h)
         before = self._tip(self._full.state.u)
+        self._beyond_range = beyond_range(self._model, self._full.state.u)
         return float(np.linalg.norm(self._tip(self._full.track(gravity, cables, iterations=1).u) - before))
 
     def _tip(self, u: np.ndarray) -> np.ndarray:
@@ -203,4 +205,5 @@ class ReducedServing:
             solve_time=time.perf_counter() - started,
             model="reduced",
             status=ShapeStatus.OK,
+            message=self._beyond_range,
         )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
-from gravcomp.description import Robot
+from gravcomp.description import Cable, CableLine, Robot
 from gravcomp.full_model.model import RobotModel
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.corotational import CorotationalElements
@@ -21,7 +21,7 @@ from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 8
+_FORMAT = 9
 # The deviation of a law from the linear one has the pressure of single points, not of an element's mean volume: up to this
 # Poisson's ratio the difference is small.
 _COMPRESSIBLE = 0.47
@@ -84,9 +84,7 @@ def path_of(model: RobotModel) -> Path:
             for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):
                 material.pop(name, None)
     mesh, robot = model.mesh, model.robot
-    cables = [dataclasses.asdict(cable) for cable in robot.cables]
-    for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
-        del cable["axial_stiffness"]
+    cables = [_path_of_cable(cable) for cable in robot.cables]
     key = content_key(
         _FORMAT,
         mesh.kind,
@@ -101,6 +99,14 @@ def path_of(model: RobotModel) -> Path:
         *(["mean volume"] if model.elements.averaged.any() else []),
     )
     return cache_path("reduction", key, ".npz")
+
+
+def _path_of_cable(cable: Cable) -> dict:
+    """Return what the reduction depends on: path and friction. A calibration of the line's stretch does not require a new one."""
+    path = dataclasses.asdict(cable)
+    for field in dataclasses.fields(CableLine):
+        del path[field.name]
+    return path | {"friction": cable.friction or 0.0}
 
 
 def _loads(robot: Robot) -> list:

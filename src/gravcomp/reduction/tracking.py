@@ -19,7 +19,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.law_deviation import KeptStiffness
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking
+from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
 
@@ -134,8 +134,9 @@ def _tracked(
         solved = np.ascontiguousarray(columns.T)
         y, answer, of_tip = solved[0], solved[1 : m + 1], solved[m + 1 :]
         compliance = point.tendons.jacobian @ answer.T
+        own = stretch(cables, point.tendons)
         for i in range(m):
-            compliance[i, i] += cables.axial_compliance[i]
+            compliance[i, i] += own[i]
         if len(given):
             wanted = given
         else:
@@ -156,5 +157,5 @@ def _tracked(
             break
     if not converged:
         point = start
-    displacement = point.tendons.displacement + cables.axial_compliance * tension
+    displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     return converged, point, q, tension, displacement, compliance, answer, residual

@@ -136,7 +136,7 @@ class DynamicSimulator:
             tip_orientation=orientation[-1],
             backbone_position=sections[:-1, 0],
             backbone_orientation=orientation[:-1],
-            cable_displacement=motion.tendons.displacement + model.tendons.axial_compliance * motion.tension,
+            cable_displacement=motion.tendons.displacement + model.tendons.stretch(motion.tendons) * motion.tension,
             cable_tension=motion.tension,
             residual=motion.residual,
             solve_time=time.perf_counter() - started,

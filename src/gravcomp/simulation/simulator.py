@@ -11,13 +11,12 @@ from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.materials.laws import LAWS
-from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -192,7 +191,7 @@ class Simulator:
         model = self.model
         sections = model.effectors.sections(model.mesh.nodes + state.u)
         effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-        displacement = state.tendons.displacement + model.tendons.axial_compliance * state.tension
+        displacement = state.tendons.displacement + model.tendons.stretch(state.tendons) * state.tension
         response = Response(
             state.compliance,
             compliance_ea,
@@ -212,7 +211,7 @@ class Simulator:
             residual=state.residual,
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
-            message="" if state.converged else self._reason(state),
+            message=beyond_range(model, state.u) if state.converged else self._reason(state),
         )
 
     def _reason(self, state: Equilibrium) -> str:
@@ -220,18 +219,7 @@ class Simulator:
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        mesh, elements = self.model.mesh, self.model.elements
-        if isinstance(elements, CorotationalElements):
-            return f"{message}: {_LIMIT_POINT}"
-        for number, material in enumerate(mesh.materials):
-            softening, own = LAWS[material.law].softening_strain, mesh.region == number
-            least = elements.strains(state.u)[own, :, :3].min(initial=0.0)
-            if softening is not None and least < softening:
-                return (
-                    f"{message}: the body is compressed to {100 * np.sqrt(1 + 2 * least):.0f} % of its length at a point,"
-                    f" where the law '{material.law}' softens; choose another law for such loads"
-                )
-        return f"{message}: {_LIMIT_POINT}"
+        return f"{message}: {beyond_range(self.model, state.u) or _LIMIT_POINT}"
 
 
 def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) -> np.ndarray:
