@@ -16,7 +16,7 @@ import numpy as np
 
 from gravcomp.description.motor import Motor
 
-_IDLE_WEIGHT = 1e-6  # of a cable that may be slack, in the choice of the motors' displacements
+_IDLE_WEIGHT = 1e-6  # of a cable without tension in the choice of the motors' displacements, over that of the one with the most
 
 
 class Transmission:
@@ -73,11 +73,14 @@ class Transmission:
         """Return the velocities (m,) of the cables in m/s for those at the capstans (k,)."""
         return list(motors) if self.direct else (self.matrix @ np.asarray(motors)).tolist()
 
-    def possible(self, displacement: np.ndarray, taut: np.ndarray) -> np.ndarray:
-        """Return displacements (m,) that the motors can make: those wanted for taut (m,) cables, as near as possible for others."""
+    def possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return displacements (m,) that the motors can make, the nearer to those wanted the larger a cable's tension (m,).
+
+        An antagonist without tension goes where the taut cable takes it.
+        """
         if self.direct:
             return displacement
-        root = np.sqrt(np.where(taut, 1.0, _IDLE_WEIGHT))
+        root = np.sqrt(_IDLE_WEIGHT + tension / max(float(tension.max()), np.finfo(float).tiny))
         wanted = root * (displacement - self.preload)
         return self.matrix @ np.linalg.lstsq(root[:, None] * self.matrix, wanted, rcond=None)[0] + self.preload
 
