@@ -32,7 +32,11 @@ class CableLine:
     )
     diameter: float | None = parameter(None, edge="mm", minimum=0.005, maximum=20.0, description="diameter of the line")
     axial_stiffness: float | None = parameter(
-        None, unit="N", minimum=1.0, maximum=1e9, description="E A of the line, instead of a material; without stretch when not given"
+        None,
+        unit="N",
+        minimum=1.0,
+        maximum=1e9,
+        description="E A of the line, instead of a material; without stretch when not given",
     )
     free_length: float | None = parameter(
         None, edge="mm", minimum=0.0, maximum=20000.0, description="length between capstan and robot; 0 when not given"
@@ -41,10 +45,18 @@ class CableLine:
         None, minimum=0.0, maximum=2.0, description="capstan friction coefficient along sheath and robot; 0 when not given"
     )
     sheath_angle: float | None = parameter(
-        None, edge="deg", minimum=0.0, maximum=3600.0, description="angle that the line turns through between capstan and robot; 0 when not given"
+        None,
+        edge="deg",
+        minimum=0.0,
+        maximum=3600.0,
+        description="angle that the line turns through between capstan and robot; 0 when not given",
     )
     pretension: float | None = parameter(
-        None, unit="N", minimum=0.0, maximum=1000.0, description="smallest tension of the cable; limits.tension_min when not given"
+        None,
+        unit="N",
+        minimum=0.0,
+        maximum=1000.0,
+        description="smallest tension of the cable; limits.tension_min when not given",
     )
 
     def __post_init__(self) -> None:

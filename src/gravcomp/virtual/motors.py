@@ -140,7 +140,9 @@ def _step(
             room = LARGEST_CURRENT * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
             torque, _ = _cable_torque(c, 0.0, wound, offset, spring, matrix, radius)
-            at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9 if torque > 0.0 else capstan[c] - rotor[c] / ratio >= half - 1e-9
+            at_flank = (
+                rotor[c] / ratio - capstan[c] >= half - 1e-9 if torque > 0.0 else capstan[c] - rotor[c] / ratio >= half - 1e-9
+            )
             load = torque / ratio if at_flank else 0.0
             if stalled[c]:
                 speed[c] = 0.0
