@@ -196,7 +196,7 @@ def test_receiving_waits_for_the_first_frame_of_any_bus(wires):
 
 def test_a_bus_that_is_missing_at_the_start_is_named():
     settings = [CanBus(name="near", channel=private_channel()), CanBus(name="far", channel="10.0.0.1:80")]
-    with pytest.raises(BusError, match="bus 'far': .*not a multicast group"):
+    with pytest.raises(BusError, match=r"bus 'far': .*not a multicast group"):
         CanBuses(settings, "near").open()
 
 

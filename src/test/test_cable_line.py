@@ -27,10 +27,11 @@ from gravcomp.virtual.robot import VirtualRobot
 
 G = 9.81
 NYLON = CableLine(material="nylon", diameter=0.7e-3, free_length=0.2)
+STIFF = CableLine()
 EA = 2.5e9 * math.pi * 0.35e-3**2
 
 
-def article(line: CableLine = CableLine(), **changes):
+def article(line=STIFF, **changes):
     robot = load_robot_file("article").robot
     cables = tuple(dataclasses.replace(cable.without_line(), **changes) for cable in robot.cables)
     return dataclasses.replace(robot, elements=Elements(along=4), cables=cables, cable_defaults=line)

@@ -42,7 +42,7 @@ class Transmission:
     @property
     def pays_out(self) -> np.ndarray:
         """(k,) bool: motors that only pay out when they turn back; the others pull an antagonist in."""
-        return (self.matrix >= 0.0).all(axis=0)
+        return np.asarray((self.matrix >= 0.0).all(axis=0))
 
     def couplings(self) -> tuple[np.ndarray, np.ndarray]:
         """Return n (q, m) of the null space above, one row a coupling, and whether it is that of antagonists (q,)."""
@@ -55,7 +55,7 @@ class Transmission:
                 row[alone[0]], row[other] = 1.0 / self.matrix[alone[0], j], -1.0 / self.matrix[other, j]
                 rows.append(row if row[alone[0]] > 0.0 else -row)
         found = np.array(rows).reshape(-1, len(self.matrix))
-        return found, (found >= 0.0).all(axis=1)
+        return found, np.asarray((found >= 0.0).all(axis=1))
 
     def motors(self, displacement: Sequence[float]) -> list[float]:
         """Return the displacements (k,) in m at the capstans that come nearest to the cables' (m,)."""

@@ -189,7 +189,7 @@ class InverseController:
     def _least_tension(self) -> np.ndarray:
         """Return the lower bounds (m,) of the tensions in N.
 
-        A cable's own pretension counts before the option. Cables that share a motor cannot be given one: it comes from the preload.
+        A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
         """
         limits, option = self.robot.limits, self.options.pretension
         own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]

@@ -35,7 +35,10 @@ class CommandCheck:
         turned = self._transmission.motors(displacement)
         for name, wanted, possible in zip(self._cables, displacement, self._transmission.cables(turned)):
             if abs(wanted - possible) > _MARGIN:
-                return f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm is possible"
+                return (
+                    f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm"
+                    " is possible"
+                )
         for label, x in zip(self._labels, turned):
             if not low - _MARGIN <= x <= high + _MARGIN:
                 return f"{label} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
