@@ -20,6 +20,7 @@ from gravcomp.description.section import Lumen, Section
 from gravcomp.description.segment import Segment
 
 __all__ = [
-    "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline",
-    "Payload", "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
+    "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody",
+    "Outline", "Payload", "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file",
+    "shipped_robots",
 ]  # fmt: skip
