@@ -170,7 +170,7 @@ class ClosedLoop:
         displacement = (
             self._cables if self._waiting else within_limits(free, self._cables, self.setup.robot.limits, SAMPLE_PERIOD)
         )
-        return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free), dtype=bool)), np.zeros(len(free))
+        return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free))), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
         command = self._problem.step(
@@ -186,7 +186,7 @@ class ClosedLoop:
     def _idle_released(self, tension: np.ndarray) -> np.ndarray:
         wanted = np.where(tension > _IDLE, self._cables, self._cables - RELEASE_SLACK)
         paid_out = within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
-        return self.setup.hardware.transmission.possible(paid_out, tension > _IDLE)
+        return self.setup.hardware.transmission.possible(paid_out, tension)
 
     def _record(self, shape: Shape) -> None:
         truth = self._virtual.truth

@@ -4,7 +4,7 @@ Unknown are the displacements u and the tensions lambda with
 
     f_int(u) = f_weight + H(u)^T lambda,
     driven by tension:       lambda given;
-    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: stretch of the cable from capstan to end).
+    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: stretch of the cable).
 
 Newton's step solves A y = r and A X = H^T with A = K(u, lambda), so that the step is y + X dlambda and the compliance of the
 cables is W = H X; the tensions follow from the small complementarity problem (Coevoet et al. 2017, section IV). From the second

@@ -130,13 +130,14 @@ class DynamicSimulator:
             sections = model.effectors.sections(model.mesh.nodes + self.solver.state.u)
             _, _, orientation = observe(sections, np.zeros((*sections.shape, 0)))
         ok = motion.converged
+        stretch = model.tendons.axial_compliance * motion.tendons.mean_share
         return dataclasses.replace(
             equilibrium,
             tip_position=sections[-1, 0],
             tip_orientation=orientation[-1],
             backbone_position=sections[:-1, 0],
             backbone_orientation=orientation[:-1],
-            cable_displacement=motion.tendons.displacement + model.tendons.stretch(motion.tendons) * motion.tension,
+            cable_displacement=motion.tendons.displacement + stretch * motion.tension,
             cable_tension=motion.tension,
             residual=motion.residual,
             solve_time=time.perf_counter() - started,

@@ -77,8 +77,9 @@ def time_step(
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step, and the caller sets the rest of the state.
+    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the
+    iteration did not converge. If the state is not possible, pose and material keep their values from before the step, and the
+    caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_end.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
