@@ -93,7 +93,8 @@ def test_a_cable_follows_the_taper_over_stations_and_steps():
         Segment("a", 0.1, stations=(Station(0.0, 20e-3), Station(0.04, 10e-3))),
         Segment("b", 0.1, 8e-3, tip_outer_diameter=4e-3),
     )
-    robot = Robot("r", segments=segments, cables=(Cable("c", 0.0, 6e-3, segment="b", follow_taper=True),))
+    cable = Cable("c", 0.0, 6e-3, segment="b", follow_taper=True)
+    robot = Robot("r", segments=segments, cables=(cable,), elements=Elements(around=8, along=10, radial=2))
     radii = [robot.cable_place(robot.cables[0], s)[0] for s in (0.0, 0.02, 0.04, 0.1, 0.15, 0.2)]
     assert radii == pytest.approx([6e-3, 4.5e-3, 3e-3, 3e-3, 2.25e-3, 1.5e-3])
     length = np.hypot(0.04, 3e-3) + 0.06 + np.hypot(0.1, 1.5e-3)

@@ -6,10 +6,11 @@ import math
 import numpy as np
 
 from gravcomp.config import parameter
+from gravcomp.description.cable_line import CableLine
 
 
 @dataclasses.dataclass(frozen=True)
-class Cable:
+class Cable(CableLine):
     """A sliding tendon, fixed to the body at its last point and pulled at its first.
 
     It runs along the axis at (radius cos angle, radius sin angle) of every section, or through `via_points`: their x and y
@@ -30,15 +31,15 @@ class Cable:
     via_points: tuple[tuple[float, float, float], ...] | None = parameter(
         None, edge="mm", description="points that the cable slides through, first to last, instead of angle and radius"
     )
-    axial_stiffness: float | None = parameter(
-        None, unit="N", minimum=1.0, maximum=1e9, description="E A of the cable; inextensible when not given"
-    )
-    friction: float = parameter(0.0, minimum=0.0, maximum=2.0, description="capstan friction coefficient along the path")
     follow_taper: bool = parameter(
         False, description="the channel comes nearer to the axis as the section shrinks; `radius` is that at its start"
     )
 
     def __post_init__(self) -> None:
+        try:
+            super().__post_init__()
+        except ValueError as error:
+            raise ValueError(f"cable '{self.name}': {error}") from error
         if self.via_points is not None:
             if (
                 self.angle is not None

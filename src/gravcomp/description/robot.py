@@ -6,6 +6,7 @@ Frame `soft_base`: z runs along the straight robot from base to tip; the base is
 import bisect
 import dataclasses
 import functools
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from gravcomp.config import parameter
 from gravcomp.description.body import Elements, MeshBody
 from gravcomp.description.cable import Cable
+from gravcomp.description.cable_line import CableLine
 from gravcomp.description.cable_path import check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
@@ -51,6 +53,9 @@ class Robot:
     segments: tuple[Segment, ...] = parameter((), description="tubes from base to tip")
     body: MeshBody | None = parameter(None, description="a body from a file, instead of segments")
     cables: tuple[Cable, ...] = parameter((), description="cables; their order is the order of every array")
+    cable_defaults: CableLine = parameter(
+        default_factory=CableLine, description="line of every cable that does not give its own; empty once the cables have it"
+    )
     elements: Elements | None = parameter(
         None,
         description="mesh of the segments; well-shaped when not given",
@@ -67,6 +72,7 @@ class Robot:
             raise ValueError(f"{found} of segments and body given; exactly one is needed")
         _refuse_repeats("segments", [s.name for s in self.segments])
         _refuse_repeats("cables", [c.name for c in self.cables])
+        self._fill_cables()
         _ = self.pieces  # refuses segments that do not meet
         segment_names = [s.name for s in self.segments]
         for index, cable in enumerate(self.cables):
@@ -76,6 +82,21 @@ class Robot:
                 raise ValueError(f"{key}.segment is '{cable.segment}'; allowed: {allowed}")
             check_path(key, cable, self)
         check_crossings(self)
+
+    def _fill_cables(self) -> None:
+        """Give each cable what `cable_defaults` has and it does not, and empty them: a changed cable is not filled again."""
+        object.__setattr__(self, "cables", tuple(cable.filled(self.cable_defaults) for cable in self.cables))
+        object.__setattr__(self, "cable_defaults", CableLine())
+        for index, cable in enumerate(self.cables):
+            try:
+                cable.check_stiffness()
+            except ValueError as error:
+                raise ValueError(f"cables[{index}] ('{cable.name}'): {error}") from error
+            if cable.pretension is not None and cable.pretension >= self.limits.tension_max:
+                raise ValueError(
+                    f"cables[{index}] ('{cable.name}').pretension is {cable.pretension:g} N;"
+                    f" allowed: below limits.tension_max = {self.limits.tension_max:g} N"
+                )
 
     @property
     def length(self) -> float:
@@ -123,6 +144,18 @@ class Robot:
             return cable.end
         assert cable.segment is not None  # Cable.__post_init__
         return self.segment_end(cable.segment)
+
+    def line_length(self, cable: Cable) -> float:
+        """Return the length in m of the cable from capstan to end, with the robot straight."""
+        if cable.via_points is not None:
+            inside = sum(math.dist(a, b) for a, b in zip(cable.via_points, cable.via_points[1:]))
+        else:
+            inside = self.cable_end(cable) - cable.start
+        return (cable.free_length or 0.0) + inside
+
+    def cable_compliance(self, cable: Cable) -> float:
+        """Return the elongation in m/N of the cable from capstan to end under a tension that is the same along it."""
+        return self.line_length(cable) / cable.stiffness
 
     def with_material(self, **changes: Any) -> "Robot":
         """Return the robot with these fields of every segment's (or the body's) material changed; caps keep theirs."""
