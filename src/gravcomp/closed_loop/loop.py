@@ -152,7 +152,9 @@ class ClosedLoop:
             self._gravity = np.array(estimate.gravity)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
-        self.shape = shape = self._simulator.step(gravity, None if self._target is None else self._cables)
+        # The model starts at rest and relaxed, and creeps from then on.
+        elapsed = None if self.shape is None else SAMPLE_PERIOD
+        self.shape = shape = self._simulator.step(gravity, None if released else self._cables, duration=elapsed)
         self._cables, tension = self._released(shape) if self._target is None else self._compensated(shape, self._target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
         self._arriving.append((self._sent, tension))

@@ -14,8 +14,6 @@ from gravcomp.mesh.volume_file import VOLUME_SUFFIXES, read_volume
 # Relative to the length: difference between the file's length and length_mm, and distance of a node from the plane of base or
 # tip.
 _LENGTH_TOLERANCE, _PLANE_TOLERANCE = 0.02, 1e-4
-# Above this Poisson's ratio quadratic tetrahedra with four integration points lock.
-_LARGEST_RATIO = 0.495
 
 
 def body_mesh(robot: Robot) -> Mesh:
@@ -38,11 +36,6 @@ def _from_file(body: MeshBody) -> Mesh:
         kind, nodes, elements = read_volume(str(path))
     else:
         raise MeshError(f"{path}: allowed are surfaces {SURFACE_SUFFIXES} and volume meshes {VOLUME_SUFFIXES}")
-    if kind == "tet10" and body.material.poissons_ratio > _LARGEST_RATIO:
-        raise MeshError(
-            f"{path}: quadratic tetrahedra are far too stiff at Poisson's ratio {body.material.poissons_ratio:g}; allowed: up to"
-            f" {_LARGEST_RATIO:g}, or a mesh of 20-node hexahedra"
-        )
     nodes = nodes * body.file_unit
     _check_place(path, nodes, body)
     for plane in (0.0, body.length):
