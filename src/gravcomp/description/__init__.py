@@ -5,11 +5,12 @@ file.robot.segments[0].length          # m
 file.section("hardware")               # another section as a plain mapping
 """
 
-from gravcomp.description.body import Cap, Elements, Material, MeshBody
+from gravcomp.description.body import Cap, Elements, Material
 from gravcomp.description.cable import Cable
 from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.mesh_body import MeshBody, Transform
 from gravcomp.description.outline import Outline
 from gravcomp.description.point_load import PointLoad
 from gravcomp.description.rest_shape import RestShape
@@ -20,5 +21,5 @@ from gravcomp.description.segment import Segment
 
 __all__ = [
     "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
-    "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
+    "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "Transform", "load_robot_file", "shipped_robots",
 ]  # fmt: skip

@@ -3,7 +3,7 @@
 import dataclasses
 
 from gravcomp.description import Material, Outline, Robot
-from gravcomp.mesh.axis import Arc, RestAxis
+from gravcomp.rest_axis import Arc, RestAxis
 from gravcomp.mesh.mesh import MeshError
 
 

@@ -147,5 +147,5 @@ def _body_skin(robot: Robot) -> Skin:
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     surface = faces[first[count == 1]]
     used, renumbered = np.unique(surface, return_inverse=True)
-    nodes = mesh.nodes[used]
+    nodes = mesh.straight[used]
     return Skin(nodes[:, 2] / robot.length, nodes[:, :2], renumbered.reshape(surface.shape))

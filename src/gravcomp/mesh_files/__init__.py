@@ -1,0 +1,11 @@
+"""Meshes as they come from other programmes: reading, mending, unit, axis and place of a body in a file.
+
+    file -> `formats` (raw mesh) -> `mend_volume` or `mend_surface` -> `units` -> `orientation` -> `placing` (body in soft_base)
+
+A surface is filled with tetrahedra by `filling`.
+"""
+
+from gravcomp.mesh_files.errors import MeshError
+from gravcomp.mesh_files.placing import PlacedBody, Placement, placed_body
+
+__all__ = ["MeshError", "PlacedBody", "Placement", "placed_body"]
