@@ -42,7 +42,7 @@ class MeshBody:
     axis: str = parameter(
         "given",
         choices=("given", "auto", "auto_reversed"),
-        description="the file's z after the transform, or found from the shape of the body; reversed: with base and tip exchanged",
+        description="the file's z after the transform, or found from the body's shape; reversed: base and tip exchanged",
     )
     transform: Transform = parameter(default_factory=Transform, description="scale, rotation and displacement, after the axis")
     element_size: float = parameter(
@@ -61,9 +61,7 @@ class MeshBody:
     def placement(self) -> Placement:
         """How the body is put into soft_base."""
         move = self.transform
-        return Placement(
-            self.axis, self.file_unit, self.length, move.scale, tuple(move.rotate), tuple(move.move), self.elements_max
-        )
+        return Placement(self.axis, self.file_unit, self.length, move.scale, move.rotate, move.move, self.elements_max)
 
     def placed(self) -> PlacedBody:
         """Return the body in soft_base, read when it is asked for first. Raises MeshError."""

@@ -37,13 +37,13 @@ def _from_file(body: MeshBody) -> Mesh:
         nodes, elements = raised_to_quadratic(nodes, elements)
     if kind == "tet10" and body.material.poissons_ratio > _LARGEST_RATIO:
         raise MeshError(
-            f"{body.file}: quadratic tetrahedra are far too stiff at Poisson's ratio {body.material.poissons_ratio:g}; allowed: up"
-            f" to {_LARGEST_RATIO:g}, or a mesh of hexahedra"
+            f"{body.file}: quadratic tetrahedra are far too stiff at Poisson's ratio {body.material.poissons_ratio:g}; allowed:"
+            f" up to {_LARGEST_RATIO:g}, or a mesh of hexahedra"
         )
     length = placed.length
     straight = straightened(placed.axis, nodes, length) if placed.axis.bent else None
-    heights = nodes[:, 2] if straight is None else straight[:, 2]
-    heights[np.abs(heights - length) < _PLANE_TOLERANCE * length] = length
+    if straight is None:
+        nodes[np.abs(nodes[:, 2] - length) < _PLANE_TOLERANCE * length, 2] = length
     stations = np.linspace(0.0, length, max(2, int(np.ceil(length / body.element_size))) + 1)
     region = np.zeros(len(elements), dtype=np.int64)
     mesh = Mesh(kind, nodes, elements, region, (body.material,), length, stations, placed.axis, straight)

@@ -3,8 +3,8 @@
 import dataclasses
 
 from gravcomp.description import Material, Outline, Robot
-from gravcomp.rest_axis import Arc, RestAxis
 from gravcomp.mesh.mesh import MeshError
+from gravcomp.rest_axis import Arc, RestAxis
 
 
 @dataclasses.dataclass(frozen=True)

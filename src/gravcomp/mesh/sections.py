@@ -47,7 +47,9 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
 
 
 def _ends_flat(mesh: Mesh) -> bool:
-    """Whether the nodes at the tip span a face."""
+    """Whether the nodes at the tip span a face across the axis; that of a bent body from a file is so only nearly."""
+    if mesh.axis.bent and not is_hexahedron(mesh.kind):
+        return False
     tip = mesh.nodes[mesh.tip]
     return len(tip) >= 3 and bool(np.linalg.svd(tip - tip.mean(axis=0), compute_uv=False)[1] > 1e-3 * mesh.length)
 

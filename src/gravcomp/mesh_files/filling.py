@@ -13,8 +13,11 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.mesh_files.errors import MeshError
+from gravcomp.mesh_files.gmsh_filling import by_gmsh
+from gravcomp.mesh_files.gmsh_library import GmshMissing
 from gravcomp.mesh_files.mend_surface import enclosed_volume
 from gravcomp.mesh_files.mend_volume import boundary_triangles, cell_volumes
+from gravcomp.mesh_files.wild_filling import TOLERANCE, by_wildmeshing
 
 _FORMAT = 3
 # Shape of an element: 1 for a regular tetrahedron, 0 for a flat one. The worst one may not be below.
@@ -29,8 +32,8 @@ def filled(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes (n, 3) and linear tetrahedra (k, 4) of the body inside the triangles (f, 3); lengths in m.
 
-    Nodes of flat faces at z = 0 and z = length lie there exactly. The result is kept in the cache. Raises MeshError: more elements
-    than elements_max, no mesher is installed or none can fill it.
+    Nodes of flat faces at z = 0 and z = length lie there exactly. The result is kept in the cache. Raises MeshError: more
+    elements than elements_max, no mesher is installed or none can fill it.
     """
     volume = enclosed_volume(nodes, triangles)
     expected = volume / (element_size**3 / (6.0 * np.sqrt(2.0)))
@@ -68,14 +71,13 @@ def shapes(nodes: np.ndarray, elements: np.ndarray) -> np.ndarray:
 def _meshed(
     nodes: np.ndarray, triangles: np.ndarray, length: float, element_size: float, volume: float, name: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    from gravcomp.mesh_files.gmsh_filling import by_gmsh
-    from gravcomp.mesh_files.wild_filling import TOLERANCE, by_wildmeshing
-
     problems: list[str] = []
     diagonal = float(np.linalg.norm(np.ptp(nodes, axis=0)))
     for mesher, within in ((by_gmsh, 1e-6 * diagonal), (by_wildmeshing, 2.0 * TOLERANCE * diagonal)):
         try:
             found = mesher(nodes, triangles, element_size, name)
+        except GmshMissing:
+            raise
         except MeshError as error:
             problems.append(str(error))
             continue

@@ -50,7 +50,8 @@ def read(path: Path, elements_max: int) -> RawMesh:
 def too_many(path: Path, found: str, elements_max: int) -> MeshError:
     """Return the error for a mesh with more elements than allowed; `found` says how many."""
     return MeshError(
-        f"{path}: {found}; body.elements_max allows {elements_max}: use a coarser mesh, or raise elements_max (memory grows with it)"
+        f"{path}: {found}; body.elements_max allows {elements_max}: use a coarser mesh, or raise elements_max (memory grows"
+        " with it)"
     )
 
 

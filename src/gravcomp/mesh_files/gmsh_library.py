@@ -18,6 +18,10 @@ SYSTEM_PACKAGES = ("libglu1-mesa", "libgl1", "libopengl0", "libxcursor1", "libxf
 INSTALL_LINE = "./gravcomp mesh install"
 
 
+class GmshMissing(MeshError):
+    """Gmsh is not installed, or cannot be loaded; the text names the line that installs it."""
+
+
 def install_gmsh() -> str:
     """Install Gmsh into the running environment, with its system libraries as root or after a yes; return its version.
 
@@ -79,9 +83,9 @@ def _provided(name: str) -> Any:
             install_gmsh()
             return _imported()
         except SetupError as error:
-            raise MeshError(f"{name}: Gmsh could not be installed: {error}") from error
+            raise GmshMissing(f"{name}: Gmsh could not be installed: {error}") from error
     missing = "is not installed" if isinstance(problem, ImportError) else f"lacks system libraries ({problem})"
-    raise MeshError(f"{name}: Gmsh, which fills surfaces and reads STEP files, {missing}; run: {INSTALL_LINE}")
+    raise GmshMissing(f"{name}: Gmsh, which fills surfaces and reads STEP files, {missing}; run: {INSTALL_LINE}")
 
 
 def _problem() -> "ImportError | OSError | None":

@@ -53,7 +53,7 @@ def mended_surface(mesh: RawMesh, path: Path) -> RawMesh:
     if len(crossing):
         places = nodes[faces[crossing]].mean(axis=1)
         raise with_picture(
-            f"{name}: the surface passes through itself at {len(crossing)} triangles, {_at(places[0])}; make a union of its parts",
+            f"{name}: the surface passes through itself at {len(crossing)} triangles, {_at(places[0])}; unite its parts",
             path, nodes, faces, places,
         )  # fmt: skip
     return RawMesh("tri3", nodes, faces, mesh.unit, (*mesh.notes, *notes))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,9 @@ from gravcomp.rest_axis import STRAIGHT, RestAxis
 
 # Of the length: how far a node may lie from the plane of the base or of the end face to be put onto it.
 _PLANE = 1e-4
+# A body this much wider than it is long along z probably lies on its side.
+_LYING = 1.5
+_WAYS = "axis: auto finds axis and base; transform turns and moves the body"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,6 +76,10 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
             raise formats.too_many(path, f"has {len(raw.cells)} elements", placement.elements_max)
         mesh = mended_volume(raw, name)
         triangles = boundary_triangles(mesh.cells)
+    if mesh.kind == "tet4":
+        mesh = mesh.with_notes("linear tetrahedra lock in bending: they are raised to quadratic ones with straight sides")
+    for note in mesh.notes:
+        logging.getLogger(__name__).warning("%s: %s", name, note)
     notes = [*mesh.notes]
     nodes, clamped = mesh.nodes, False
     if placement.axis != "given":
@@ -87,8 +95,10 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     if axis.bent:
         turn = np.degrees(np.arccos(axis.frames(np.array([length]))[1][0, 2, 2]))
         notes.append(f"the body is bent at rest: its axis turns by {turn:.0f} deg; lengths run along it")
-    unit, why = unit_of(length, placement.unit, mesh.unit, placement.length, name)
+    unit, why = _unit(mesh, nodes, length, placement, name)
     notes.append(f"{why}: {length * unit * 1e3:.6g} mm long")
+    if axis.bent and any(placement.move):
+        raise MeshError(f"{name}: transform.move_mm cannot move a body that is bent at rest: its axis begins inside its base")
     nodes, length = unit * nodes + np.array(placement.move), unit * length
     axis = RestAxis(tuple(dataclasses.replace(arc, length=unit * arc.length) for arc in axis.arcs))
     if placement.length is not None and not axis.bent:
@@ -98,6 +108,22 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     for plane in (0.0, length) if not axis.bent else (0.0,):
         nodes[np.abs(nodes[:, 2] - plane) < _PLANE * length, 2] = plane
     return PlacedBody(mesh.kind, nodes, mesh.cells, length, axis, tuple(notes))
+
+
+def _unit(mesh: RawMesh, nodes: np.ndarray, length: float, placement: Placement, name: str) -> tuple[float, str]:
+    """The unit, and why it is that one; a body that lies on its side is named before its unit is doubted. Raises MeshError."""
+    size = np.ptp(nodes, axis=0)
+    lying = placement.axis == "given" and max(size[:2]) > _LYING * size[2]
+    across = "xy"[int(np.argmax(size[:2]))]
+    on_side = MeshError(
+        f"{name}: the body is {' x '.join(f'{x:.4g}' for x in size)} units: its axis is not z but nearer to {across}; {_WAYS}"
+    )
+    if lying and placement.length is None:
+        raise on_side
+    try:
+        return unit_of(length, placement.unit, mesh.unit, placement.length, name)
+    except MeshError as error:
+        raise (on_side if lying else error) from None
 
 
 def _rotation(angles: tuple[float, float, float]) -> np.ndarray:
@@ -111,15 +137,10 @@ def _check_base(mesh: RawMesh, nodes: np.ndarray, length: float, clamped: bool, 
     """Raise MeshError unless the body stands on z = 0 on a flat face, or is clamped there up to some height."""
     low, size = nodes.min(axis=0), np.ptp(nodes, axis=0)
     found = f"the body is {' x '.join(f'{1e3 * x:.4g}' for x in size)} mm, from z = {1e3 * low[2]:.4g} mm"
-    ways = "axis: auto finds axis and base; transform turns and moves it"
     if clamped:
         return
-    if size[2] < max(size[:2]) and size[2] < 0.9 * float(np.linalg.norm(size)) and abs(size[2] - length) < 1e-9 * length:
-        across = "xy"[int(np.argmax(size[:2]))]
-        if max(size[:2]) > 1.5 * size[2]:
-            raise MeshError(f"{name}: {found}: its axis is not z but nearer to {across}; {ways}")
     if abs(low[2]) > _PLANE * length:
-        raise MeshError(f"{name}: {found}; the base must lie at z = 0; {ways}")
+        raise MeshError(f"{name}: {found}; the base must lie at z = 0; {_WAYS}")
     base = nodes[np.abs(nodes[:, 2]) < _PLANE * length]
     if len(base) < 3 or np.linalg.svd(base - base.mean(axis=0), compute_uv=False)[1] < 1e-3 * length:
-        raise MeshError(f"{name}: {found}; no flat base at z = 0: {len(base)} nodes lie there, at least 3 around it; {ways}")
+        raise MeshError(f"{name}: {found}; no flat base at z = 0: {len(base)} nodes lie there, at least 3 around it; {_WAYS}")

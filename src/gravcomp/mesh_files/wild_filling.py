@@ -1,4 +1,4 @@
-"""Filling a surface by fTetWild (package wildmeshing), in a process of its own: it prints what it does, and cannot be interrupted."""
+"""Filling a surface by fTetWild (package wildmeshing), in a process of its own: it prints and cannot be interrupted."""
 
 import importlib.util
 import os

@@ -18,8 +18,10 @@ def edge_pairs(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def wound_alike(faces: np.ndarray) -> np.ndarray | None:
-    """Return the triangles of one connected surface with those turned over that face another way than the first; None if they
-    cannot all face alike."""
+    """Return the triangles of one connected surface, those turned over that face another way than the first.
+
+    None if they cannot all face alike.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order
 

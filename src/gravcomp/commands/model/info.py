@@ -51,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
         "reach": _reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
     }
+    if robot.body is not None:
+        figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     if args.choose_mesh and robot.body is None:
         figures["chosen_elements"] = dataclasses.asdict(chosen_elements(file.robot))
     output.result(figures, _text(figures))
@@ -138,6 +140,9 @@ def _text(figures: dict[str, Any]) -> str:
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
+    if "mesh_file" in figures:
+        lines.append(f"  body from {figures['mesh_file']['file']}:")
+        lines += [f"    {note}" for note in figures["mesh_file"]["notes"]]
     if "chosen_elements" in figures:
         numbers = ", ".join(f"{name}: {value}" for name, value in figures["chosen_elements"].items())
         lines.append(f"  elements that reach 0.1 % of the length: {{{numbers}}}")
