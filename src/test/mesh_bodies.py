@@ -3,7 +3,7 @@
 import numpy as np
 
 from gravcomp.description import load_robot_file
-from gravcomp.mesh_files.mend_volume import boundary_triangles
+from gravcomp.mesh_files.repair_volume import boundary_triangles
 
 LENGTH = 80.0
 

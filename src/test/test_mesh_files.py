@@ -1,4 +1,4 @@
-"""Bodies as they come from other programmes: formats, units, places, and what is mended or refused."""
+"""Bodies as they come from other programmes: formats, units, places, and what is repaired or refused."""
 
 import numpy as np
 import pytest

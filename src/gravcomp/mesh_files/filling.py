@@ -15,8 +15,8 @@ from gravcomp.cache import cache_path, content_key
 from gravcomp.mesh_files.errors import MeshError
 from gravcomp.mesh_files.gmsh_filling import by_gmsh
 from gravcomp.mesh_files.gmsh_library import GmshMissing
-from gravcomp.mesh_files.mend_surface import enclosed_volume
-from gravcomp.mesh_files.mend_volume import boundary_triangles, cell_volumes
+from gravcomp.mesh_files.repair_surface import enclosed_volume
+from gravcomp.mesh_files.repair_volume import boundary_triangles, cell_volumes
 from gravcomp.mesh_files.wild_filling import TOLERANCE, by_wildmeshing
 
 _FORMAT = 3

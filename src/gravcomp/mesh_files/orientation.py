@@ -2,8 +2,9 @@
 
 The axis is the principal axis of the solid body, along which it is longest. The base is the end with the flatter face: the one
 whose flat face covers more of the section just inside it. Where both ends are equally flat it is the thicker one, and with
-equally thick ones the one nearer to the file's origin. The base lies in the plane of its flat face, in the middle of the
-section, with z into the body across that face; x is the file's axis most across z, the first of x, y, z among equals.
+equally thick ones the one nearer to the file's origin. The base lies in the middle of its flat face (of the section, where the
+face is only a part of the end), with z into the body across that face; x is the file's axis most across z, the first of x, y, z
+among equals.
 """
 
 import dataclasses
@@ -21,6 +22,8 @@ _DEPTH, _END = 0.03, 0.2
 _FLATTER, _THICKER = 0.2, 0.02
 # A flat face that covers less than this share of the section is no base to clamp.
 _FLAT = 0.3
+# A flat face that covers more than this share is the whole end.
+_WHOLE = 0.9
 _ROUNDED_CLAMP = 0.02
 
 
@@ -121,9 +124,10 @@ def _end(nodes: np.ndarray, triangles: np.ndarray, centre: np.ndarray, outward: 
         best = best[0], best[1], best[2] / np.linalg.norm(best[2]), best[3]
         below, inside = plane_section(nodes, triangles, best[1] - _DEPTH * length * best[2], best[2])
         if below > 0.0:
-            # The middle of the end, also where only a part of it is flat.
-            centre = inside + ((best[1] - inside) @ best[2]) * best[2]
-            return _End(outward, min(best[0] / below, 1.0), below, centre, best[2], best[3])
+            share = min(best[0] / below, 1.0)
+            # Where only a part of the end is flat, the middle of the whole end counts.
+            centre = best[1] if share > _WHOLE else inside + ((best[1] - inside) @ best[2]) * best[2]
+            return _End(outward, share, below, centre, best[2], best[3])
     below, middle_of = plane_section(nodes, triangles, centre + (top - _DEPTH * length) * outward, outward)
     return _End(outward, 0.0, below, middle_of + _DEPTH * length * outward, outward, np.zeros(0, dtype=int))
 

@@ -1,4 +1,4 @@
-"""A body from a file at its place: read, mended, in metres, in the frame `soft_base`."""
+"""A body from a file at its place: read, repaired, in metres, in the frame `soft_base`."""
 
 import dataclasses
 import functools
@@ -10,10 +10,10 @@ import numpy as np
 from gravcomp.mesh_files import formats
 from gravcomp.mesh_files.centreline import fitted_axis
 from gravcomp.mesh_files.errors import MeshError
-from gravcomp.mesh_files.mend_surface import mended_surface
-from gravcomp.mesh_files.mend_volume import boundary_triangles, mended_volume
 from gravcomp.mesh_files.orientation import automatic_frame
 from gravcomp.mesh_files.raw_mesh import RawMesh
+from gravcomp.mesh_files.repair_surface import repaired_surface
+from gravcomp.mesh_files.repair_volume import boundary_triangles, repaired_volume
 from gravcomp.mesh_files.units import unit_of
 from gravcomp.rest_axis import STRAIGHT, RestAxis
 
@@ -46,7 +46,7 @@ class PlacedBody:
     """A surface (kind tri3, facing outward) or a volume (tet4, tet10, hex20) in soft_base.
 
     nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; flat_tip: whether it ends in a face across the
-    axis; notes: sentences on what was found and mended.
+    axis; notes: sentences on what was found and repaired.
     """
 
     kind: str
@@ -58,7 +58,7 @@ class PlacedBody:
 
 
 def placed_body(path: str | Path, placement: Placement) -> PlacedBody:
-    """Return the body in the file at its place. Raises MeshError when it cannot be read, mended or placed."""
+    """Return the body in the file at its place. Raises MeshError when it cannot be read, repaired or placed."""
     path = Path(path)
     state = path.stat() if path.is_file() else None
     return _placed(path, state and (state.st_mtime_ns, state.st_size), placement)
@@ -69,12 +69,12 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     name = str(path)
     raw = formats.read(path, placement.elements_max)
     if raw.is_surface:
-        mesh = mended_surface(raw, path)
+        mesh = repaired_surface(raw, path)
         triangles = mesh.cells
     else:
         if len(raw.cells) > placement.elements_max:
             raise formats.too_many(path, f"has {len(raw.cells)} elements", placement.elements_max)
-        mesh = mended_volume(raw, name)
+        mesh = repaired_volume(raw, name)
         triangles = boundary_triangles(mesh.cells)
     if mesh.kind == "tet4":
         mesh = mesh.with_notes("linear tetrahedra lock in bending: they are raised to quadratic ones with straight sides")

@@ -1,4 +1,4 @@
-"""Mending surfaces: repeated points and triangles, their direction, small and flat holes. What cannot be mended is refused.
+"""Repairing surfaces: repeated points and triangles, their direction, small and flat holes. What cannot be repaired is refused.
 
 A refusal that has a place comes with a picture of it (`flaw_picture`).
 """
@@ -10,8 +10,8 @@ import numpy as np
 from gravcomp.mesh_files.errors import MeshError
 from gravcomp.mesh_files.flaw_picture import with_picture
 from gravcomp.mesh_files.holes import fill_holes, open_edges
-from gravcomp.mesh_files.mend_volume import require_numbers, require_one_body
 from gravcomp.mesh_files.raw_mesh import RawMesh
+from gravcomp.mesh_files.repair_volume import require_numbers, require_one_body
 from gravcomp.mesh_files.self_intersection import intersecting_triangles
 from gravcomp.mesh_files.welding import components, welded
 from gravcomp.mesh_files.winding import edge_pairs, wound_alike
@@ -20,8 +20,8 @@ from gravcomp.mesh_files.winding import edge_pairs, wound_alike
 _GAP = 1e-4
 
 
-def mended_surface(mesh: RawMesh, path: Path) -> RawMesh:
-    """Return the closed surface, facing outward; its notes say what was mended.
+def repaired_surface(mesh: RawMesh, path: Path) -> RawMesh:
+    """Return the closed surface, facing outward; its notes say what was repaired.
 
     Raises MeshError: coordinates that are not numbers, no volume, an open surface, edges with more than two triangles, one side
     only, several bodies, a surface that passes through itself.

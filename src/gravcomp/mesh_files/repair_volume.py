@@ -1,4 +1,4 @@
-"""Mending volume meshes: repeated nodes and elements, collapsed and inverted elements. What cannot be mended is refused."""
+"""Repairing volume meshes: repeated nodes and elements, collapsed and inverted elements. What cannot be repaired is refused."""
 
 import numpy as np
 
@@ -23,8 +23,8 @@ _HEX_PARTS = np.array([(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (
 _COLLAPSED = 1e-6
 
 
-def mended_volume(mesh: RawMesh, name: str) -> RawMesh:
-    """Return the mesh without flaws; its notes say what was mended. Linear hexahedra become 20-node ones.
+def repaired_volume(mesh: RawMesh, name: str) -> RawMesh:
+    """Return the mesh without flaws; its notes say what was repaired. Linear hexahedra become 20-node ones.
 
     `name` stands in the errors. Raises MeshError: coordinates that are not numbers, no volume, elements that overlap, several
     bodies.
