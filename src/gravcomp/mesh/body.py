@@ -12,8 +12,6 @@ from gravcomp.mesh_files.filling import filled
 
 # Relative to the length: distance of a node from the plane of base or tip up to which it is put onto the plane.
 _PLANE_TOLERANCE = 1e-4
-# Above this Poisson's ratio quadratic tetrahedra with four integration points lock.
-_LARGEST_RATIO = 0.495
 
 
 def body_mesh(robot: Robot) -> Mesh:
@@ -35,11 +33,6 @@ def _from_file(body: MeshBody) -> Mesh:
     if kind == "tet4":
         kind = "tet10"
         nodes, elements = raised_to_quadratic(nodes, elements)
-    if kind == "tet10" and body.material.poissons_ratio > _LARGEST_RATIO:
-        raise MeshError(
-            f"{body.file}: quadratic tetrahedra are far too stiff at Poisson's ratio {body.material.poissons_ratio:g}; allowed:"
-            f" up to {_LARGEST_RATIO:g}, or a mesh of hexahedra"
-        )
     length = placed.length
     straight = straightened(placed.axis, nodes, length) if placed.axis.bent else None
     if straight is None:

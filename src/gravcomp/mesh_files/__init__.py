@@ -1,6 +1,6 @@
 """Meshes as they come from other programmes: reading, repairing, unit, axis and place of a body in a file.
 
-    file -> `formats` (raw mesh) -> `repair_volume` or `repair_surface` -> `units` -> `orientation` -> `placing` (body in soft_base)
+    file -> `formats` -> `repair_volume` or `repair_surface` -> `orientation` -> `units` -> `placing` (body in soft_base)
 
 A surface is filled with tetrahedra by `filling`.
 """

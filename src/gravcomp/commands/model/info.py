@@ -18,10 +18,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
     )
-    parser.add_argument(
-        "--choose-mesh", action="store_true",
-        help="find elements with a tip error of at most 0.1 %% of the length (seconds to minutes)",
-    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,7 +25,6 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from gravcomp.description import load_robot_file
-    from gravcomp.full_model.mesh_choice import chosen_elements
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.mesh.quality import mesh_quality
     from gravcomp.simulation import Simulator
@@ -49,12 +44,10 @@ def run(args: argparse.Namespace) -> int:
         "natural_frequency_hz": natural_frequencies(model).tolist(),
         "horizontal_tip_mm": (1e3 * sag.tip_position).tolist(),
         "reach": _reach(simulator),
-        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
+        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
     }
     if robot.body is not None:
         figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
-    if args.choose_mesh and robot.body is None:
-        figures["chosen_elements"] = dataclasses.asdict(chosen_elements(file.robot))
     output.result(figures, _text(figures))
     return 0
 
@@ -76,6 +69,8 @@ def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
             if not simulator.solver.track(np.zeros(3), CableInput(tension=tensions), iterations=10).converged:
                 break
             shape = simulator.step(np.zeros(3), tension=tensions)
+            if shape.message and "law_range_left_at_n" not in best:
+                best["law_range_left_at_n"], best["law_range"] = float(tension), shape.message
             tilt = float(np.degrees(np.arccos(np.clip(shape.tip_direction[2], -1.0, 1.0))))
             beyond = shape.cable_displacement[index] > robot.limits.displacement_max
             if beyond or tilt < best["tilt_deg"]:
@@ -91,16 +86,27 @@ def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
     return reach
 
 
-def _mesh_error(robot: "Robot", sag: "Shape") -> dict[str, Any]:
-    """Return how far the horizontal robot's tip moves when the mesh is refined; for a body from a file return advice only."""
+def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, Any]:
+    """Return the estimated error of a chosen mesh, or how far the horizontal tip moves when the described one is refined.
+
+    For a body from a file return advice only.
+    """
     import numpy as np
 
+    from gravcomp.full_model.mesh_choice import ACCURACY, chosen_mesh
     from gravcomp.simulation import Simulator
 
     if robot.body is not None:
         return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
     elements = robot.elements
     assert elements is not None  # the model's robot has its mesh chosen
+    if described.elements is None:
+        error = chosen_mesh(described).error
+        return {
+            "chosen_elements": dataclasses.asdict(elements),
+            "estimated_error_pct": 100 * error,
+            "refinement": "fine enough" if error <= ACCURACY else f"the error is above {100 * ACCURACY:g} % of the length",
+        }
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
     change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve(np.array([-_GRAVITY, 0.0, 0.0]))
     error = float(np.linalg.norm(change.tip_position - sag.tip_position))
@@ -128,11 +134,18 @@ def _text(figures: dict[str, Any]) -> str:
         f" at {r['tension_n']:.2f} N and {r['displacement_mm']:.1f} mm"
         for r in figures["reach"]
     ]
+    lines += [f"    warning: at {r['law_range_left_at_n']:.2f} N {r['law_range']}" for r in figures["reach"] if "law_range" in r]
     lines.append(
         f"  mesh: {mesh['elements']} {mesh['kind']}, {mesh['nodes']} nodes, {mesh['unknowns']} unknowns;"
         f" worst Jacobian ratio {mesh['jacobian_ratio']:.2f}, worst aspect ratio {mesh['aspect_ratio']:.1f}"
     )
-    if "tip_change_when_refined_mm" in mesh:
+    if "chosen_elements" in mesh:
+        numbers = ", ".join(f"{name}: {str(value).lower()}" for name, value in mesh["chosen_elements"].items())
+        lines.append(
+            f"  elements chosen: {{{numbers}}}; with twice as many each way the tip, horizontal or bent to its limit, moves by"
+            f" about {mesh['estimated_error_pct']:.2g} % of the length: {mesh['refinement']}"
+        )
+    elif "tip_change_when_refined_mm" in mesh:
         lines.append(
             f"  with twice the elements along and around the horizontal tip moves by"
             f" {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"
@@ -143,7 +156,4 @@ def _text(figures: dict[str, Any]) -> str:
     if "mesh_file" in figures:
         lines.append(f"  body from {figures['mesh_file']['file']}:")
         lines += [f"    {note}" for note in figures["mesh_file"]["notes"]]
-    if "chosen_elements" in figures:
-        numbers = ", ".join(f"{name}: {value}" for name, value in figures["chosen_elements"].items())
-        lines.append(f"  elements that reach 0.1 % of the length: {{{numbers}}}")
     return "\n".join(lines)
