@@ -56,6 +56,12 @@ def test_the_doctor_examines_the_machine(type_in, line):
     assert code in (0, 1) and "Python" in output
 
 
+def test_the_meshers_are_installed(type_in):
+    code, output = type_in("./gravcomp mesh install")
+    # 3: without root, the line that installs Gmsh's system libraries is printed.
+    assert (code == 0 and "Gmsh" in output) or (code == 3 and "apt-get install" in output), output
+
+
 def test_the_source_is_checked(type_in):
     code, output = type_in("./gravcomp check")
     assert code == 0 and "mypy: passed" in output, output
