@@ -61,9 +61,9 @@ def test_a_pair_on_the_same_side_is_refused():
     hardware = Hardware(motors=(Motor("a", 1, pair="c"), Motor("b", 2), Motor("d", 3)), order=CABLES)
     check_pairs(hardware, robot(), "robot.yaml")
     near = dataclasses.replace(robot().cables[2], angle=math.radians(40))
-    beside = dataclasses.replace(robot(), cables=(*robot().cables[:2], near, robot().cables[3]))
+    same_side = dataclasses.replace(robot(), cables=(*robot().cables[:2], near, robot().cables[3]))
     with pytest.raises(ConfigError, match=r"robot.yaml: hardware.motors\[0\].pair is 'c', on the same side of the robot as 'a'"):
-        check_pairs(hardware, beside, "robot.yaml")
+        check_pairs(hardware, same_side, "robot.yaml")
 
 
 def test_the_cables_of_a_pair_move_against_each_other():

@@ -58,7 +58,7 @@ class Motor:
 
     @property
     def ratios_of_others(self) -> dict[str, float]:
-        """Ratios of the cables beside `cable`."""
+        """Ratios of the cables other than `cable`."""
         return dict(self.also) if self.pair is None else {self.pair: -self.ratio}
 
     @property

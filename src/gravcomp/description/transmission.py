@@ -10,6 +10,7 @@ path, delta <= path, so of the paths
 By virtual work the force at a capstan is F = T^T lambda.
 """
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,7 +35,7 @@ class Transmission:
         self.direct = self.matrix.shape[0] == self.matrix.shape[1] and bool((self.matrix == np.eye(len(cables))).all())
         self._inverse = np.linalg.pinv(self.matrix)
 
-    @property
+    @functools.cached_property
     def first_motor(self) -> list[int]:
         """Index (m,) of the first motor of each cable."""
         return [int(np.flatnonzero(row)[0]) for row in self.matrix]

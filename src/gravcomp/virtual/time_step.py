@@ -8,10 +8,10 @@ Comput. Nonlinear Dyn. 5, 2010) in the fixed frame, so the inertial forces of a 
 The internal forces are those of forces.py with the material of material.py and the tendons' friction of tendon_friction.py. The
 share of the tension that arrives in each element is that at the beginning of the step.
 
-The tension T of each tendon is an unknown of Newton's method next to the shape, with T = max(0, k s) for the stretch s, and the
-geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and its
-geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency and
-robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
+The tension T of each tendon is an unknown of Newton's method in addition to the shape, with T = max(0, k s) for the stretch s,
+and the geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and
+its geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency
+and robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
 """
 
 import numpy as np
