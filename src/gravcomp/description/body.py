@@ -1,4 +1,4 @@
-"""What the robot's body is made of: materials, caps, a mesh from a file, and how tubes are divided into elements."""
+"""What the robot's body is made of: materials, caps, and how tubes are divided into elements."""
 
 import dataclasses
 
@@ -84,19 +84,6 @@ class Cap:
 
     length: float = parameter(edge="mm", minimum=0.1, maximum=500.0, description="thickness along the axis")
     material: Material = parameter(description="material of the cap")
-
-
-@dataclasses.dataclass(frozen=True)
-class MeshBody:
-    """A body from a file: a closed surface, which is meshed, or a volume mesh; `mesh.body` reads the formats."""
-
-    file: str = parameter(description="path of the mesh, relative to the robot file")
-    length: float = parameter(
-        edge="mm", minimum=1.0, maximum=5000.0, description="length along z, checks unit and axis of the file"
-    )
-    file_unit: float = parameter(1.0, edge="mm", minimum=1e-6, maximum=1e6, description="length of one unit of the file")
-    element_size: float = parameter(3.0, edge="mm", minimum=0.05, maximum=500.0, description="edge length of the elements")
-    material: Material = parameter(default_factory=Material, description="material of the body")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -22,9 +22,6 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
 _FORMAT = 9
-# The deviation of a law from the linear one has the pressure of single points, not of an element's mean volume: up to this
-# Poisson's ratio the difference is small.
-_COMPRESSIBLE = 0.47
 
 
 @dataclass(frozen=True)
@@ -59,10 +56,6 @@ def why_not(model: RobotModel) -> str:
     """Return the reason why a robot cannot be reduced, as a sentence; empty if it can."""
     if isinstance(model.elements, CorotationalElements):
         return "corotational tetrahedra have no polynomial strain: the full model is used"
-    incompressible = [m.poissons_ratio > _COMPRESSIBLE and not LAWS[m.law].quadratic for m in model.mesh.materials]
-    if model.elements.averaged.any() and any(incompressible):
-        limit = f"a Poisson's ratio above {_COMPRESSIBLE:g}"
-        return f"tetrahedra with {limit} are reduced with the law 'svk' only: the full model is used"
     return ""
 
 

@@ -46,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
         "reach": _reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
     }
+    if robot.body is not None:
+        figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     output.result(figures, _text(figures))
     return 0
 
@@ -184,4 +186,7 @@ def _text(figures: dict[str, Any]) -> str:
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
+    if "mesh_file" in figures:
+        lines.append(f"  body from {figures['mesh_file']['file']}:")
+        lines += [f"    {note}" for note in figures["mesh_file"]["notes"]]
     return "\n".join(lines)
