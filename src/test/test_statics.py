@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Payload, load_robot_file
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mechanics.block_matrix import BlockMatrix
-from gravcomp.simulation import ShapeStatus, Simulator
+from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
 
 G = 9.81
 
@@ -235,3 +236,12 @@ def test_tracking_with_factors_of_earlier_steps_gives_the_shapes_of_new_factors(
     largest = np.abs(exact.response.compliance_ea).max()
     assert shape.response.compliance_ea == pytest.approx(exact.response.compliance_ea, abs=0.1 * largest)
     assert used < (steps - settled) / 2
+
+
+@pytest.mark.parametrize(("law", "message"), [("svk", "compressed to 55 %"), ("neo_hookean", "")])
+def test_a_shape_beyond_the_range_of_its_law_is_reported(law, message):
+    model = RobotModel(load_robot_file("article").robot.with_material(law=law))
+    u = np.zeros_like(model.mesh.nodes)
+    u[:, 2] = -0.45 * model.mesh.nodes[:, 2]
+    assert message in beyond_range(model, u) and bool(beyond_range(model, u)) == bool(message)
+    assert not beyond_range(model, 0.5 * u)

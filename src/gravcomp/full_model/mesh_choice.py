@@ -110,12 +110,17 @@ def _choose(robot: Robot) -> MeshChoice:
                 change = tips.change(*(_with(robot, start, direction, value) for value in (number, compared)))
                 changes[direction] = change * (1.0 - 0.5**order) / (1.0 - (number / compared) ** order)
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
-        error = _largest(np.sum(list(changes.values()), axis=0)) if changes else 0.0
+        error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
         best = max(gains, key=lambda direction: gains[direction])
         here = _finer(robot, here, best)
         del changes[best]
+
+
+def _together(changes: list[np.ndarray]) -> float:
+    """The size of changes (l, 3) that act together; where they cancel out, that of independent ones."""
+    return max(_largest(np.sum(changes, axis=0)), math.sqrt(sum(_largest(change) ** 2 for change in changes)))
 
 
 def _largest(changes: np.ndarray) -> float:

@@ -17,8 +17,8 @@ from gravcomp.full_model.statics import StaticSolver
 _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
-_SAFE, _PARTS = 0.7, 8
-# The steps in which the bend is followed.
+_SAFE, _PARTS = 0.7, 64
+# The steps in which a load is followed.
 _STEPS = 8
 # The tension grows by this factor from step to step, from this part of its limit.
 _FACTOR, _FIRST = 1.35, 0.01
@@ -50,8 +50,10 @@ def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
     solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
     for index, load in enumerate(loads):
         solver.reset()
-        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:] if load.tension.any() else (1.0,):
+        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
             state = solver.track(part * load.gravity, CableInput(tension=part * load.tension), iterations=15)
+            if not state.converged:
+                break
         if not state.converged:
             solver.reset()
             state = solver.solve(load.gravity, CableInput(tension=load.tension), _PARTS)
@@ -69,7 +71,10 @@ def _bending_tension(model: RobotModel) -> np.ndarray | None:
     unit, solver = np.eye(len(robot.cables))[index], StaticSolver(model)
     limit, tension, best = robot.limits.tension_max, _FIRST * robot.limits.tension_max, 0.0
     while True:
-        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), iterations=15)
+        cables = CableInput(tension=tension * unit)
+        state = solver.track(np.zeros(3), cables, iterations=15)
+        if not state.converged:
+            state = solver.solve(np.zeros(3), cables, _PARTS)
         if not state.converged:
             logging.getLogger(__name__).info("no equilibrium at a tension of %.3g N", tension)
             best *= _SAFE

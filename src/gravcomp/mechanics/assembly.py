@@ -165,7 +165,11 @@ def _foreseen_stress(
     origin: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, law: int, constants: np.ndarray, f: np.ndarray, e: np.ndarray,
     s: np.ndarray, d: np.ndarray,
 ) -> None:  # fmt: skip
-    """Write the stress s (6) for the strain that is linear in the step from `origin` to the present f (3, 3)."""
+    """Write the stress s (6) that is linear in the step from `origin` to the present f (3, 3): S + dS/dE : B du, both at `origin`.
+
+    The law itself at the strain that is linear in the step would answer a rotation, whose linear strain is a shear that changes
+    the volume, with a pressure.
+    """
     start = np.empty((3, 3))
     step = np.empty((3, 3))
     deformation_gradient(origin, nodes, gradient, start)
@@ -175,6 +179,7 @@ def _foreseen_stress(
     rate = np.empty(6)
     green_strain(start, e)
     strain_rate(start, step, rate)
+    laws.stress(law, constants, e, s, d, True)
     for m in range(6):
-        e[m] += rate[m]
-    laws.stress(law, constants, e, s, d, False)
+        for n in range(6):
+            s[m] += d[m, n] * rate[n]
