@@ -105,15 +105,12 @@ def _choose(robot: Robot) -> MeshChoice:
     changes: dict[str, np.ndarray] = {}  # of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction
     while True:
         gains = {}
-        for direction, order in _ORDER.items():
+        for direction in _ORDER:
             finer = _finer(robot, here, direction)
             if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
                 continue
             if direction not in changes:
-                number = getattr(here, direction)
-                compared = 2 * number if direction == "around" else getattr(finer, direction)
-                change = tips.change(*(_with(robot, start, direction, value) for value in (number, compared)))
-                changes[direction] = change * (1.0 - 0.5**order) / (1.0 - (number / compared) ** order)
+                changes[direction] = _change_to_twice(robot, tips, start, direction, getattr(here, direction))
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
         error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
@@ -121,6 +118,20 @@ def _choose(robot: Robot) -> MeshChoice:
         best = max(gains, key=lambda direction: gains[direction])
         here = _finer(robot, here, best)
         del changes[best]
+
+
+def _change_to_twice(robot: Robot, tips: "_Tips", start: Elements, direction: str, number: int) -> np.ndarray:
+    """The change of the tips (l, 3) over the length from `number` of elements in a direction to twice as many.
+
+    Along the robot it is measured. A finer section costs much, so that its change is measured on the first mesh only.
+    """
+    order = _ORDER[direction]
+    measured = number if direction == "along" else getattr(start, direction)
+    finer = 2 * measured
+    if direction == "along":
+        finer = _finer(robot, _with(robot, start, direction, measured), direction).along
+    change = tips.change(*(_with(robot, start, direction, value) for value in (measured, finer)))
+    return change * (1.0 - 0.5**order) / (1.0 - (measured / finer) ** order) * (measured / number) ** order
 
 
 def _together(changes: list[np.ndarray]) -> float:
