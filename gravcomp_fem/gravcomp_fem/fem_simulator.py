@@ -143,10 +143,11 @@ class FemSimulator(ManagedNode):
             return
         stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
         last, self._last_stamp = self._last_stamp, stamp
-        interval = None if last is None or not 0.0 < stamp - last <= _LONGEST_GAP else stamp - last
+        elapsed = None if last is None or stamp <= last else stamp - last
+        interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
         self._move_cables(interval or _LONGEST_GAP)
         self._late_reduction.exchange()
-        shape = self._shape(gravity, interval)
+        shape = self._shape(gravity, interval if self._dynamic else elapsed)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # otherwise the next step would start at an invalid shape
             self._refuse(
@@ -171,8 +172,8 @@ class FemSimulator(ManagedNode):
 
     def _shape(self, gravity: np.ndarray, interval: float | None) -> Shape:
         """Return the shape; interval: s since the last sample, or None when it is not known."""
-        if not self._dynamic:
-            return self._simulator.step(gravity, self._cables)
+        if not self._dynamic:  # a body that creeps is relaxed in its first equilibrium
+            return self._simulator.step(gravity, self._cables, duration=interval)
         if interval is None:
             return self._simulator.settle(gravity, self._cables)
         return self._simulator.step(gravity, self._cables, duration=interval)

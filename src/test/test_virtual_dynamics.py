@@ -21,7 +21,9 @@ ELASTIC = {"creep_ratio": (), "creep_time": (), "damping_time": 0.0, "slip_ratio
 
 def moving_rod(friction=0.0, **changes) -> MovingRod:
     parameters = with_body(**changes)
-    parameters = dataclasses.replace(parameters, tendons=dataclasses.replace(Tendons(), axial_stiffness=960.0, free_length=0.2, friction=friction))
+    parameters = dataclasses.replace(
+        parameters, tendons=dataclasses.replace(Tendons(), axial_stiffness=960.0, free_length=0.2, friction=friction)
+    )
     model = build_rod(reference_robot(), parameters)
     return MovingRod(model, build_material(model, parameters), build_friction(reference_robot(), parameters))
 

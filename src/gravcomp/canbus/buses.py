@@ -96,7 +96,8 @@ class CanBuses:
         for frame in frames:
             name = frame.channel if frame.channel in self.links else self._default
             by_bus.setdefault(str(name), []).append(frame)
-        return all([self.links[name].is_open and self.links[name].send(own) for name, own in by_bus.items()])
+        accepted = {name: self.links[name].is_open and self.links[name].send(own) for name, own in by_bus.items()}
+        return all(accepted.values())
 
     def close(self) -> None:
         """Close all buses."""

@@ -21,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="python-can interface in place of the file's, e.g. socketcan (default with --virtual: a private bus)",
     )
-    parser.add_argument("--channel", default="", help="channel of the interface, e.g. can0; with several buses one each, by commas")
+    parser.add_argument(
+        "--channel", default="", help="channel of the interface, e.g. can0; with several buses one each, by commas"
+    )
     parser.add_argument("--virtual", action="store_true", help="start the virtual robot on the bus as well")
     parser.add_argument(
         "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"

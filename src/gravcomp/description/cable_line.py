@@ -6,8 +6,12 @@ material stands for E over the full circle of the diameter, so that E A = E pi d
 
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 from gravcomp.config import parameter
+
+if TYPE_CHECKING:
+    from typing import Self
 
 # Pa. Solid wire and monofilament: the material's own modulus. Rope 7x7: makers' tables for elastic stretch over the full circle.
 # Braids: fibre (100 GPa UHMWPE, 80 GPa aramid), about half of the circle filled, and the braid's angle. Braids and nylon
@@ -67,7 +71,7 @@ class CableLine:
                 " with diameter_mm"
             )
 
-    def filled(self, defaults: "CableLine") -> "CableLine":
+    def filled(self, defaults: "CableLine") -> "Self":
         """Return this line with what is not given taken from `defaults`. Stiffness counts as one: its own or the default's."""
         changes = {
             field.name: getattr(defaults, field.name)
@@ -88,13 +92,13 @@ class CableLine:
             one_of = "" if self.diameter is None else f", one of {', '.join(CABLE_MATERIALS)}"
             raise ValueError(f"{found} is given without {missing}{one_of}; a material and a diameter together give the stiffness")
 
-    def with_stiffness(self, stiffness: float | None) -> "CableLine":
+    def with_stiffness(self, stiffness: float | None) -> "Self":
         """Return the line with the stiffness E A in N in place of its material; None: without stretch."""
         return dataclasses.replace(self, axial_stiffness=stiffness, material=None, diameter=None)
 
-    def without_line(self) -> "CableLine":
+    def without_line(self) -> "Self":
         """Return the line without stretch, friction, free length and pretension."""
-        return dataclasses.replace(self, **dict.fromkeys((field.name for field in dataclasses.fields(CableLine))))
+        return dataclasses.replace(self, **dict.fromkeys(field.name for field in dataclasses.fields(CableLine)))
 
     @property
     def stiffness(self) -> float:

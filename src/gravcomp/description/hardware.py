@@ -28,7 +28,8 @@ from gravcomp.description.motor import MOTOR_IDS, Motor
 from gravcomp.description.transmission import Transmission
 
 __all__ = [
-    "COUNTS_PER_TURN", "MOTOR_IDS", "CanBus", "CanInterface", "Drive", "Hardware", "Homing", "Motor", "Watchdog", "parse_hardware",
+    "COUNTS_PER_TURN", "MOTOR_IDS", "CanBus", "CanInterface", "Drive", "Hardware", "Homing", "Motor", "Watchdog",
+    "parse_hardware",
 ]  # fmt: skip
 
 COUNTS_PER_TURN = 8192
@@ -185,8 +186,8 @@ class Hardware:
             twice = sorted({can_id for can_id in ids if ids.count(can_id) > 1})
             if twice:
                 raise ValueError(
-                    f"can_id {', '.join(twice)} is given to more than one motor{where}; several cables of one motor are one entry,"
-                    " with `pair` or `also`"
+                    f"can_id {', '.join(twice)} is given to more than one motor{where}; several cables of one motor are one"
+                    " entry, with `pair` or `also`"
                 )
 
     def _check_cables(self) -> None:
@@ -240,7 +241,7 @@ class Hardware:
             names = ", ".join(bus.name for bus in self.all_buses)
             one_each = f"one each for the buses {names}, separated by commas" if self.buses else "one"
             raise ConfigError(f"channel is '{channel}', {len(channels)} channels; needed: {one_each}")
-        given = [
+        given: list[dict[str, Any]] = [
             {key: value for key, value in (("interface", interface), ("channel", own)) if value}
             for own in channels or [""] * len(self.all_buses)
         ]

@@ -1,8 +1,8 @@
 """Motors, and the cables that each of them moves.
 
-A motor winds the line of its `cable`. It may move others as well: the antagonist on the far side of the same capstan (`pair`), or any
-cables over capstans of other radii, gears and pulleys (`also`). A cable that two motors move together (a differential) is named by
-both of them. With the displacement u (k,) at the capstans of the drive, the cables' displacements are (see `transmission`)
+A motor winds the line of its `cable`. It may move others as well: the antagonist on the far side of the same capstan (`pair`),
+or any cables over capstans of other radii, gears and pulleys (`also`). A cable that two motors move together (a differential) is
+named by both of them. With the displacement u (k,) at the drive's capstans, the cables' displacements are (see `transmission`)
 
     delta = T u + s,    T_ij = ratio of cable i on motor j,    s: preload of the pairs.
 """
@@ -58,7 +58,7 @@ class Motor:
 
     @property
     def ratios_of_others(self) -> dict[str, float]:
-        """Ratios of the cables beside `cable`."""
+        """Ratios of the cables other than `cable`."""
         return dict(self.also) if self.pair is None else {self.pair: -self.ratio}
 
     @property

@@ -19,7 +19,7 @@ from gravcomp.description.segment import Segment, require_room
 
 # A transition whose length is not given: so many times as long as the outline moves in it, at least this part of the width.
 _SLOPE, _PART = 2.0, 0.25
-# In a layer of elements in a transition the section's area changes at most by this factor.
+# In a layer of elements in a transition the areas of outline, wall and lumens change by about this factor at most.
 _AREA_IN_LAYER = 1.5
 _SAME = 1e-9  # m
 
@@ -162,15 +162,20 @@ def _transition(before: Piece, segment: Segment, start: float) -> Piece:
         pairs = [(one, other) for one in base for before_taper, other in zip(own, tip) if one.alike(before_taper, _SAME)]
         base, tip = [one for one, _ in pairs], [other for _, other in pairs]
     outer = before.outer[1], segment.outline(part)
-    layers = math.ceil(abs(math.log(outer[1].area / outer[0].area)) / math.log(_AREA_IN_LAYER))
+    lumens = tuple(zip(base, tip))
+    whole = [outline.area for outline in outer]
+    wall = [area - sum(lumen[end].area for lumen in lumens) for end, area in enumerate(whole)]
+    change = max(
+        abs(math.log(tip_area / base_area)) for base_area, tip_area in (whole, wall, *((a.area, b.area) for a, b in lumens))
+    )
+    layers = math.ceil(change / math.log(_AREA_IN_LAYER))
     marks = {*_marks(segment, 0.0, part), *(length * k / layers for k in range(1, layers))}
     piece = Piece(
-        segment.name, "transition", start, length, outer, tuple(zip(base, tip)), segment.material, tuple(sorted(marks))
+        segment.name, "transition", start, length, outer, lumens, segment.material, tuple(sorted(marks))
     )  # fmt: skip
     for share in np.linspace(0.0, 1.0, 9):
-        outline, lumens = piece.section(start + float(share) * length)
         try:
-            require_room(outline, lumens)
+            require_room(*piece.section(start + float(share) * length))
         except ValueError as error:
             raise ValueError(
                 f"between the segments '{before.segment}' and '{segment.name}' no channel fits: {error};"

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from gravcomp.config import parameter
-from gravcomp.description.body import Elements, MeshBody
+from gravcomp.description.body import Elements
 from gravcomp.description.cable import Cable
 from gravcomp.description.cable_line import CableLine
 from gravcomp.description.cable_path import check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.mesh_body import MeshBody
 from gravcomp.description.pieces import Piece, pieces_of_segments
 from gravcomp.description.point_load import PointLoad
 from gravcomp.description.segment import Segment
@@ -101,7 +102,7 @@ class Robot:
     @property
     def length(self) -> float:
         """Rest length from base to tip, with caps (m)."""
-        return self.body.length if self.body else sum(s.full_length for s in self.segments)
+        return self.body.full_length if self.body else sum(s.full_length for s in self.segments)
 
     @functools.cached_property
     def pieces(self) -> list[Piece]:

@@ -10,13 +10,14 @@ path, delta <= path, so of the paths
 By virtual work the force at a capstan is F = T^T lambda.
 """
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
 
 from gravcomp.description.motor import Motor
 
-_IDLE_WEIGHT = 1e-6  # of a cable that may be slack, in the choice of the motors' displacements
+_IDLE_WEIGHT = 1e-6  # of a cable without tension in the choice of the motors' displacements, over that of the one with the most
 
 
 class Transmission:
@@ -34,7 +35,7 @@ class Transmission:
         self.direct = self.matrix.shape[0] == self.matrix.shape[1] and bool((self.matrix == np.eye(len(cables))).all())
         self._inverse = np.linalg.pinv(self.matrix)
 
-    @property
+    @functools.cached_property
     def first_motor(self) -> list[int]:
         """Index (m,) of the first motor of each cable."""
         return [int(np.flatnonzero(row)[0]) for row in self.matrix]
@@ -42,7 +43,7 @@ class Transmission:
     @property
     def pays_out(self) -> np.ndarray:
         """(k,) bool: motors that only pay out when they turn back; the others pull an antagonist in."""
-        return (self.matrix >= 0.0).all(axis=0)
+        return np.asarray((self.matrix >= 0.0).all(axis=0))
 
     def couplings(self) -> tuple[np.ndarray, np.ndarray]:
         """Return n (q, m) of the null space above, one row a coupling, and whether it is that of antagonists (q,)."""
@@ -55,7 +56,7 @@ class Transmission:
                 row[alone[0]], row[other] = 1.0 / self.matrix[alone[0], j], -1.0 / self.matrix[other, j]
                 rows.append(row if row[alone[0]] > 0.0 else -row)
         found = np.array(rows).reshape(-1, len(self.matrix))
-        return found, (found >= 0.0).all(axis=1)
+        return found, np.asarray((found >= 0.0).all(axis=1))
 
     def motors(self, displacement: Sequence[float]) -> list[float]:
         """Return the displacements (k,) in m at the capstans that come nearest to the cables' (m,)."""
@@ -73,11 +74,14 @@ class Transmission:
         """Return the velocities (m,) of the cables in m/s for those at the capstans (k,)."""
         return list(motors) if self.direct else (self.matrix @ np.asarray(motors)).tolist()
 
-    def possible(self, displacement: np.ndarray, taut: np.ndarray) -> np.ndarray:
-        """Return displacements (m,) that the motors can make: those wanted for taut (m,) cables, as near as possible for others."""
+    def possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return displacements (m,) that the motors can make, the nearer to those wanted the larger a cable's tension (m,).
+
+        An antagonist without tension goes where the taut cable takes it.
+        """
         if self.direct:
             return displacement
-        root = np.sqrt(np.where(taut, 1.0, _IDLE_WEIGHT))
+        root = np.sqrt(_IDLE_WEIGHT + tension / max(float(tension.max()), np.finfo(float).tiny))
         wanted = root * (displacement - self.preload)
         return self.matrix @ np.linalg.lstsq(root[:, None] * self.matrix, wanted, rcond=None)[0] + self.preload
 

@@ -80,7 +80,12 @@ def _rounded(robot: Robot) -> Robot:
 
     def material(m: Material) -> Material:
         return dataclasses.replace(
-            m, youngs_modulus=_rounded_down(m.youngs_modulus), damping_time=0.0, creep_ratio=0.0, creep_time=0.5
+            m,
+            youngs_modulus=_rounded_down(m.youngs_modulus),
+            damping_time=0.0,
+            creep_ratio=0.0,
+            creep_time=0.5,
+            prony=(),
         )
 
     segments = tuple(

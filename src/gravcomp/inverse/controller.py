@@ -97,6 +97,11 @@ class InverseController:
         previous = self._displacement
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
+        last = previous
+        if len(self._couplings.rows):
+            # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
+            path = response.compliance_aa @ tension + response.displacement_free
+            previous = np.where(self._couplings.rows.any(axis=0), np.maximum(previous, path), previous)
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
@@ -142,10 +147,10 @@ class InverseController:
             target.tip_position,
             target.direction_or_zeros,
         )
-        displacement = self._possible(result.displacement, result.tension > 0.0)
+        displacement = self._possible(result.displacement, result.tension)
         errors = result.errors
         self._damping.observe(result.along, result.lengths)
-        self._retreat.observe(displacement - previous, interval)
+        self._retreat.observe(displacement - last, interval)
         if self._retreat.stride < 1.0:
             result.met[0] = False  # the shorter stride limits the step, not the motors
         missed = max(
@@ -175,16 +180,16 @@ class InverseController:
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
         """Return displacements (m,) on the way from `previous` (m,) to slack cables; free (m,): displacements of their paths."""
         slack = within_limits(free - self.options.slack, previous, self.robot.limits, interval)
-        return self._possible(slack, np.zeros(len(free), dtype=bool))
+        return self._possible(slack, np.zeros(len(free)))
 
-    def _possible(self, displacement: np.ndarray, taut: np.ndarray) -> np.ndarray:
-        """Return displacements (m,) that the motors can make, exact for the taut (m,) cables if the motors allow it."""
-        return displacement if self._transmission is None else self._transmission.possible(displacement, taut)
+    def _possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return displacements (m,) that the motors can make, nearest for the cables with the largest tensions (m,)."""
+        return displacement if self._transmission is None else self._transmission.possible(displacement, tension)
 
     def _least_tension(self) -> np.ndarray:
         """Return the lower bounds (m,) of the tensions in N.
 
-        A cable's own pretension counts before the option. Cables that share a motor cannot be given one: it comes from the preload.
+        A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
         """
         limits, option = self.robot.limits, self.options.pretension
         own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
@@ -207,7 +212,7 @@ class InverseController:
             # Back to the present shape, whichever command it belongs to: the model may be one sample behind.
             path = response.compliance_aa @ tension + response.displacement_free
             shape = np.where(tension > 0.0, path, path - self.options.slack)
-            displacement = self._possible(within_limits(shape, previous, self.robot.limits, interval), tension > 0.0)
+            displacement = self._possible(within_limits(shape, previous, self.robot.limits, interval), tension)
             code, message = (
                 ControllerCode.UNREACHABLE,
                 "the model finds no equilibrium on the way to the target: the last shape is kept",

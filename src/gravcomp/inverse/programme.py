@@ -9,9 +9,10 @@ Escande and Duriez, IEEE RA-L 2017)
           displacement_lower <= W_aa lambda + delta_free <= displacement_upper,
           n . (W_aa lambda + delta_free - s) >= 0 for antagonists on one motor, = 0 for cables that one motor pulls together,
 
-where n and s are those of `description.transmission`, M contains the roots of the weights, D is the diagonal of W_aa, and c = trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps
-and rho independent of the robot's size. The energy term eps selects, among tensions of equal effect, those without cables that
-work against each other. The proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see `damping`).
+where n and s are those of `description.transmission`, M contains the roots of the weights, D is the diagonal of W_aa, and c =
+trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps and rho independent of the robot's size. The energy term eps selects, among
+tensions of equal effect, those without cables that work against each other. The proximal term rho makes the sequence of steps, a
+Gauss-Newton iteration, settle (see `damping`).
 The part of the errors of tip and backbone along the robot counts less, because cables can only pull: they cannot undo their
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.

@@ -2,7 +2,7 @@
 
 In one plane a region around each lumen (`lumen_cells`) is divided into sectors and rings. In the other planes the nodes keep
 their parameters on the walls, and those between are displaced as a harmonic function, which a uniform taper reproduces exactly.
-Where a channel is filled, kites lie inside a ring.
+Where a channel is filled, a ring lies in it and a square of cells or kites inside the ring.
 """
 
 import itertools
@@ -16,7 +16,7 @@ from gravcomp.description import BlendedOutline, Outline
 from gravcomp.mesh.channels import Channel
 from gravcomp.mesh.lumen_cells import Diagram, diagram_of
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.section_grid import SectionGrid
+from gravcomp.mesh.section_grid import SectionGrid, core_cells
 from gravcomp.mesh.section_laplace import jacobian_ratios, stiffness_and_moments
 
 # Above this ratio of radii the rings around a lumen are divided evenly, below it in geometric progression.
@@ -26,8 +26,10 @@ _EVEN = 0.4
 _GOOD, _MOST_FILLINGS = 0.25, 3
 # What a more complicated division has to gain.
 _BETTER = 0.03
-# The kites in a filled channel reach to this part of its radius.
-_FILLED = 0.6
+# What fills a channel inside the ring reaches to this part of its radius, and its sides bulge: 0 is a square, 1 a circle.
+_FILLED, _BULGE = 0.6, 0.35
+# Up to so many sectors a channel is filled with kites: more of them would be too obtuse.
+_MOST_KITES = 10
 
 
 def lumen_grid(outlines: Sequence[Outline | BlendedOutline], channels: list[Channel], around: int, radial: int) -> SectionGrid:
@@ -97,18 +99,23 @@ def _roomiest(outline: Outline | BlendedOutline, lumens: list[Outline]) -> Outli
 
 
 def _numbers(diagram: Diagram, around: int, filled: list[bool]) -> list[int]:
-    """How many cells lie along each border; around a filled channel their number is even."""
+    """How many cells lie along each border; around a filled channel their number suits its filling."""
     number = [max(1, math.ceil(border.angle * around / (2 * math.pi) - 0.3)) for border in diagram.borders]
-    # A region without an outer border gives its odd cell to a neighbour, which has one or comes later.
+    # A region without an outer border gives cells to a neighbour, which has one or comes later.
     depth = [0 if any(diagram.borders[b].other is None for b, _ in loop) else 1 for loop in diagram.loops]
     for index in sorted(range(len(depth)), key=lambda i: -depth[i]):
         loop = [b for b, _ in diagram.loops[index]]
-        if filled[index] and sum(number[b] for b in loop) % 2:
+        while filled[index] and not _can_be_filled(sum(number[b] for b in loop)):
             widest = max(loop, key=lambda b: (diagram.borders[b].other is None, diagram.borders[b].angle / number[b]))
             number[widest] += 1
     if any(f and sum(number[b] for b, _ in loop) % 2 for f, loop in zip(filled, diagram.loops)):
         number = [2 * n for n in number]
     return number
+
+
+def _can_be_filled(sectors: int) -> bool:
+    """Whether a channel of so many sectors can be filled with cells of a good shape."""
+    return sectors % 4 == 0 or (sectors % 2 == 0 and sectors <= _MOST_KITES)
 
 
 class _Division:
@@ -161,22 +168,35 @@ class _Division:
         self._ring_cells(rings, -1)
 
     def _fill(self, lumen: Outline, wall: list[int], channel: int) -> None:
-        """Cells inside a channel: a ring, and kites between its middle and three nodes of the ring's inner side each."""
+        """Cells inside a channel: a ring, and inside it a square of cells, or kites where the sectors are no multiple of 4."""
         middle = np.array([lumen.x, lumen.y])
-        corner = _FILLED * (np.array([self._points[node] for node in wall]) - middle)
-        # Straight sides, so that two neighbouring ones meet at an angle.
-        corner[1::2] = (corner[::2] + np.roll(corner[::2], -1, axis=0)) / 2
-        side = middle + corner
         outer = np.array([self._points[node] for node in wall])
+        count = len(wall)
+        corner = _FILLED * (outer - middle)
+        sides = 2 if count % 8 else count // 4
+        # Sides that are nearly straight, so that two neighbouring ones meet at an angle.
+        part = (np.arange(count) % sides / sides)[:, None]
+        first = np.arange(count) // sides * sides
+        straight = (1.0 - part) * corner[first] + part * corner[(first + sides) % count]
+        side = middle + (straight if sides == 2 else (1.0 - _BULGE) * straight + _BULGE * corner)
         rings = [self._add(side), self._add((side + outer) / 2), wall]
         self._ring_cells(rings, channel)
-        count = len(wall)
+        if count % 8:
+            self._kites(middle, side, rings[0], channel)
+            return
+        cells, inner = core_cells(count // 8, side[None], count)
+        number = np.array([*rings[0], *self._add(inner[0])])
+        self._cells.extend(number[cells])
+        self.filling_of += [channel] * len(cells)
+
+    def _kites(self, middle: np.ndarray, side: np.ndarray, ring: list[int], channel: int) -> None:
+        """Cells between the middle of a channel and three corners each of the polygon `side` (k, 2), whose nodes are `ring`."""
+        count = len(ring)
         centre = self._add(middle[None])[0]
         spokes = {k: self._add(((middle + side[k]) / 2)[None])[0] for k in range(0, count, 4)}
         for k in range(0, count, 4):
             right, tip, left = k, (k + 2) % count, (k + 4) % count
             inside = self._add(((middle + side[right] + side[tip] + side[left]) / 4)[None])[0]
-            ring = rings[0]
             self._cells.append(np.array([
                 [centre, spokes[left], ring[left]],
                 [spokes[right], inside, ring[(k + 3) % count]],

@@ -1,7 +1,7 @@
 """The pieces of a row of segments, and its axis at rest."""
 
 from gravcomp.description import Piece, Robot
-from gravcomp.mesh.axis import Arc, RestAxis
+from gravcomp.rest_axis import Arc, RestAxis
 
 
 def pieces_of(robot: Robot) -> list[Piece]:
@@ -10,7 +10,9 @@ def pieces_of(robot: Robot) -> list[Piece]:
 
 
 def rest_axis(robot: Robot) -> RestAxis:
-    """Return the axis at rest, one arc for every segment and cap."""
+    """Return the axis at rest, one arc for every segment and cap; that of a body from a file is read. Raises MeshError."""
+    if robot.body is not None:
+        return robot.body.placed().axis
     arcs = []
     for segment in robot.segments:
         rest = segment.rest

@@ -64,11 +64,11 @@ def section_grid(levels: Levels, around: int, radial: int, equal_stiffness: bool
     place = half.reshape(len(half), -1, 2)
     if not levels.solid:
         return SectionGrid(cells, _present(levels, interval[ring]), place)
-    core_cells, core_place = _core(around // 4, half[:, 0], place.shape[1])
+    inner_cells, inner_place = core_cells(around // 4, half[:, 0], place.shape[1])
     return SectionGrid(
-        np.concatenate([cells, core_cells]),
-        _present(levels, np.concatenate([interval[ring], np.zeros(len(core_cells), dtype=interval.dtype)])),
-        np.concatenate([place, core_place], axis=1),
+        np.concatenate([cells, inner_cells]),
+        _present(levels, np.concatenate([interval[ring], np.zeros(len(inner_cells), dtype=interval.dtype)])),
+        np.concatenate([place, inner_place], axis=1),
     )
 
 
@@ -130,8 +130,8 @@ def _core_boundary(outline: Outline | BlendedOutline, angle: np.ndarray, across:
     return middle + part * ((1.0 - _BULGE) * square + _BULGE * curve)
 
 
-def _core(across: int, side: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (c c, 3, 3) of the core, and the places (planes, m, 2) of its inner nodes, which are numbered from `first`.
+def core_cells(across: int, side: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells (c c, 3, 3) of a core, and the places (planes, m, 2) of its inner nodes, which are numbered from `first`.
 
     side (planes, 8 c, 2): the nodes on its sides, from the corner (1, 1) counterclockwise.
     """

@@ -185,7 +185,7 @@ class Bridge:
             self._fault(f"CAN bus lost: {why}", latched=False)
 
     def buses_down(self, lost: Mapping[str, str]) -> None:
-        """Take the buses that are closed, with the reasons: all of them are a fault; without some, the cables of the others hold."""
+        """Take the buses that are closed, with the reasons. All are a fault; without some, the cables of the others hold."""
         self._down = frozenset(self._bus_index[name] for name in lost)
         if len(self._down) == len(self._bus_index):
             self.bus_lost("; ".join(lost.values()))

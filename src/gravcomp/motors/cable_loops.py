@@ -44,7 +44,7 @@ class CableLoops:
         self.target = [loop.setpoint for loop in self._loops]
 
     def pay_out(self) -> None:
-        """Move all cables to `displacement_min`; motors with antagonists go to their zero positions, where no cable is pulled in."""
+        """Move all cables to `displacement_min`; motors with antagonists go to zero, where no cable is pulled in."""
         farthest = self._hardware.drive.displacement_min
         self.follow([farthest if alone else 0.0 for alone in self._pays_out], [])
 
@@ -65,8 +65,8 @@ class CableLoops:
     ) -> str | None:
         """Compute the currents of one control period of `dt` s. Return the fault of a motor, or None.
 
-        `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing. Motors `without` a bus get
-        zero current.
+        `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing. Motors `without` a bus
+        get zero current.
         """
         targets = self.target if targets is None else targets
         displacement, velocity = self._rotors.displacement(), self._rotors.velocity()

@@ -36,7 +36,8 @@ class CommandCheck:
         for name, wanted, possible in zip(self._cables, displacement, self._transmission.cables(turned)):
             if abs(wanted - possible) > _MARGIN:
                 return (
-                    f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm is possible"
+                    f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm"
+                    " is possible"
                 )
         for label, x in zip(self._labels, turned):
             if not low - _MARGIN <= x <= high + _MARGIN:

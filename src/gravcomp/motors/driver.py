@@ -1,4 +1,4 @@
-"""The thread that runs the bridge on its buses: it receives, controls at a fixed rate and sends, independently of the rest of the process.
+"""The thread that runs the bridge on its buses: it receives, controls and sends, independently of the rest of the process.
 
     bus --frames--> Bridge (states, loops) --currents--> bus          every control period
         --frames--> ImuStream --samples--> queue                      as they come
@@ -20,8 +20,8 @@ from collections.abc import Callable, Sequence
 import can
 
 from gravcomp.canbus import c610, codec
-from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.buses import CanBuses
+from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.canbus.link import lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import MOTOR_IDS, Hardware

@@ -62,7 +62,9 @@ class FaultWatch:
         """Return the names of the buses on which no motor answers, if all others answer completely; else none."""
         lost = [bus for bus in set(self._bus) if all(i in silent for i, own in enumerate(self._bus) if own == bus)]
         complete = all(self._bus[index] in lost for index in silent)
-        return [self._hardware.all_buses[bus].name for bus in sorted(lost)] if complete and len(lost) < len(set(self._bus)) else []
+        return (
+            [self._hardware.all_buses[bus].name for bus in sorted(lost)] if complete and len(lost) < len(set(self._bus)) else []
+        )
 
     def unknown_id(self) -> str | None:
         """Motors that answer although no cable has their id on that bus, and an IMU board on another bus than its own."""

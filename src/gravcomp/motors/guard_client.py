@@ -41,7 +41,8 @@ class GuardClient:
     def connect(cls, hardware: Hardware, record: ZeroRecord | None = None, bus: int = 0) -> "GuardClient":
         """Connect to the guard of the bus with this index in `hardware.all_buses`, and start it when there is none.
 
-        `record`, by CAN id, is what the bridge has itself. Raises GuardError when another bridge drives this bus or no guard answers.
+        `record`, by CAN id, is what the bridge has itself. Raises GuardError when another bridge drives this bus or no guard
+        answers.
         """
         settings, can = GuardSettings.of(hardware, bus), hardware.all_buses[bus]
         deadline, process = time.monotonic() + _START_TIMEOUT, None

@@ -29,9 +29,9 @@ class ReducedCables(NamedTuple):
 class ReducedTendons(NamedTuple):
     """The cables at coordinates q.
 
-    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that at the capstan; mean_share (m,): its mean along each
-    cable; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose times
-    the tensions is the cables' force.
+    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that at the capstan; mean_share (m,): its mean along
+    each cable; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose
+    times the tensions is the cables' force.
     """
 
     tangent: np.ndarray

@@ -21,7 +21,7 @@ from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 10
+_FORMAT = 11
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,10 @@ def path_of(model: RobotModel) -> Path:
     materials = [dataclasses.asdict(material) for material in model.mesh.materials]
     for material in materials:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
-        for viscous in ("damping_time", "creep_ratio", "creep_time"):
+        for viscous in ("damping_time", "creep_ratio", "creep_time", "prony"):
             del material[viscous]
+        if material["fibres"] is None:
+            del material["fibres"]
         for law in LAWS.values():  # a constant counts only for the law that has it
             for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):
                 material.pop(name, None)
@@ -87,6 +89,7 @@ def path_of(model: RobotModel) -> Path:
         robot.payload,
         *_loads(robot),
         *_disks(robot),
+        *(["mean volume"] if model.elements.averaged.any() else []),
     )
     return cache_path("reduction", key, ".npz")
 

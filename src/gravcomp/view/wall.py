@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from gravcomp.description import Outline, Piece, Robot, Segment
+from gravcomp.mesh_files.repair_volume import boundary_triangles
 from gravcomp.view.skin import AROUND, Skin, merged, quads, revolved
 
 # Rings along the robot, and the fewest along a piece.
@@ -127,10 +128,6 @@ def _body_skin(robot: Robot) -> Skin:
     from gravcomp.mesh import body_mesh
 
     mesh = body_mesh(robot)
-    corners = mesh.elements[:, :4]
-    faces = np.concatenate([corners[:, face] for face in ([0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2])])
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    surface = faces[first[count == 1]]
-    used, renumbered = np.unique(surface, return_inverse=True)
-    nodes = mesh.nodes[used]
-    return Skin(nodes[:, 2] / robot.length, nodes[:, :2], renumbered.reshape(surface.shape))
+    used, faces = np.unique(boundary_triangles(mesh.elements), return_inverse=True)
+    nodes = mesh.straight[used]
+    return Skin(nodes[:, 2] / robot.length, nodes[:, :2], faces.reshape(-1, 3))

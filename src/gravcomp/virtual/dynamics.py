@@ -43,7 +43,7 @@ class MovingRod:
 
     @property
     def spring(self) -> np.ndarray:
-        """Stiffness (m,) N/m of each tendon as its capstan feels it within a step: the line in series with the rod that gives way."""
+        """Stiffness (m,) N/m that each capstan feels within a step: the line in series with the rod."""
         return self.tendon_stiffness / (1.0 + self.tendon_stiffness * self._compliance)
 
     @property

@@ -4,11 +4,11 @@ Angles and torques are positive in the direction that winds the cable in. At the
 
     J dw/dt = k_t i - b w - F / N r - friction,    di/dt = (i_commanded - i) / lag
 
-with the gear ratio N, the radius r of the capstan and the force F there: that of the cable, or of all cables that the motor moves,
-each times its ratio. Coulomb friction (a constant part and a part
-proportional to the load) removes at most the existing momentum, so a rotor at rest stays at rest. The capstan has no inertia of
-its own: while the cable is taut it lies on the flank that winds in; inside the backlash it stays where it is while its drag is
-larger than the torque of the cables. An antagonist that pulls more draws it to the other flank.
+with the gear ratio N, the radius r of the capstan and the force F there: the sum of the forces of the motor's cables, each times
+its ratio. Coulomb friction (a constant part and a part proportional to the load) removes at most the existing momentum, so a
+rotor at rest stays at rest. The capstan has no inertia of its own: while the cable is taut it lies on the flank that winds in;
+inside the backlash it stays where it is while its drag is larger than the torque of the cables. An antagonist that pulls more
+draws it to the other flank.
 
 The speed controller keeps the last current that it received; there is no timeout.
 """
@@ -49,7 +49,7 @@ class MotorBank:
         return self._matrix @ self._capstan * self._parameters.capstan_radius - self._longer
 
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
-        """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack at displacements up to `shortened` (m,) m."""
+        """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack up to displacements `shortened` (m,) m."""
         p = self._parameters
         _step(
             ticks,
@@ -140,7 +140,9 @@ def _step(
             room = LARGEST_CURRENT * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
             torque, _ = _cable_torque(c, 0.0, wound, offset, spring, matrix, radius)
-            at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9 if torque > 0.0 else capstan[c] - rotor[c] / ratio >= half - 1e-9
+            at_flank = (
+                rotor[c] / ratio - capstan[c] >= half - 1e-9 if torque > 0.0 else capstan[c] - rotor[c] / ratio >= half - 1e-9
+            )
             load = torque / ratio if at_flank else 0.0
             if stalled[c]:
                 speed[c] = 0.0

@@ -45,9 +45,7 @@ class RealtimeRobot:
         `steer` returns the orientation (3, 3), world from soft_base, to turn the base to, or None. Compiles the kernels first.
         """
         self.robot, self.lock = robot, threading.Lock()
-        self.link = CanBuses(
-            hardware.all_buses, hardware.board_bus.name, [layout(name).frame_id for name in RECEIVED_FRAMES]
-        )
+        self.link = CanBuses(hardware.all_buses, hardware.board_bus.name, [layout(name).frame_id for name in RECEIVED_FRAMES])
         self._wires = len(hardware.all_buses)
         self.lost_time = 0.0
         self.error: BaseException | None = None

@@ -8,10 +8,10 @@ Comput. Nonlinear Dyn. 5, 2010) in the fixed frame, so the inertial forces of a 
 The internal forces are those of forces.py with the material of material.py and the tendons' friction of tendon_friction.py. The
 share of the tension that arrives in each element is that at the beginning of the step.
 
-The tension T of each tendon is an unknown of Newton's method next to the shape, with T = max(0, k s) for the stretch s, and the
-geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and its
-geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency and
-robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
+The tension T of each tendon is an unknown of Newton's method in addition to the shape, with T = max(0, k s) for the stretch s,
+and the geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and
+its geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency
+and robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
 """
 
 import numpy as np
@@ -77,8 +77,9 @@ def time_step(
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step, and the caller sets the rest of the state.
+    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the
+    iteration did not converge. If the state is not possible, pose and material keep their values from before the step, and the
+    caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_end.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))

@@ -8,7 +8,7 @@ from gravcomp.commands import output
 
 if TYPE_CHECKING:
     from gravcomp.description import Robot
-    from gravcomp.simulation import Shape, Simulator
+    from gravcomp.simulation import RobotModel, Shape, Simulator
 
 _GRAVITY = 9.81
 
@@ -40,14 +40,48 @@ def run(args: argparse.Namespace) -> int:
         "length_mm": 1e3 * robot.length,
         "mass_g": 1e3 * model.mass,
         "payload_g": 1e3 * robot.payload.mass,
-        "cables": {name: {"length_mm": 1e3 * length} for name, length in zip(robot.cable_names, model.tendons.rest_length)},
+        "cables": _cables(model),
         "natural_frequency_hz": natural_frequencies(model).tolist(),
         "horizontal_tip_mm": (1e3 * sag.tip_position).tolist(),
         "reach": _reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
     }
+    if robot.body is not None:
+        figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     output.result(figures, _text(figures))
     return 0
+
+
+def _cables(model: "RobotModel") -> dict[str, dict[str, float | None]]:
+    """Return length, line and stretch at the largest tension of each cable; stiffness None: it does not stretch."""
+    robot, tendons = model.robot, model.tendons
+    return {
+        cable.name: {
+            "length_mm": 1e3 * float(length),
+            "free_length_mm": 1e3 * (cable.free_length or 0.0),
+            "axial_stiffness_n": cable.stiffness if cable.stretches else None,
+            "largest_stretch_mm": 1e3 * float(compliance) * robot.limits.tension_max,
+        }
+        for cable, length, compliance in zip(robot.cables, tendons.rest_length, tendons.axial_compliance)
+    }
+
+
+def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
+    """Return the sentences about the cables' lines, one for each kind of line."""
+    kinds: dict[tuple, list[str]] = {}
+    for name, cable in cables.items():
+        values = tuple(None if value is None else round(value, 3) for value in list(cable.values())[1:])
+        kinds.setdefault(values, []).append(name)
+    sentences = []
+    for (free, stiffness, stretch), names in kinds.items():
+        if stiffness is None:
+            sentences.append(f"  lines of {', '.join(names)}: not described, without stretch")
+        else:
+            sentences.append(
+                f"  lines of {', '.join(names)}: E A {stiffness:.0f} N, {free:g} mm from capstan to robot,"
+                f" stretch {stretch:.2f} mm at the largest tension"
+            )
+    return sentences
 
 
 def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
@@ -123,6 +157,7 @@ def _text(figures: dict[str, Any]) -> str:
         f"{figures['robot']} ({figures['file']})",
         f"  length {figures['length_mm']:.1f} mm, mass {figures['mass_g']:.2f} g (payload {figures['payload_g']:.2f} g)",
         "  cables " + ", ".join(f"{name} {cable['length_mm']:.1f} mm" for name, cable in figures["cables"].items()),
+        *_lines(figures["cables"]),
         "  natural frequencies " + ", ".join(f"{f:.2f}" for f in figures["natural_frequency_hz"]) + " Hz",
         "  tip when horizontal, cables released: " + ", ".join(f"{x:.2f}" for x in figures["horizontal_tip_mm"]) + " mm",
         "  reach of each cable alone, without gravity:",
@@ -151,4 +186,7 @@ def _text(figures: dict[str, Any]) -> str:
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
+    if "mesh_file" in figures:
+        lines.append(f"  body from {figures['mesh_file']['file']}:")
+        lines += [f"    {note}" for note in figures["mesh_file"]["notes"]]
     return "\n".join(lines)
