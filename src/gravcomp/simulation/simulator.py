@@ -10,13 +10,12 @@ import numpy as np
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.linear_response import observed
 from gravcomp.full_model.model import RobotModel
-from gravcomp.full_model.observation import observe
-from gravcomp.full_model.shape import Response, Shape, ShapeStatus
+from gravcomp.full_model.shape import Shape, ShapeStatus
+from gravcomp.full_model.softening import softened
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.materials.laws import LAWS
-from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -158,20 +157,11 @@ class Simulator:
 
     def _shape(self, state: Equilibrium, gravity: np.ndarray, started: float) -> Shape:
         """Return the shape and response of a state of the full model; started: of the computation, by `time.perf_counter`."""
-        model = self.model
-        sections = model.effectors.sections(model.mesh.nodes + state.u)
-        effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-        displacement = state.tendons.displacement + model.tendons.axial_compliance * state.tension
-        response = Response(
-            state.compliance,
-            compliance_ea,
-            displacement - state.compliance @ state.tension,
-            effector - compliance_ea @ state.tension,
-        )
+        sections, orientation, _, displacement, response = observed(self.model, state)
         return Shape(
             tip_position=sections[-1, 0],
             tip_orientation=orientation[-1],
-            backbone_station=model.effectors.station,
+            backbone_station=self.model.effectors.station,
             backbone_position=sections[:-1, 0],
             backbone_orientation=orientation[:-1],
             cable_displacement=displacement,
@@ -189,18 +179,7 @@ class Simulator:
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        mesh, elements = self.model.mesh, self.model.elements
-        if isinstance(elements, CorotationalElements):
-            return f"{message}: {_LIMIT_POINT}"
-        for number, material in enumerate(mesh.materials):
-            softening, own = LAWS[material.law].softening_strain, mesh.region == number
-            least = elements.strains(state.u)[own, :, :3].min(initial=0.0)
-            if softening is not None and least < softening:
-                return (
-                    f"{message}: the body is compressed to {100 * np.sqrt(1 + 2 * least):.0f} % of its length at a point,"
-                    f" where the law '{material.law}' softens; choose another law for such loads"
-                )
-        return f"{message}: {_LIMIT_POINT}"
+        return f"{message}: {softened(self.model, state.u) or _LIMIT_POINT}"
 
 
 def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) -> np.ndarray:
