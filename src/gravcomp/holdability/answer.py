@@ -33,7 +33,8 @@ class DirectionAnswer:
     None if no tension holds the tip; tension in N and displacement in m that are needed, largest of the cables, None likewise;
     lateral in m: error that remains at the whole gravity within the limits, None where no equilibrium was found; eigenvalue:
     the smallest at the end of the path, over that at rest, at constant tension, and eigenvalue_held with taut cables held; end:
-    share of gravity at which the path of equilibria ends, None if it does not.
+    share of gravity at which the path of equilibria ends, None if it does not; cause: why it ends, as a sentence, where that is
+    known.
     """
 
     direction: np.ndarray
@@ -48,6 +49,7 @@ class DirectionAnswer:
     eigenvalue: float
     eigenvalue_held: float
     end: float | None
+    cause: str = ""
 
     @property
     def severity(self) -> float:
@@ -101,6 +103,11 @@ class Holdability:
     def held(self) -> bool:
         """Whether the tip is held in every direction."""
         return all(answer.held for answer in self.directions)
+
+    @property
+    def ended(self) -> bool:
+        """Whether a path of equilibria ends before the whole gravity acts."""
+        return any(answer.end is not None for answer in self.directions)
 
     @property
     def held_share(self) -> float:

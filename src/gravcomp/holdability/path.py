@@ -29,9 +29,10 @@ from gravcomp.inverse.target import Target
 # with less of it, tensions of equal effect are found sooner.
 _INVERSE = InverseOptions(axial_weight=1e-3, proximal_weight=3e-4)
 _NEWTON = 10
-_PROGRAMMES = 30
+_PROGRAMMES = 20
 # Changes of the cables below which a point has settled: of the robot's length, and of the largest tension.
 _SETTLED, _SETTLED_TENSION = 2e-5, 5e-3
+_UNDAMPED = 4.0
 # Steps toward the programme's tensions are halved at most this many times.
 _HALVINGS = 3
 
@@ -64,6 +65,11 @@ class HoldPath:
         self._tangent = Tangent(model)
         self._solver = ProgrammeSolver()
         self.linear_answer = self._tangent.answer
+
+    @property
+    def displacements(self) -> np.ndarray:
+        """Displacements (nodes, 3) in m at the last point of the last path."""
+        return self._tracker.state.u
 
     def follow(self, gravity: np.ndarray, limits: Limits, first: np.ndarray, most: float = 1.0) -> list[PathPoint]:
         """Return the points of the path from no gravity to `most` times gravity (3,) in m/s^2, or to where it ends.
@@ -126,14 +132,16 @@ class HoldPath:
             change = response.compliance_aa @ (wanted - state.tension)
             largest = max(wanted.max(initial=0.0), state.tension.max(initial=0.0))
             if (
-                np.abs(change).max() <= _SETTLED * model.length
+                damping.factor <= _UNDAMPED  # damped steps are short anywhere
+                and np.abs(change).max() <= _SETTLED * model.length
                 and np.abs(wanted - state.tension).max() <= _SETTLED_TENSION * largest
             ):
                 return state
             damping.observe(float(change @ last), float(np.linalg.norm(change) * np.linalg.norm(last)))
             last = change
             state = self._moved(gravity, state, wanted)
-        return state
+        # Where the equilibria end, the steps become shorter and shorter and do not settle.
+        return state if state is not None and self._lateral(state) <= self.options.tolerance * model.length else None
 
     def _moved(self, gravity: np.ndarray, state: Equilibrium, wanted: np.ndarray) -> Equilibrium | None:
         """Return the equilibrium at the tensions `wanted` (m,), or part of the way to them; None if there is none."""
@@ -146,8 +154,13 @@ class HoldPath:
         return None
 
     def _tracked(self, gravity: np.ndarray, tension: np.ndarray) -> Equilibrium | None:
-        state = self._tracker.track(gravity, CableInput(tension=tension), iterations=_NEWTON, stable=True)
+        state = self._tracker.track(gravity, CableInput(tension=tension), iterations=_NEWTON)
         return state if state.converged else None
+
+    def _lateral(self, state: Equilibrium) -> float:
+        """Return the lateral error of the tip in m."""
+        effector = observed(self.model, state).effector
+        return float(tip_errors(effector, self.target.tip_position, self.target.direction_or_zeros).lateral)
 
     def _point(self, share: float, state: Equilibrium) -> PathPoint:
         seen = observed(self.model, state)

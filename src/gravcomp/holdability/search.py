@@ -3,6 +3,7 @@
 import numpy as np
 
 from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.softening import softened
 from gravcomp.holdability.answer import Binding, DirectionAnswer
 from gravcomp.holdability.limits import unlimited_rates
 from gravcomp.holdability.linear import LinearHolding
@@ -14,6 +15,8 @@ from gravcomp.standard_gravity import STANDARD_GRAVITY
 # A path that ends with an eigenvalue that reaches zero within this many of its least steps ends by buckling.
 _NEAR = 4.0
 _LITTLE = 0.1
+# The last equilibrium of a path is compressed to this part of the strain at which the material softens, at least.
+_NEARLY = 0.75
 
 
 class HoldSearch:
@@ -48,6 +51,7 @@ class HoldSearch:
         last = points[-1]
         complete = last.share >= 1.0
         share, binding, cable = self._first_violation(points)
+        cause = "" if complete else softened(self.model, self.path.displacements, _NEARLY) or ""
         possible = complete and last.lateral <= self.tolerance
         held, lateral = share >= 1.0 and complete, last.lateral if complete else None
         if binding in (Binding.TENSION, Binding.DISPLACEMENT):
@@ -69,6 +73,7 @@ class HoldSearch:
             eigenvalue=last.eigenvalues.free,
             eigenvalue_held=last.eigenvalues.held,
             end=None if complete else last.share,
+            cause=cause if binding == Binding.EQUILIBRIUM else "",
         )
 
     def _ratios(self, point: PathPoint) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.holdability.answer import Binding, DirectionAnswer, Holdability
-from gravcomp.holdability.directions import sphere
+from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.needed import needed
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.search import HoldSearch
@@ -31,12 +31,14 @@ def holdability(
     *,
     directions: np.ndarray | None = None,
     progress: Progress | None = None,
+    first: Callable[[str], None] | None = None,
     with_needed: bool = True,
 ) -> Holdability:
     """Return whether the robot's cables keep its tip laterally on the target.
 
     target: default the straight tip; directions (k, 3) of gravity: default all over the sphere, and the worst of the linear
-    estimate first; with_needed: find also what would be needed, where it buckles, and the released shape. Raises MeshError for a
+    estimate first; progress: see `Progress`; first: called with the linear estimate, as a sentence, before the paths are
+    followed; with_needed: find also what would be needed, where it buckles, and the released shape. Raises MeshError for a
     body that cannot be meshed, ValueError for a robot without cables.
     """
     model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
@@ -45,7 +47,10 @@ def holdability(
     asked = asked / np.linalg.norm(asked, axis=1, keepdims=True)
     answers: list[DirectionAnswer | None] = [None] * len(asked)
     # The worst first: it is the answer that the user waits for.
-    order = np.argsort([-search.linear_demand(direction) for direction in asked], kind="stable")
+    demands = np.array([search.linear_demand(direction) for direction in asked])
+    order = np.argsort(-demands, kind="stable")
+    if first and target is None:
+        first(_estimate(search, asked[order[0]]))
     for count, index in enumerate(order):
         answer = answers[index] = search.answer(asked[index])
         if progress:
@@ -59,6 +64,19 @@ def _directions(search: HoldSearch) -> np.ndarray:
     fine = sphere(_FINER * equator)
     worst = fine[int(np.argmax([search.linear_demand(direction) for direction in fine]))]
     return np.vstack([worst, sphere(equator)])
+
+
+def _estimate(search: HoldSearch, direction: np.ndarray) -> str:
+    """Return the linear estimate of the straight robot for a direction (3,), as a sentence."""
+    tension, lateral = search.linear.tension(STANDARD_GRAVITY * direction)
+    inclination, azimuth = np.degrees(angles(direction))
+    where = f"gravity {inclination:.0f} deg from the axis toward {azimuth:.0f} deg"
+    if lateral > search.tolerance:
+        return f"First answer, from the linear response at rest: the cables do not hold the tip with {where}"
+    return (
+        f"First answer, from the linear response at rest: worst with {where}, where the cables need"
+        f" {tension.max():.3g} N of {search.limits.tension_max:g} N"
+    )
 
 
 def _summary(search: HoldSearch, answers: tuple[DirectionAnswer, ...], with_needed: bool) -> Holdability:

@@ -36,14 +36,14 @@ class Tangent:
 
     def __init__(self, model: RobotModel):
         self._model = model
-        self._mass, self._matrix = model.mass_matrix(), model.new_matrix()
+        self._mass, self._matrix = model.mass_matrix().sparse(), model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         loads = [model.weight(axis) for axis in np.eye(3)]
         forces = model.tendons.state(model.mesh.nodes).force_jacobian
         factor = self._matrix.factor()
         self.answer = factor.solve(np.column_stack([*loads, *forces]))
         """(3 n_free, 3 + m): change of the unknowns at rest per unit of gravity along x, y, z and per tension of each cable."""
-        self._start, _ = np.linalg.qr(self.answer)
+        self._begin = self._mass @ np.linalg.qr(self.answer)[0]
         self._rest = 1.0
         self._rest = self._iterated(factor, lambda y: y)
 
@@ -72,14 +72,14 @@ class Tangent:
         """Return the smallest eigenvalue among the vectors that `allowed` projects on; 0 if it is negative."""
         from scipy.linalg import eigh, qr
 
-        x, value = self._start, np.inf
+        right, value = self._begin, np.inf
         for _ in range(_ITERATIONS):
-            right = self._mass.multiply(x)
             y, triangle, order = qr(allowed(factor.solve(right)), mode="economic", pivoting=True)
             sizes = np.abs(np.diag(triangle))
             count = int((sizes > _DEPENDENT * sizes[0]).sum())  # the projection makes some vectors dependent
             y, triangle, right = y[:, :count], triangle[:count, :count], right[:, order[:count]]
             stiffness = np.linalg.solve(triangle.T, right.T @ y).T
-            values, vectors = eigh(0.5 * (stiffness + stiffness.T), y.T @ self._mass.multiply(y))
-            x, value = y @ vectors, float(values[0])
+            weighted = self._mass @ y
+            values, vectors = eigh(0.5 * (stiffness + stiffness.T), y.T @ weighted)
+            right, value = weighted @ vectors, float(values[0])
         return max(value / self._rest, 0.0)
