@@ -47,7 +47,7 @@ def save(answer: "Holdability", name: str, file: str) -> None:
         t_deg, a_deg = np.degrees(angles(direction.direction))
         # The share at the place of each computed direction: of the limits where it is held, of gravity where it is not.
         text = f"{100 * (direction.demand or 0.0):.0f}" if direction.held else f"{100 * direction.share:.0f}!"
-        axes.annotate(text, (a_deg if a_deg < 179.9 else -180.0, t_deg), fontsize=7, ha="center", va="center", clip_on=True)
+        axes.annotate(text, (min(max(a_deg, -176.0), 176.0), min(max(t_deg, 4.0), 176.0)), fontsize=7, ha="center", va="center", clip_on=True)
     worst = np.degrees(angles(answer.directions[answer.worst].direction))
     axes.plot(worst[1], worst[0], "o", markersize=17, markerfacecolor="none", markeredgecolor="black", label="worst direction")
     axes.set(
@@ -62,6 +62,6 @@ def save(answer: "Holdability", name: str, file: str) -> None:
             axes.plot([], [], "s", color=colour, label=f"not held: {label} (number: % of gravity)")
     mappable = matplotlib.cm.ScalarMappable(norm, colours)
     bar = figure.colorbar(mappable, ax=axes, shrink=0.8)
-    bar.set_label("held: what the cables need over what their limits allow (number: %)")
+    bar.set_label("held: needed over allowed (number: %)")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8, frameon=False, ncols=2)
     figure.savefig(file, dpi=130)
