@@ -258,9 +258,7 @@ class InverseController(ManagedNode):
 
     def _publish_code(self, code: ControllerCode, sentence: str, header: Header | None = None) -> None:
         code, sentence = self._with_refusal(code, sentence)
-        status = ControllerStatus(
-            code=int(code), message=sentence, holdable=self._holdable, hold_message=self._hold_message
-        )
+        status = ControllerStatus(code=int(code), message=sentence, holdable=self._holdable, hold_message=self._hold_message)
         status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
         self._published_code = None
         self._status.publish(status)

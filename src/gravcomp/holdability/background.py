@@ -31,7 +31,12 @@ class HoldProcess:
     def __init__(self, robot: str, gravity: np.ndarray, target: Target):
         """robot: path or shipped name."""
         direction = None if target.tip_direction is None else target.tip_direction.tolist()
-        question = {"robot": robot, "gravity": list(map(float, gravity)), "tip": target.tip_position.tolist(), "direction": direction}
+        question = {
+            "robot": robot,
+            "gravity": list(map(float, gravity)),
+            "tip": target.tip_position.tolist(),
+            "direction": direction,
+        }
         self._process = subprocess.Popen(
             [sys.executable, "-m", "gravcomp.holdability.background", json.dumps(question)],
             stdin=subprocess.DEVNULL,

@@ -97,7 +97,7 @@ class HoldPath:
                 continue
             self._tracker.state, self._tracker.sliding = before, sliding
             step /= 2.0
-            if step < self.options.least_step:
+            if step < self.options.least_step * max(1.0, points[-1].share):
                 break
         return points
 

@@ -47,7 +47,14 @@ def save(answer: "Holdability", name: str, file: str) -> None:
         t_deg, a_deg = np.degrees(angles(direction.direction))
         # The share at the place of each computed direction: of the limits where it is held, of gravity where it is not.
         text = f"{100 * (direction.demand or 0.0):.0f}" if direction.held else f"{100 * direction.share:.0f}!"
-        axes.annotate(text, (min(max(a_deg, -176.0), 176.0), min(max(t_deg, 4.0), 176.0)), fontsize=7, ha="center", va="center", clip_on=True)
+        axes.annotate(
+            text,
+            (min(max(a_deg, -176.0), 176.0), min(max(t_deg, 4.0), 176.0)),
+            fontsize=7,
+            ha="center",
+            va="center",
+            clip_on=True,
+        )
     worst = np.degrees(angles(answer.directions[answer.worst].direction))
     axes.plot(worst[1], worst[0], "o", markersize=17, markerfacecolor="none", markeredgecolor="black", label="worst direction")
     axes.set(
