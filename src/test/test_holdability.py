@@ -107,7 +107,7 @@ def test_a_robot_that_is_too_soft_buckles_upright_and_says_so():
 
 @pytest.mark.parametrize("share", [0.6, 1.5])
 def test_the_answer_is_that_of_the_closed_loop_of_model_and_controller(share):
-    """With a limit above what is needed the loop reaches the target, and below it ends at the error that was foretold."""
+    """With a limit above what is needed the loop reaches the target, and below it ends at the error that was predicted."""
     limit = share * holdability(arm(), directions=_SIDE, with_needed=False).directions[0].tension
     robot = arm(tension_max=limit)
     found = holdability(robot, directions=_SIDE, with_needed=False).directions[0]

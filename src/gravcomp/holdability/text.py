@@ -1,4 +1,4 @@
-"""The answer as sentences for people: mm, N and degrees."""
+"""The answer as sentences in mm, N and degrees."""
 
 import numpy as np
 
