@@ -28,7 +28,7 @@ def observed(model: RobotModel, state: Equilibrium) -> Observed:
     """Return what is observed of a state of the model."""
     sections = model.effectors.sections(model.mesh.nodes + state.u)
     effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-    displacement = state.tendons.displacement + model.tendons.axial_compliance * state.tension
+    displacement = state.tendons.displacement + model.tendons.stretch(state.tendons) * state.tension
     response = Response(
         state.compliance,
         compliance_ea,

@@ -28,9 +28,10 @@ class LinearHolding:
         sections = model.effectors.sections(model.mesh.nodes)
         self._effector, change, _ = observe(sections, model.effectors.section_changes(answer))
         self._by_gravity, self._by_tension = change[:, :3], np.ascontiguousarray(change[:, 3:])
-        lengths = model.tendons.state(model.mesh.nodes).jacobian @ answer
+        tendons = model.tendons.state(model.mesh.nodes)
+        lengths = tendons.jacobian @ answer
         self._path_by_gravity = lengths[:, :3]
-        self._compliance = lengths[:, 3:] + np.diag(model.tendons.axial_compliance)
+        self._compliance = lengths[:, 3:] + np.diag(model.tendons.stretch(tendons))
         self._target = straight_target(model.length)
         self._solver = ProgrammeSolver()
 

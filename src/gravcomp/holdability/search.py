@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.model import RobotModel
-from gravcomp.full_model.softening import softened
 from gravcomp.holdability.answer import Binding, DirectionAnswer
 from gravcomp.holdability.limits import unlimited_rates
 from gravcomp.holdability.linear import LinearHolding
@@ -51,7 +51,7 @@ class HoldSearch:
         last = points[-1]
         complete = last.share >= 1.0
         share, binding, cable = self._first_violation(points)
-        cause = "" if complete else softened(self.model, self.path.displacements, _NEARLY) or ""
+        cause = "" if complete else beyond_range(self.model, self.path.displacements, _NEARLY)
         possible = complete and last.lateral <= self.tolerance
         held, lateral = share >= 1.0 and complete, last.lateral if complete else None
         if binding in (Binding.TENSION, Binding.DISPLACEMENT):

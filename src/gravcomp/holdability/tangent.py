@@ -61,7 +61,7 @@ class Tangent:
         taut = state.tension > _TAUT * max(state.tension.max(initial=0.0), np.finfo(float).tiny)
         rows = state.tendons.jacobian[taut]
         release = factor.solve(state.tendons.force_jacobian[taut].T)
-        compliance = rows @ release + np.diag(model.tendons.axial_compliance[taut])
+        compliance = rows @ release + np.diag(model.tendons.stretch(state.tendons)[taut])
         free = self._iterated(factor, lambda y: y)
         if not taut.any():
             return Eigenvalues(free, free)

@@ -11,7 +11,7 @@ from gravcomp.commands.model.reach import text as reach_text
 
 if TYPE_CHECKING:
     from gravcomp.description import Robot
-    from gravcomp.simulation import Shape
+    from gravcomp.simulation import RobotModel, Shape
 
 _GRAVITY = 9.81
 
@@ -21,10 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
     )
-    parser.add_argument(
-        "--choose-mesh", action="store_true",
-        help="find elements with a tip error of at most 0.1 %% of the length (seconds to minutes)",
-    )  # fmt: skip
     hold.add_arguments(parser)
 
 
@@ -33,7 +29,6 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from gravcomp.description import load_robot_file
-    from gravcomp.full_model.mesh_choice import chosen_elements
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.holdability.text import lines
     from gravcomp.mesh.quality import mesh_quality
@@ -51,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         "length_mm": 1e3 * robot.length,
         "mass_g": 1e3 * model.mass,
         "payload_g": 1e3 * robot.payload.mass,
-        "cables": {name: {"length_mm": 1e3 * length} for name, length in zip(robot.cable_names, model.tendons.rest_length)},
+        "cables": _cables(model),
     }
     answer = hold.answer(args, model)
     if answer is not None and args.picture:
@@ -63,24 +58,67 @@ def run(args: argparse.Namespace) -> int:
         "horizontal_message": sag.message,
         "hold": None if answer is None else hold.figures(answer, model),
         "reach": reach(simulator),
-        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(robot, sag),
+        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
     }
-    if args.choose_mesh and robot.body is None:
-        figures["chosen_elements"] = dataclasses.asdict(chosen_elements(file.robot))
+    if robot.body is not None:
+        figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     output.result(figures, _text(figures, [] if answer is None else lines(robot, answer)))
     return 0
 
 
-def _mesh_error(robot: "Robot", sag: "Shape") -> dict[str, Any]:
-    """Return how far the horizontal robot's tip moves when the mesh is refined; for a body from a file return advice only."""
+def _cables(model: "RobotModel") -> dict[str, dict[str, float | None]]:
+    """Return length, line and stretch at the largest tension of each cable; stiffness None: it does not stretch."""
+    robot, tendons = model.robot, model.tendons
+    return {
+        cable.name: {
+            "length_mm": 1e3 * float(length),
+            "free_length_mm": 1e3 * (cable.free_length or 0.0),
+            "axial_stiffness_n": cable.stiffness if cable.stretches else None,
+            "largest_stretch_mm": 1e3 * float(compliance) * robot.limits.tension_max,
+        }
+        for cable, length, compliance in zip(robot.cables, tendons.rest_length, tendons.axial_compliance)
+    }
+
+
+def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
+    """Return the sentences about the cables' lines, one for each kind of line."""
+    kinds: dict[tuple, list[str]] = {}
+    for name, cable in cables.items():
+        values = tuple(None if value is None else round(value, 3) for value in list(cable.values())[1:])
+        kinds.setdefault(values, []).append(name)
+    sentences = []
+    for (free, stiffness, stretch), names in kinds.items():
+        if stiffness is None:
+            sentences.append(f"  lines of {', '.join(names)}: not described, without stretch")
+        else:
+            sentences.append(
+                f"  lines of {', '.join(names)}: E A {stiffness:.0f} N, {free:g} mm from capstan to robot,"
+                f" stretch {stretch:.2f} mm at the largest tension"
+            )
+    return sentences
+
+
+def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, Any]:
+    """Return the estimated error of a chosen mesh, or how far the horizontal tip moves when the described one is refined.
+
+    For a body from a file return advice only.
+    """
     import numpy as np
 
+    from gravcomp.full_model.mesh_choice import ACCURACY, chosen_mesh
     from gravcomp.simulation import Simulator
 
     if robot.body is not None:
         return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
     elements = robot.elements
     assert elements is not None  # the model's robot has its mesh chosen
+    if described.elements is None:
+        error = chosen_mesh(described).error
+        return {
+            "chosen_elements": dataclasses.asdict(elements),
+            "estimated_error_pct": 100 * error,
+            "refinement": "fine enough" if error <= ACCURACY else f"the error is above {100 * ACCURACY:g} % of the length",
+        }
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
     change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve(np.array([-_GRAVITY, 0.0, 0.0]))
     if not (change.is_equilibrium and sag.is_equilibrium):
@@ -101,6 +139,7 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
         f"{figures['robot']} ({figures['file']})",
         f"  length {figures['length_mm']:.1f} mm, mass {figures['mass_g']:.2f} g (payload {figures['payload_g']:.2f} g)",
         "  cables " + ", ".join(f"{name} {cable['length_mm']:.1f} mm" for name, cable in figures["cables"].items()),
+        *_lines(figures["cables"]),
         "  natural frequencies " + ", ".join(f"{f:.2f}" for f in figures["natural_frequency_hz"]) + " Hz",
         "  tip when horizontal, cables released: "
         + (figures["horizontal_message"] if tip is None else ", ".join(f"{x:.2f}" for x in tip) + " mm"),
@@ -112,7 +151,13 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
         f"  mesh: {mesh['elements']} {mesh['kind']}, {mesh['nodes']} nodes, {mesh['unknowns']} unknowns;"
         f" worst Jacobian ratio {mesh['jacobian_ratio']:.2f}, worst aspect ratio {mesh['aspect_ratio']:.1f}"
     )
-    if mesh.get("tip_change_when_refined_mm") is not None:
+    if "chosen_elements" in mesh:
+        numbers = ", ".join(f"{name}: {str(value).lower()}" for name, value in mesh["chosen_elements"].items())
+        lines.append(
+            f"  elements chosen: {{{numbers}}}; with twice as many each way the tip, horizontal or bent to its limit, moves by"
+            f" about {mesh['estimated_error_pct']:.2g} % of the length: {mesh['refinement']}"
+        )
+    elif mesh.get("tip_change_when_refined_mm") is not None:
         lines.append(
             f"  with twice the elements along and around the horizontal tip moves by"
             f" {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"
@@ -120,7 +165,7 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
     else:
         lines.append(f"  refinement: {mesh['refinement']}")
     lines += [f"  advice: {sentence}" for sentence in mesh["advice"]]
-    if "chosen_elements" in figures:
-        numbers = ", ".join(f"{name}: {value}" for name, value in figures["chosen_elements"].items())
-        lines.append(f"  elements that reach 0.1 % of the length: {{{numbers}}}")
+    if "mesh_file" in figures:
+        lines.append(f"  body from {figures['mesh_file']['file']}:")
+        lines += [f"    {note}" for note in figures["mesh_file"]["notes"]]
     return "\n".join(lines)

@@ -23,6 +23,7 @@ def _reach_of(simulator: "Simulator", index: int) -> dict[str, Any]:
     import numpy as np
 
     from gravcomp.full_model.cable_input import CableInput
+    from gravcomp.full_model.law_range import beyond_range
 
     robot, solver, model = simulator.robot, simulator.solver, simulator.model
     limits = robot.limits
@@ -45,7 +46,7 @@ def _reach_of(simulator: "Simulator", index: int) -> dict[str, Any]:
         section = model.effectors.sections(model.mesh.nodes + state.u)[-1]
         direction = np.cross(section[1], section[2])
         tilt = float(np.degrees(np.arccos(np.clip(direction[2] / np.linalg.norm(direction), -1.0, 1.0))))
-        displacement = float(state.tendons.displacement[index] + model.tendons.axial_compliance[index] * tension[index])
+        displacement = float(state.tendons.displacement[index] + model.tendons.stretch(state.tendons)[index] * tension[index])
         if displacement > limits.displacement_max:
             entry["ended_by"] = "displacement limit"
             break
@@ -59,6 +60,9 @@ def _reach_of(simulator: "Simulator", index: int) -> dict[str, Any]:
             "lateral_mm": max(lateral, entry["lateral_mm"] or 0.0),
             "tilt_deg": tilt,
         }
+        left = beyond_range(model, state.u)
+        if left and "law_range" not in entry:
+            entry |= {"law_range_left_at_n": float(tension[index]), "law_range": left}
         here, part, step = state, next_part, min(2.0 * step, _LONGEST)
     solver.reset()
     return entry
@@ -75,4 +79,6 @@ def text(entries: list[dict[str, Any]]) -> list[str]:
             f"    {entry['cable']}: {entry['lateral_mm']:.1f} mm lateral, tip tilted by {entry['tilt_deg']:.0f} deg,"
             f" at {entry['tension_n']:.2f} N and {entry['displacement_mm']:.1f} mm; ended by: {entry['ended_by']}"
         )
+        if "law_range" in entry:
+            found.append(f"      warning: at {entry['law_range_left_at_n']:.2f} N {entry['law_range']}")
     return found
