@@ -11,6 +11,8 @@ from documents import documented
 
 from gravcomp.view.browser import find_chromium
 
+pytestmark = pytest.mark.graph
+
 LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]
 
 
@@ -36,6 +38,7 @@ def check_compensation(figures: dict) -> None:
     assert figures["delay_ms"]["median"] > 0.0
 
 
+@pytest.mark.rates
 def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     mark = f"GRAVCOMP_TEST={os.getpid()}-scenario"
     answer = gravcomp(*documented("./gravcomp demo --headless --duration 30 --json")[1:], GRAVCOMP_TEST=mark.split("=")[1])
@@ -46,6 +49,7 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     assert marked(mark) == []
 
 
+@pytest.mark.rates
 def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
     answer = gravcomp(*documented("./gravcomp demo --imu FILE", FILE=trial[0])[1:], "--json")

@@ -13,7 +13,7 @@ from gravcomp.launcher import Graph
 from gravcomp.launcher.domain import reserve_domain
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.rates, pytest.mark.timeout(600)]
 
 # With a namespace, because nothing must depend on an empty one.
 NAMESPACE = "/left"

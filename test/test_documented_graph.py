@@ -13,7 +13,7 @@ pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
 from ros2_line import Ros2
 from shell import START, Shell
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.rates, pytest.mark.timeout(900)]
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from shell import START, Shell
 
 from gravcomp.launcher.domain import reserve_domain
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(900)]
 
 APART = reserve_domain()
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"

@@ -109,6 +109,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
             # The last one, because its motion begins with its activation.
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
+            processes.wait(processes.were_active, _START_TIMEOUT, "the activation of the virtual robot")
+            builder.start()
             state = _follow(processes, result_file, args, pictures)
             problem = pictures.take(address) if pictures else ""
             figures = {
