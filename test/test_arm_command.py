@@ -7,7 +7,7 @@ from documents import documented
 @pytest.mark.graph
 @pytest.mark.timeout(700)
 def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcomp):
-    answer = gravcomp(*documented("./gravcomp arm --viewer")[1:], "--hold", "3", "--json", timeout=600)
+    answer = gravcomp(*documented("./gravcomp arm --viewer")[1:], "--hold", "2", "--json", timeout=600)
     assert answer.code == 0, answer.err
     figures = answer.json
     assert figures["inclination_deg"] == [135.0, 90.0, 45.0, 0.0, -45.0]
