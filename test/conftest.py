@@ -34,7 +34,7 @@ class Answer:
 
 @pytest.fixture
 def apart(request):
-    """Return options of subprocess: a command of a test that starts no graph gives way to the graph of a test next to it."""
+    """Return options of subprocess: a lower priority for the commands of tests that start no graph, which can run next to one."""
     if any(request.node.get_closest_marker(name) for name in ("graph", "rates")):
         return {}
     return {"start_new_session": True, "preexec_fn": _give_way}
