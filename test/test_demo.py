@@ -16,7 +16,7 @@ pytestmark = pytest.mark.graph
 LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]
 
 
-PATIENCE = 60.0  # s
+PATIENCE = 120.0  # s
 
 
 def processes(mark: str) -> dict[int, str]:

@@ -15,6 +15,7 @@ from gravcomp.view.browser import Browser, find_chromium
 from gravcomp.view.graphics import chosen
 
 _LIGHT = {"virtual_robot": {"feedback_rate": 125, "motion": "tremor", "truth_rate": 50.0}}  # as in the demo
+_FIRST_TRACE = 60.0  # s, longest wait for the first command on the bus
 _FRAMES = "window.gravcompFrames = 0; (function count() { window.gravcompFrames++; requestAnimationFrame(count) })()"
 
 
@@ -67,6 +68,9 @@ def _delays(graph: RunningGraph, settle: float, duration: float) -> dict[str, fl
     time.sleep(settle)
     listener = DelayListener(graph.can)
     listener.start()
+    end = time.monotonic() + _FIRST_TRACE
+    while not listener.delays and time.monotonic() < end:
+        time.sleep(0.1)
     time.sleep(duration)
     listener.stop()
     in_ms = 1e3 * np.array(listener.delays)
