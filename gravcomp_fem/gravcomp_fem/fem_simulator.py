@@ -25,7 +25,7 @@ from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
 from gravcomp_fem.conversion import deformation_message, pose_message
-from gravcomp_fem.markers import markers_of
+from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
@@ -63,6 +63,7 @@ class FemSimulator(ManagedNode):
         self._deformation = self.create_publisher(Deformation, "robot/deformation", SENSOR)
         self._tip = self.create_publisher(PoseStamped, "robot/tip", SENSOR)
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
+        self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
 
     def activate(self) -> None:
@@ -142,10 +143,11 @@ class FemSimulator(ManagedNode):
             return
         stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
         last, self._last_stamp = self._last_stamp, stamp
-        interval = None if last is None or not 0.0 < stamp - last <= _LONGEST_GAP else stamp - last
+        elapsed = None if last is None or stamp <= last else stamp - last
+        interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
         self._move_cables(interval or _LONGEST_GAP)
         self._late_reduction.exchange()
-        shape = self._shape(gravity, interval)
+        shape = self._shape(gravity, interval if self._dynamic else elapsed)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # otherwise the next step would start at an invalid shape
             self._refuse(
@@ -170,8 +172,8 @@ class FemSimulator(ManagedNode):
 
     def _shape(self, gravity: np.ndarray, interval: float | None) -> Shape:
         """Return the shape; interval: s since the last sample, or None when it is not known."""
-        if not self._dynamic:
-            return self._simulator.step(gravity, self._cables)
+        if not self._dynamic:  # a body that creeps is relaxed in its first equilibrium
+            return self._simulator.step(gravity, self._cables, duration=interval)
         if interval is None:
             return self._simulator.settle(gravity, self._cables)
         return self._simulator.step(gravity, self._cables, duration=interval)
@@ -184,7 +186,7 @@ class FemSimulator(ManagedNode):
             return
         self._last_markers = stamp
         if self._markers.get_subscription_count():
-            self._markers.publish(markers_of(shape, self.robot_file.robot, header))
+            self._markers.publish(self._robot_markers.of(shape, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
 
     def _refuse(self, sentence: str) -> None:

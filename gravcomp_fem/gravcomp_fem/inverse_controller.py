@@ -14,6 +14,8 @@ from rclpy.time import Time
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
+from gravcomp.description.hardware import parse_hardware
+from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import Command, ControllerCode, Target, TargetError, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
@@ -42,8 +44,9 @@ class InverseController(ManagedNode):
     def configure(self) -> None:
         """Compile the solver; create publishers and services."""
         # Compile before the first deformation arrives.
-        warm_up(self.robot_file.robot, self.parameters.inverse)
-        self._problem = InverseProblem(self.robot_file.robot, self.parameters.inverse)
+        robot, transmission = self.robot_file.robot, self._transmission()
+        warm_up(robot, self.parameters.inverse, transmission)
+        self._problem = InverseProblem(robot, self.parameters.inverse, transmission)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
         self._relaxing = False
@@ -90,6 +93,14 @@ class InverseController(ManagedNode):
             self._problem.options = new.inverse
         if old.enabled != new.enabled:
             self._enabled, self._relaxing = new.enabled, False
+
+    def _transmission(self) -> Transmission | None:
+        """Return how motors move cables; None for a robot file without hardware."""
+        file = self.robot_file
+        section = file.section("hardware")
+        if not section:
+            return None
+        return parse_hardware(section, source=file.source, cables=file.robot.cable_names).transmission
 
     def _straight(self) -> Target:
         return straight_target(

@@ -5,7 +5,6 @@ A separate thread publishes the samples and states from the driver's queue, so t
 """
 
 import array
-import dataclasses
 import math
 import sys
 import threading
@@ -23,6 +22,7 @@ from gravcomp.canbus.bus import BusError
 from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
@@ -103,11 +103,11 @@ class CanBridge(ManagedNode):
         self._driver = None
 
     def _read_hardware(self) -> Hardware:
-        """Return the section `hardware` with this node's interface and channel."""
+        """Return the section `hardware` with this node's interface and channels."""
         file, p = self.robot_file, self.parameters
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        given = {key: value for key, value in (("interface", p.interface), ("channel", p.channel)) if value}
-        return dataclasses.replace(hardware, can=dataclasses.replace(hardware.can, **given))
+        check_pairs(hardware, file.robot, file.source)
+        return hardware.on(p.interface, p.channel)
 
     def _command(self, message: CableCommand) -> None:
         stamp = message.header.stamp

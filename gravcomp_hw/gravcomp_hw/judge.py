@@ -171,7 +171,7 @@ class Judge(ManagedNode):
         section = self.robot_file.section("hardware")
         hardware = parse_hardware(section, source=self.robot_file.source, cables=self.robot_file.robot.cable_names)
         p = self.parameters
-        return CanInterface(p.interface or hardware.can.interface, p.channel or hardware.can.channel)
+        return hardware.on(p.interface, p.channel).board_bus
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

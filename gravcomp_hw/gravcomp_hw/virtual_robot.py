@@ -54,14 +54,12 @@ class VirtualRobotNode(ManagedNode):
             motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, seed)
         except RecordingError as error:
             raise ConfigError(str(error)) from error
+        hardware = hardware.on(self.parameters.interface, self.parameters.channel)
         robot = VirtualRobot(parameters, self.robot_file.robot, hardware, seed, motion)
-        interface = self.parameters.interface or hardware.can.interface
-        channel = self.parameters.channel or hardware.can.channel
-        settings = type(hardware.can)(interface, channel, hardware.can.bitrate, hardware.can.hop_limit)
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
-        self._live = RealtimeRobot(robot, settings, self._publish, self.parameters.truth_rate, self._commanded_base)
+        self._live = RealtimeRobot(robot, hardware, self._publish, self.parameters.truth_rate, self._commanded_base)
         self._base: Polled | None = None
 
     def activate(self) -> None:

@@ -209,6 +209,22 @@ def test_without_zero_positions_nothing_is_driven(bench):
     ],
 )
 def test_bad_parameters_end_the_node_with_one_sentence(parameter, complaint):
-    command = [sys.executable, "-m", "gravcomp_hw.can_bridge", "--ros-args", "-p", parameter]
+    refuses([parameter], complaint)
+
+
+@pytest.mark.parametrize(
+    ("channel", "complaint"),
+    [
+        ("239.74.163.2:43113", "channel is '239.74.163.2:43113', 1 channels; needed: one each for the buses base, tip"),
+        ("239.74.163.2:43113,10.0.0.1:80", "bus 'tip': udp_multicast 10.0.0.1:80 cannot be opened"),
+    ],
+)
+def test_a_bus_that_is_missing_at_the_start_is_named(channel, complaint):
+    refuses(["robot:=three_segment", f"channel:={channel}"], complaint)
+
+
+def refuses(parameters, complaint):
+    options = [part for parameter in parameters for part in ("-p", parameter)]
+    command = [sys.executable, "-m", "gravcomp_hw.can_bridge", "--ros-args", *options]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert result.returncode == 2 and complaint in result.stderr and "Traceback" not in result.stderr

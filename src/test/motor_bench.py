@@ -19,7 +19,7 @@ class SpringMotor:
         self.start = self.angle = random.uniform(0, 2 * math.pi)  # rad, of the capstan
         self.speed = self.current = 0.0
         self.blocked = self.silent = False
-        self.sent_id = motor.can_id
+        self.sent_id, self.bus = motor.can_id, motor.bus
 
     @property
     def displacement(self) -> float:
@@ -41,9 +41,11 @@ class SpringMotor:
     def feedback(self):
         counts = self.angle * self.drive.gear_ratio / (2 * math.pi) * COUNTS_PER_TURN
         rpm = round(self.speed * self.drive.gear_ratio * 60 / (2 * math.pi))
-        return codec.encode(
+        frame = codec.encode(
             f"MotorFeedback{self.sent_id}", angle=math.floor(counts) % COUNTS_PER_TURN, speed=rpm, current=self.current
         )
+        frame.channel = self.bus
+        return frame
 
 
 class Bench:
@@ -55,6 +57,8 @@ class Bench:
         self.motors = [SpringMotor(m, hardware.drive, **(motors or {})) for m in hardware.motors]
         self.bridge = Bridge(hardware, **bridge)
         self.imu = True
+        self.down = {}  # reasons by the name of each bus that carries no frames
+        self.board_bus = hardware.board_bus.name or None
         self.largest_current = 0.0  # A, in all frames so far
         self.states = []
 
@@ -74,14 +78,17 @@ class Bench:
                 motor.step()
             if self._step % 4 == 0:
                 for motor in self.motors:
-                    if not motor.silent:
+                    if not motor.silent and motor.bus not in self.down:
                         self.bridge.on_frame(motor.feedback(), self.now)
             if self._step % 20 == 0:
-                if self.imu:
+                board = codec.encode("HeaterCommand", duty=0.0, sequence=0)  # any frame: only its bus counts
+                board.channel = self.board_bus
+                if self.imu and self.board_bus not in self.down and self.bridge.on_board_frame(board, self.now):
                     self.bridge.on_imu_sample(self.now)
                 if command is not None:
                     self.bridge.command(command(self.now - begin), [], self.now)
             if self._step % 8 == 0:
+                self.bridge.buses_down(self.down)
                 self.deliver(self.bridge.tick(self.now))
                 self.states.append((self.now, self.bridge.state))
 
@@ -90,7 +97,7 @@ class Bench:
             for name, current in codec.decode(frame).values._asdict().items():
                 self.largest_current = max(self.largest_current, abs(current))
                 for motor in self.motors:
-                    if name == f"current_{motor.motor.can_id}":
+                    if name == f"current_{motor.motor.can_id}" and motor.bus == frame.channel and motor.bus not in self.down:
                         motor.current = current
 
     def since(self, begin: float, state) -> float:

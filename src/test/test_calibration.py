@@ -8,7 +8,7 @@ import pytest
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
 from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
-from gravcomp.calibration.fit import fit_statics
+from gravcomp.calibration.fit import cable_compliance, fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.statics import StaticParameters, StaticPredictor
 from gravcomp.closed_loop.setup import Setup
@@ -32,7 +32,7 @@ def robot(setup):
 
 def test_one_model_serves_all_moduli(robot):
     windows = StillWindows(GRAVITY[None], np.array([[1e-3, np.nan, np.nan, 0.5e-3, np.nan, np.nan]]), np.zeros((1, 3)))
-    found = StaticPredictor(robot, windows).predict(StaticParameters(0.6e6, np.zeros(6), np.zeros(6)))
+    found = StaticPredictor(robot, windows).predict(StaticParameters(0.6e6, np.zeros(6), cable_compliance(robot)))
     direct = Simulator(robot.with_material(youngs_modulus=0.6e6), reduced=False).solve(GRAVITY, windows.displacement[0])
     np.testing.assert_allclose(found.tip[0], direct.tip_position, atol=2e-7)
     np.testing.assert_allclose(found.tension[0], direct.cable_tension, atol=1e-4)
@@ -138,8 +138,8 @@ def test_calibrated_values_are_written_and_comments_stay(tmp_path, robot):
     assert [m.offset for m in motors] == pytest.approx(parameters.offset, abs=1e-9)
     assert [s.material.youngs_modulus for s in mine.robot.segments] == pytest.approx([0.7512e6] * 2)
     assert mine.robot.segments[0].material.damping_time == pytest.approx(0.031)
-    assert mine.robot.cables[0].axial_stiffness == pytest.approx(0.05 / 0.2e-3)
-    assert mine.robot.cables[3].axial_stiffness is None
+    assert cable_compliance(mine.robot) == pytest.approx(parameters.compliance, abs=1e-6)
+    assert mine.robot.cables[0].axial_stiffness == pytest.approx((0.2 + 0.05) / 0.2e-3)
     assert "# from base to tip; z along the straight robot" in path.read_text()
 
 

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from gravcomp.description import Elements, load_robot_file
+from gravcomp.description import Elements, Fibres, PronyTerm, load_robot_file
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
@@ -192,6 +192,31 @@ def test_a_robot_of_linear_tetrahedra_is_refused_with_the_reason(robot, cache):
         build(linear, SMALL)
 
 
+@pytest.mark.parametrize(
+    ("kind", "material"),
+    [("tet10", {"poissons_ratio": 0.4999}), ("hex20", {"fibres": Fibres(5.0, 0.5)})],
+    ids=["mean pressure", "fibres"],
+)
+def test_polynomials_hold_the_mean_pressure_of_tetrahedra_and_the_fibres(robot, kind, material):
+    robot = robot.with_material(**material)
+    model = RobotModel(robot, tube_mesh(robot, kind))
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    x, y, z = model.mesh.nodes[: model.n_free].T / model.length
+    raw = np.array([np.stack(f, axis=1).ravel() for f in ((z**2, 0 * z, -2 * x * z), (-y * z, x * z, 0 * z), (x, y, z))])
+    basis = energy_basis(raw, matrix.multiply, 3)
+    shapes = np.random.default_rng(0).normal(size=(30, 3)) @ (0.1 * basis.T)
+    polynomials = strain_polynomials(model.elements, basis, shapes, extra=6)
+    q = 0.1 * np.random.default_rng(1).normal(size=3)
+    u = np.zeros_like(model.mesh.nodes)
+    model.free(u)[:] = basis @ q
+    matrix.values[:] = 0.0
+    force = basis.T @ model.free(model.elements.assemble(u, matrix))
+    own_force, own_stiffness, _ = polynomials.evaluate(q)
+    assert own_force == pytest.approx(force, rel=1e-5, abs=1e-8)
+    assert np.tril(own_stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-5, abs=1e-6)
+
+
 def with_law(modes, law: str):
     """The model of another law on the same three modes; its polynomials of all strains; its cubature of all points."""
     model, _, basis, shapes = modes
@@ -273,6 +298,31 @@ def test_reduced_cables_with_friction_are_the_full_models(robot, modes):
     model.tendons.add_stiffness(exact, tension, matrix)
     add_stiffness(reduced.cables, own, tension, stiffness)
     assert np.tril(stiffness) == pytest.approx(np.tril(basis.T @ matrix.multiply(basis)), rel=1e-6, abs=1e-9)
+
+
+def test_a_reduced_body_creeps_as_the_full_one_and_hands_its_memory_over(built):
+    """Gravity turns for a second, rests for twenty, and the reduced model is left and taken up again in between."""
+    prony = (PronyTerm(0.08, 0.3), PronyTerm(0.12, 6.0))
+    model, robot = built[0], built[0].robot.with_material(prony=prony)
+    reduced, full = Simulator(robot), Simulator(robot, reduced=False)
+    relaxed = Simulator(model)
+    gravity = 9.81 * np.array([0.0, 0.0, -1.0])
+    shapes = [simulator.step(gravity) for simulator in (reduced, full)]
+    models, apart, left = [], [], np.inf
+    for step in range(110):
+        angle = 0.5 * np.pi * min(1.0, step / 20)
+        gravity = 9.81 * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
+        if step == 40:
+            reduced._serving._leave("for the test", wait=10)
+        shapes = [s.step(gravity, duration=0.05 if step < 60 else 0.4) for s in (reduced, full)]
+        models.append(shapes[0].model)
+        apart.append(np.linalg.norm(shapes[0].tip_position - shapes[1].tip_position))
+        if step == 20:
+            left = np.linalg.norm(shapes[1].tip_position - relaxed.step(gravity).tip_position)
+    assert left > 2e-3  # what is still to creep when gravity has turned
+    assert models[39] == "reduced" and models[45] == "full" and models[-1] == "reduced"
+    assert max(apart) < 0.1e-3
+    assert np.linalg.norm(shapes[0].tip_position - relaxed.step(gravity).tip_position) < 0.1 * left
 
 
 @pytest.mark.parametrize("damping", ["kelvin_voigt", "rayleigh"])

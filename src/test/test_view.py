@@ -17,9 +17,10 @@ from gravcomp.view.page import free_port
 from gravcomp.view.plots import top_of
 from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
 from gravcomp.view.scale import SCALE
-from gravcomp.view.skin import cable_skin, joined, lumen_skin, wall_skins
+from gravcomp.view.skin import cable_skin, joined
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.status import cables_html, status_html
+from gravcomp.view.wall import lumen_skin, wall_skins
 from gravcomp.view.world import BaseInWorld, quaternion_wxyz
 
 

@@ -21,9 +21,11 @@ ELASTIC = {"creep_ratio": (), "creep_time": (), "damping_time": 0.0, "slip_ratio
 
 def moving_rod(friction=0.0, **changes) -> MovingRod:
     parameters = with_body(**changes)
-    parameters = dataclasses.replace(parameters, tendons=dataclasses.replace(Tendons(), friction=friction))
+    parameters = dataclasses.replace(
+        parameters, tendons=dataclasses.replace(Tendons(), axial_stiffness=960.0, free_length=0.2, friction=friction)
+    )
     model = build_rod(reference_robot(), parameters)
-    return MovingRod(model, build_material(model, parameters), build_friction(parameters))
+    return MovingRod(model, build_material(model, parameters), build_friction(reference_robot(), parameters))
 
 
 def run(rod, seconds, wound=RELEASED, gravity=DOWN, base=None):
@@ -142,7 +144,7 @@ def test_tension_follows_the_capstan_equation_while_sliding():
     at_rest(rod, np.zeros(3))
     run(rod, 2.0, wound=lambda t: np.array([2e-3 * t / 2.0, *RELEASED[1:]]), gravity=np.zeros(3))
     share = rod.tension_share[0]
-    turned_through = rod.friction.guide_angle + np.cumsum(np.hypot(*rod.strain[:, 3:5].T) * rod.model.length)
+    turned_through = rod.friction.guide_angle[0] + np.cumsum(np.hypot(*rod.strain[:, 3:5].T) * rod.model.length)
     last = rod.model.tendon_end[0] - 1
     expected = math.exp(-0.3 * (turned_through[last] + turned_through[last - 1]) / 2)
     assert share[last] == pytest.approx(expected, rel=0.01)

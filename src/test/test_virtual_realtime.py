@@ -4,11 +4,10 @@ import threading
 
 import can
 import pytest
-from virtual_article import virtual_robot
+from virtual_article import article, virtual_robot
 
 from gravcomp.canbus.bus import BusError
 from gravcomp.canbus.codec import decode, encode
-from gravcomp.description.hardware import CanInterface
 from gravcomp.virtual.realtime import RealtimeRobot
 
 
@@ -30,10 +29,14 @@ class Truths:
             assert self._arrived.wait_for(lambda: self.last is not None and condition(self.last), timeout=20.0)
 
 
+def on(interface, channel):
+    return article()[1].on(interface, channel)
+
+
 @pytest.fixture
 def running(request):
     truths = Truths()
-    live = RealtimeRobot(virtual_robot(), CanInterface("virtual", request.node.name), truths, truth_rate=100.0)
+    live = RealtimeRobot(virtual_robot(), on("virtual", request.node.name), truths, truth_rate=100.0)
     with can.Bus(interface="virtual", channel=request.node.name) as bus:
         live.start()
         yield live, bus, truths
@@ -79,4 +82,4 @@ def test_an_error_in_the_thread_is_kept_for_the_node(running):
 
 def test_a_bus_that_does_not_exist_is_refused_by_name():
     with pytest.raises(BusError, match="nosuch"):
-        RealtimeRobot(virtual_robot(), CanInterface("nosuch", "0"), lambda truth: None, 100.0).start()
+        RealtimeRobot(virtual_robot(), on("nosuch", "0"), lambda truth: None, 100.0).start()

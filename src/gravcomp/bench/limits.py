@@ -1,5 +1,6 @@
 """Headline figures of the benchmarks, with their limits."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,11 @@ from gravcomp.report.result import Figure
 
 @dataclass(frozen=True)
 class Row:
-    """A headline figure and its limit. key: path in the benchmark's result, with dots; of a list, its length counts."""
+    """A headline figure and its limit.
+
+    key: path in the benchmark's result, with dots; of a list, its length counts; `*` stands for every key of a mapping, which
+    the figure's name then has in front.
+    """
 
     key: str
     name: str
@@ -25,6 +30,9 @@ ROWS = {
         Row("reduced_step_ms.median", "reduced model: one closed-loop step, median", "ms", 0.3),
         Row("reduced_step_ms.p99", "reduced model: one closed-loop step, 99th percentile", "ms", 1.0),
         Row("reduced_error_mm", "reduced against full model in the closed loop at 10 and 90 deg/s, worst tip error", "mm", 0.05),
+        Row("neo_hookean.reduced_step_ms.median", "the same with the neo-Hookean law: one closed-loop step, median", "ms", 0.3),
+        Row("neo_hookean.reduced_step_ms.p99", "the same with the neo-Hookean law: 99th percentile", "ms", 1.0),
+        Row("neo_hookean.reduced_error_mm", "the same with the neo-Hookean law: worst tip error", "mm", 0.05),
         Row("tet4_step_ms.median", "linear tetrahedra as in the article: one closed-loop step, median", "ms"),
         Row("speedup_over_tet4", "speed-up of the full model over the linear tetrahedra", ""),
         Row("tet4_sag_mm", "linear tetrahedra: deflection of the tip, released and horizontal", "mm"),
@@ -42,6 +50,22 @@ ROWS = {
         Row("inverse_us.p99", "inverse problem, 99th percentile", "us", 300.0),
         Row("dynamics_error_mm", "free fall of the reduced model: steps of 10 ms against 0.5 ms, worst tip error", "mm", 1.0),
         Row("dynamics_step_ms.median", "free fall of the reduced model: one step, median", "ms", 0.5),
+    ),
+    "robots": (
+        Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),
+        Row("robots.*.rest_error_pct", "tip without load and gravity, share of the length", "%", 1e-7),
+        Row("robots.*.reduced_step_ms", "step of the reduced model with the inverse problem, median", "ms", 0.3),
+        Row("robots.*.reduced_error_pct", "reduced against full model in the closed loop, worst", "%", 0.05),
+        Row("robots.*.build_s", "from the file to the reduced model, one core", "s", 60.0),
+        Row("robots.article.reduced_step_ms", "article: step of the reduced model with the inverse problem, median", "ms", 0.11),
+        Row("ccx_error_pct", "against CalculiX, worst row, share of the length", "%", 0.2),
+        Row("disks_error_pct", "backbones with disks, worst, share of the length", "%", 0.3),
+        Row("rod_error_pct", "rod under gravity, worst, share of the length", "%", 0.3),
+        Row("beam_rest_mm", "beam at rest under load, worst marker", "mm", 0.8),
+        Row("beam_motion_mm", "beam in motion, RMS", "mm", 2.5),
+        Row("tentacle_mm", "tentacle, fitted", "mm", 8.0),
+        Row("tentacle_held_mm", "tentacle, each pose predicted by a fit to the others", "mm", 12.0),
+        Row("tdcr_mm", "nine tendons, five-fold", "mm", 4.0),
     ),
     "estimator": (
         Row("broad_deg", "inclination: mean RMSE of five BROAD trials, larger of 95.2 Hz and full rate", "deg", 0.37),
@@ -120,13 +144,33 @@ ROWS = {
 
 
 def figures(benchmark: str, measured: Mapping[str, Any]) -> list[Figure]:
-    """Return the headline figures of a benchmark with their limits, without those that were not measured."""
+    """Return the headline figures of a benchmark with their limits, without those that were not measured.
+
+    A figure of a robot that failed is NaN, which reaches no limit.
+    """
     found = []
     for row in ROWS[benchmark]:
-        value: Any = measured
-        for part in row.key.split("."):
-            value = value.get(part) if isinstance(value, Mapping) else None
-        value = len(value) if isinstance(value, list) else value
-        if value is not None:
-            found.append(Figure(row.name, value, row.unit, limit=row.limit, at_least=row.at_least))
+        for name, value in _values(row, measured):
+            found.append(Figure(name, value, row.unit, limit=row.limit, at_least=row.at_least))
     return found
+
+
+def _values(row: Row, measured: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Names and values of the row's figures."""
+    before, star, after = row.key.partition(".*.")
+    if not star:
+        value = _value(measured, row.key)
+        return [] if value is None else [(row.name, value)]
+    found = []
+    for key, entry in (_value(measured, before) or {}).items():
+        if after in entry:
+            found.append((f"{key}: {row.name}", math.nan if entry[after] is None else entry[after]))
+    return found
+
+
+def _value(measured: Mapping[str, Any], key: str) -> Any:
+    """The value at a path with dots, the length of a list; None where there is none."""
+    value: Any = measured
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    return len(value) if isinstance(value, list) else value

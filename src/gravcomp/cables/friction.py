@@ -1,7 +1,8 @@
 """Friction of cables in their guides: the share of a cable's tension that reaches each piece of its path.
 
 Capstan friction (Euler and Eytelwein): lambda_k = lambda exp(-+ mu theta_k), where theta_k is the sum of the angles up to piece
-k; minus while the cable is pulled in, plus while it is paid out.
+k, with the sheath between capstan and robot before the first; minus while the cable is pulled in, plus while it is paid out. The
+cable stretches by the mean of the tension along it: of a sheath that turns evenly by theta, (1 - exp(-mu theta)) / (mu theta).
 """
 
 import dataclasses
@@ -15,10 +16,12 @@ _AT_REST = 1e-9
 
 
 class Friction:
-    """Capstan friction of m cables."""
+    """Capstan friction of m cables. sheath_angle (m,) in rad and free_length (m,) in m: between capstan and robot."""
 
     def __init__(self, cables: tuple[Cable, ...]):
-        self._coefficient = np.array([cable.friction for cable in cables])
+        self._coefficient = np.array([cable.friction or 0.0 for cable in cables])
+        self.sheath_angle = np.array([cable.sheath_angle or 0.0 for cable in cables])
+        self.free_length = np.array([cable.free_length or 0.0 for cable in cables])
 
     @property
     def coefficient(self) -> np.ndarray:
@@ -42,7 +45,19 @@ class Friction:
         cosine = np.clip((tangent[1:] * tangent[:-1]).sum(axis=1), -1.0, 1.0)
         turned = np.cumsum(np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)]))
         first = np.searchsorted(cable, np.arange(len(pulling)))
-        return np.exp(-(self._coefficient * pulling)[cable] * (turned - turned[first][cable]))
+        angle = self.sheath_angle[cable] + turned - turned[first][cable]
+        return np.exp(-(self._coefficient * pulling)[cable] * angle)
+
+    def mean_shares(self, cable: np.ndarray, length: np.ndarray, share: np.ndarray, pulling: np.ndarray) -> np.ndarray:
+        """Return (m,) the mean tension along each cable, free length included, over that at the capstan.
+
+        cable, length and share (s,): of the pieces; pulling (m,) as in `acts`.
+        """
+        turn = self._coefficient * pulling * self.sheath_angle
+        sheath = np.where(np.abs(turn) > 1e-9, -np.expm1(-turn) / np.where(turn == 0.0, 1.0, turn), 1.0)
+        count = len(pulling)
+        inside, weighted = np.bincount(cable, length, count), np.bincount(cable, share * length, count)
+        return (self.free_length * sheath + weighted) / (self.free_length + inside)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,11 @@
-"""Routes of a robot's cables through its body at rest, or through its disks."""
+"""Routes of a robot's cables through its body at rest, or through its disks.
+
+A force on one point or along one line of a solid sinks into it without limit as the mesh is refined. So a cable of a segment
+presses on a ring in the wall around it, as a channel of finite width does, and is fixed to the whole section at its end, as to a
+plate: its force is spread over the section as a rod's stress is.
+"""
+
+import dataclasses
 
 import numpy as np
 
@@ -11,47 +18,109 @@ from gravcomp.mesh.sections import section_functionals
 # How far outside its element a point may lie in a mesh from a file, in local coordinates: facets cut a little off a round
 # body. For segments the description has been checked: the cable runs inside the walls that the facets approximate.
 _TOLERANCE = 0.1
+# A cable presses on a ring of so many points, whose radius is this part of the distance to the nearest surface.
+_RING, _PRESSED = 6, 0.8
+# Points on an outline at which the distance is measured, and distance (m) within which two heights are the same.
+_SURFACE, _SAME = 180, 1e-9
 
 
-def route_cables(robot: Robot, mesh: Mesh) -> list[Embedding]:
-    """Return the points that every cable slides through, first to last, attached to the mesh.
+@dataclasses.dataclass(frozen=True)
+class Route:
+    """The points that a cable slides through, first to last.
 
-    In a segment with disks they are the holes of the disks; else a cable given by angle and radius slides through every
-    station of the mesh between its start and its end. Raises MeshError for a cable that leaves the body.
+    points: p points on the mesh; smooth (p,): whether the cable follows a smooth curve from the point before through this one to
+    the next one, with this one half way, as it does through the middle of an element; elsewhere it runs straight between points.
+    """
+
+    points: Embedding
+    smooth: np.ndarray
+
+    def renumbered(self, order: np.ndarray) -> "Route":
+        """Return the same route on the mesh renumbered by `order`."""
+        return dataclasses.replace(self, points=self.points.renumbered(order))
+
+
+def route_cables(robot: Robot, mesh: Mesh) -> list[Route]:
+    """Return the routes of the cables, attached to the mesh.
+
+    In a segment with disks a cable runs from disk to disk; else a cable given by angle and radius slides through every station
+    of the mesh between its start and its end. Raises MeshError for a cable that leaves the body.
     """
     guided = disk_heights(robot)
-    sections = section_functionals(mesh, guided).reshape(len(guided), 3, -1) if len(guided) else np.zeros((0, 3, 0))
-    return [_route(robot, mesh, cable, guided, sections) for cable in robot.cables]
+    return [_route(robot, mesh, cable, guided) for cable in robot.cables]
 
 
-def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, sections: np.ndarray) -> Embedding:
-    """The route of one cable; guided (d,): the heights of the disks, sections (d, 3, n): the functionals of their sections."""
+def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
+    """The route of one cable; guided (d,): the heights of the disks."""
     points, at_disk = _via_points(robot, cable, mesh.stations, guided)
+    smooth = _smooth(points[:, 2], mesh.stations, at_disk, 1e-6 * robot.length)
+    if cable.via_points is not None or robot.body is not None:
+        smooth[:] = False
+        at_section = at_disk
+    else:
+        at_section = at_disk | (np.arange(len(points)) == len(points) - 1)
     parts = []
-    if at_disk.any():
-        disk = np.abs(points[at_disk, 2:] - guided).argmin(axis=1)
-        parts.append(holes(points[at_disk, :2], sections[disk]))
-    if not at_disk.all():
+    if at_section.any():
+        sections = section_functionals(mesh, points[at_section, 2]).reshape(-1, 3, len(mesh.nodes))
+        parts.append(holes(points[at_section, :2], sections))
+    if not at_section.all():
         try:
-            route = embed(mesh, mesh.axis.points(points[~at_disk]))
+            inside = (
+                _in_channel(robot, mesh, points[~at_section])
+                if cable.via_points is None
+                else embed(mesh, mesh.axis.points(points[~at_section]))
+            )
         except MeshError as error:
             raise MeshError(f"cable '{cable.name}' leaves the body: {error}") from error
-        worst = int(np.argmax(route.outside))
-        if robot.body is not None and route.outside[worst] > _TOLERANCE:
-            x, y, z = points[~at_disk][worst] * 1e3
+        worst = int(np.argmax(inside.outside))
+        if robot.body is not None and inside.outside[worst] > _TOLERANCE:
+            x, y, z = points[~at_section][worst] * 1e3
             raise MeshError(f"cable '{cable.name}' leaves the body at ({x:.3g}, {y:.3g}, {z:.3g}) mm; it must run inside")
-        parts.append(route)
-    if len(parts) == 1:
-        return parts[0]
-    return _merged(parts, at_disk)
+        parts.append(inside)
+    return Route(parts[0] if len(parts) == 1 else _merged(parts, at_section), smooth)
 
 
-def _merged(parts: list[Embedding], at_disk: np.ndarray) -> Embedding:
-    """The points at disks and those in the body in one embedding, in their order along the cable."""
+def _in_channel(robot: Robot, mesh: Mesh, points: np.ndarray) -> Embedding:
+    """Attach each of the points (p, 3) to a ring around it, over which a cable presses on the wall."""
+    radius = np.array([_PRESSED * _clearance(robot, *point) for point in points])
+    turn = 2 * np.pi * np.arange(_RING) / _RING
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(_RING)])
+    found = embed(mesh, mesh.axis.points((points[:, None] + radius[:, None, None] * ring).reshape(-1, 3)))
+    nodes = found.nodes.reshape(len(points), -1)
+    weights = found.weights.reshape(len(points), -1) / _RING
+    return Embedding(nodes, weights, found.outside.reshape(len(points), -1).max(axis=1))
+
+
+def _clearance(robot: Robot, x: float, y: float, s: float) -> float:
+    """Distance (m) of the point (x, y) from the nearest surface of the section at the arc length s (m)."""
+    base, distances = 0.0, []
+    turn = np.linspace(0.0, 2 * np.pi, _SURFACE, endpoint=False)
+    for segment in robot.segments:
+        top = base + segment.full_length
+        if base - _SAME <= s <= top + _SAME:
+            part = min(max((s - base) / segment.length, 0.0), 1.0)
+            for outline in (segment.outline(part), *segment.lumen_outlines(part)):
+                distances.append(np.hypot(*(outline.boundary(turn) - (x, y)).T).min())
+        base = top
+    return float(min(distances, default=0.0))
+
+
+def _smooth(s: np.ndarray, stations: np.ndarray, at_disk: np.ndarray, slack: float) -> np.ndarray:
+    """Which of the points at the arc lengths s (p,) are the middle of an element between two others of its ends (p,)."""
+    smooth = np.zeros(len(s), dtype=bool)
+    for k in range(1, len(s) - 1):
+        middle = int(np.argmin(np.abs(stations - s[k])))
+        if middle % 2 == 1 and middle + 1 < len(stations) and not at_disk[k - 1 : k + 2].any():
+            smooth[k] = np.abs(stations[middle - 1 : middle + 2] - s[k - 1 : k + 2]).max() < slack
+    return smooth
+
+
+def _merged(parts: list[Embedding], at_section: np.ndarray) -> Embedding:
+    """The points at sections and those in the body in one embedding, in their order along the cable."""
     width = max(part.nodes.shape[1] for part in parts)
-    nodes, weights = np.zeros((len(at_disk), width), dtype=np.int64), np.zeros((len(at_disk), width))
-    outside = np.zeros(len(at_disk))
-    for part, rows in zip(parts, (np.flatnonzero(at_disk), np.flatnonzero(~at_disk))):
+    nodes, weights = np.zeros((len(at_section), width), dtype=np.int64), np.zeros((len(at_section), width))
+    outside = np.zeros(len(at_section))
+    for part, rows in zip(parts, (np.flatnonzero(at_section), np.flatnonzero(~at_section))):
         columns = part.nodes.shape[1]
         nodes[np.ix_(rows, np.arange(columns))], weights[np.ix_(rows, np.arange(columns))] = part.nodes, part.weights
         outside[rows] = part.outside
@@ -78,7 +147,7 @@ def _via_points(robot: Robot, cable: Cable, stations: np.ndarray, guided: np.nda
                 f"cable '{cable.name}' {'ends' if index else 'starts'} at {s[index] * 1e3:g} mm, between two disks;"
                 f" there are disks at {', '.join(f'{1e3 * height:g}' for height in guided)} mm"
             )
-    place = np.array([cable.place(value, end) for value in s])
+    place = np.array([robot.cable_place(cable, value) for value in s])
     return np.column_stack([place, s]), at_disk
 
 

@@ -6,18 +6,32 @@ t_k = e_k / l_k, its displacement (positive: pulled in), its force and its stiff
     delta = sum_k (L_k - l_k),    H_a = d(delta)/dx_a = -sum_k d_ka t_k,    force = H^T lambda,
     K_ab  = lambda sum_k d_ka d_kb (I - t_k t_k^T) / l_k.
 
-With friction the tension changes along the path: lambda_k is the share of `friction` times lambda.
+Through the middle P_m of an element, from its end P_0 to P_1, a cable follows the parabola through the three points instead. Its
+length is that of two tangents, by Gauss's rule with two points, which take the place of the two chords:
+
+    e = (P_1 - P_0) / 2 -+ (P_0 - 2 P_m + P_1) / sqrt(3).
+
+lambda is the tension at the capstan. With friction it changes along the path: lambda_k is the share of `friction` times lambda. A
+line of stiffness E A is wound in by more than its path shortens, by its stretch along free length L_f and path:
+
+    wound = delta + c lambda,    c = (L_f + sum_k L_k) / (E A) times the mean share.
+
+Without tension there is no stretch.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 from numba import njit
 
 from gravcomp.cables.friction import Friction
+from gravcomp.cables.routing import Route
 from gravcomp.description import Cable
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
-from gravcomp.mesh.embedding import Embedding
+
+# What a tangent at one of Gauss's points has of the second difference of three points, beyond a chord.
+_BEYOND_CHORD = 1.0 / math.sqrt(3.0) - 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +40,7 @@ class TendonState:
 
     displacement (m,) in m; jacobian (m, n): its derivative by the unknowns; force_jacobian (m, n): its transpose times the
     tensions is the cables' force (without friction it is the same array); tangent (s, 3) and length (s,) of every piece; share
-    (s,): tension in the piece over tension of the cable.
+    (s,): tension in the piece over that at the capstan; mean_share (m,): mean of it along each cable, which stretches it.
     """
 
     displacement: np.ndarray
@@ -35,26 +49,30 @@ class TendonState:
     tangent: np.ndarray
     length: np.ndarray
     share: np.ndarray
+    mean_share: np.ndarray
 
 
 class Tendons:
     """The cables of a robot on a mesh whose nodes are in the pattern's order."""
 
-    def __init__(self, cables: tuple[Cable, ...], routes: list[Embedding], rest: np.ndarray, pattern: BlockPattern):
+    def __init__(self, cables: tuple[Cable, ...], routes: list[Route], rest: np.ndarray, pattern: BlockPattern):
         self.count = len(cables)
         self.friction = Friction(cables)
         self._n_free = pattern.n // 3
         pieces = [piece for route in routes for piece in pieces_of(route)]
-        self._cable = np.repeat(np.arange(self.count), [len(r.nodes) - 1 for r in routes]).astype(np.int64)
+        self._cable = np.repeat(np.arange(self.count), [len(r.smooth) - 1 for r in routes]).astype(np.int64)
         self._first = np.concatenate([[0], np.cumsum([len(nodes) for nodes, _ in pieces])]).astype(np.int64)
         self._nodes = np.concatenate([nodes for nodes, _ in pieces]) if pieces else np.zeros(0, dtype=np.int64)
         self._weights = np.concatenate([weights for _, weights in pieces]) if pieces else np.zeros(0)
         self._position = self._scatter_positions(pieces, pattern)
         self._rest_length = np.zeros(self.count)
         self._rest_length = -self.state(rest).displacement
-        stiffness = np.array([c.axial_stiffness or np.inf for c in cables])
-        # m/N: elongation under unit tension, zero for an inextensible cable.
-        self.axial_compliance = self._rest_length / stiffness
+        # m/N: elongation from capstan to end under unit tension without friction, zero for a cable without stretch.
+        self.axial_compliance = (self.friction.free_length + self._rest_length) / np.array([c.stiffness for c in cables])
+
+    def stretch(self, state: TendonState) -> np.ndarray:
+        """Return the elongation (m,) of each cable under unit tension at its capstan, in m/N."""
+        return self.axial_compliance * state.mean_share
 
     @property
     def rest_length(self) -> np.ndarray:
@@ -71,12 +89,13 @@ class Tendons:
         jacobian = np.zeros((self.count, 3 * self._n_free))
         path = np.zeros(self.count)
         _tendons(x, self._cable, self._first, self._nodes, self._weights, self._n_free, length, tangent, jacobian, path)
-        share, force_jacobian = np.ones(count), jacobian
+        share, mean_share, force_jacobian = np.ones(count), np.ones(self.count), jacobian
         if pulling is not None and self.friction.acts(pulling):
             share = self.friction.shares(self._cable, tangent, pulling)
+            mean_share = self.friction.mean_shares(self._cable, length, share, pulling)
             force_jacobian = np.zeros_like(jacobian)
             _force_jacobian(self._cable, self._first, self._nodes, self._weights, self._n_free, tangent, share, force_jacobian)
-        return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share)
+        return TendonState(self._rest_length - path, jacobian, force_jacobian, tangent, length, share, mean_share)
 
     def add_stiffness(self, state: TendonState, tension: np.ndarray, matrix: BlockMatrix) -> None:
         """Add the geometric stiffness of the cables under `tension` (m,) to `matrix`."""
@@ -107,12 +126,17 @@ class Tendons:
         return position
 
 
-def pieces_of(route: Embedding) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return nodes and weights d of every straight piece between neighbouring via points."""
+def pieces_of(route: Route) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return nodes and weights d of every piece e_k between neighbouring points."""
     pieces = []
-    for k in range(len(route.nodes) - 1):
-        nodes = np.concatenate([route.nodes[k + 1], route.nodes[k]])
-        signed = np.concatenate([route.weights[k + 1], -route.weights[k]])
+    for k in range(len(route.smooth) - 1):
+        share = {k: -1.0, k + 1: 1.0}
+        for middle, sign in ((k + 1, -1.0), (k, 1.0)):
+            if route.smooth[middle]:
+                for point, factor in ((middle - 1, 1.0), (middle, -2.0), (middle + 1, 1.0)):
+                    share[point] = share.get(point, 0.0) + sign * factor * _BEYOND_CHORD
+        nodes = np.concatenate([route.points.nodes[point] for point in share])
+        signed = np.concatenate([factor * route.points.weights[point] for point, factor in share.items()])
         unique, inverse = np.unique(nodes, return_inverse=True)
         weights = np.bincount(inverse, signed)
         used = weights != 0.0

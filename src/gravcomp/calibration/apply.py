@@ -5,11 +5,13 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gravcomp.calibration.pose_prediction import moved
 from gravcomp.calibration.poses import PoseParameters
 from gravcomp.calibration.statics import StaticParameters
 from gravcomp.config import ConfigError
-from gravcomp.description import Robot
+from gravcomp.description import Cable, Robot
 from gravcomp.description.hardware import Hardware
 from gravcomp.orientation.calibration import RestCalibration
 
@@ -22,7 +24,7 @@ _STIFFEST = 1e6  # N: a stiffer cable is described as inextensible
 def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: float | None = None) -> Robot:
     """Return the robot with the fitted modulus, cable elasticity and, if given, damping time in s."""
     cables = tuple(
-        dataclasses.replace(cable, axial_stiffness=_stiffness(robot.cable_end(cable) - cable.start, float(compliance)))
+        cable.with_stiffness(_stiffness(robot, cable, float(compliance)))
         for cable, compliance in zip(robot.cables, parameters.compliance)
     )
     changes = {} if damping_time is None else {"damping_time": damping_time}
@@ -31,9 +33,11 @@ def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: f
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
     """Return the motors with the fitted capstan radius and cable offsets, relative to those of `hardware`."""
+    # Of cables that share a motor it takes the offset that comes nearest to theirs.
+    offsets = np.linalg.pinv(hardware.transmission.matrix) @ parameters.offset
     motors = tuple(
         dataclasses.replace(motor, offset=float(parameters.winding * motor.offset + offset))
-        for motor, offset in zip(hardware.motors, parameters.offset)
+        for motor, offset in zip(hardware.motors, offsets)
     )
     drive = dataclasses.replace(hardware.drive, capstan_radius=hardware.drive.capstan_radius * float(parameters.winding))
     return dataclasses.replace(hardware, motors=motors, drive=drive)
@@ -63,6 +67,8 @@ def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardw
             material["creep_time"] = round(segment.material.creep_time, 4)
     for entry, cable in zip(document["robot"].get("cables", []), robot.cables):
         if cable.axial_stiffness is not None:
+            for described in ("material", "diameter_mm"):
+                entry.pop(described, None)
             entry["axial_stiffness"] = round(cable.axial_stiffness, 2)
         if cable.angle is not None and abs(math.degrees(cable.angle) - entry["angle_deg"]) > 1e-6:
             entry["angle_deg"] = round(math.degrees(cable.angle), 3)
@@ -124,6 +130,12 @@ def _yaml() -> "YAML":
     return yaml
 
 
-def _stiffness(length: float, compliance: float) -> float | None:
-    """Return the axial stiffness in N of a cable of a length in m and a compliance in m/N; None: inextensible."""
-    return length / compliance if compliance > length / _STIFFEST else None
+def _stiffness(robot: Robot, cable: Cable, compliance: float) -> float | None:
+    """Return the axial stiffness in N of a cable with a compliance in m/N from capstan to end; None: without stretch.
+
+    A cable whose line is described to stretch keeps a number, so that the file's defaults do not give it the old one back.
+    """
+    length = robot.line_length(cable)
+    if compliance > length / _STIFFEST:
+        return length / compliance
+    return _STIFFEST if cable.stretches else None

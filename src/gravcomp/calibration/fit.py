@@ -104,8 +104,8 @@ def fit_statics(
 
 
 def cable_compliance(robot: Robot) -> np.ndarray:
-    """Return (m,) the elongation in m/N of each cable's path in the robot, from the robot's description."""
-    return np.array([(robot.cable_end(c) - c.start) / c.axial_stiffness if c.axial_stiffness else 0.0 for c in robot.cables])
+    """Return (m,) the elongation in m/N of each cable from capstan to end, from the robot's description."""
+    return np.array([robot.cable_compliance(cable) for cable in robot.cables])
 
 
 class _Problem:

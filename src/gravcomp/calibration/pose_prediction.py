@@ -107,6 +107,8 @@ def moved(cable: Cable, angle: float, radius: float) -> Cable:
         return cable
     if cable.angle is None or cable.radius is None:
         raise ValueError(f"cable '{cable.name}' has via points; only cables with angle_deg and radius_mm can be moved by a fit")
+    if radius and cable.follow_taper:
+        raise ValueError(f"cable '{cable.name}' has follow_taper; a fit of its radius needs tip_radius_mm instead")
     tip = cable.radius if cable.tip_radius is None else cable.tip_radius
     return dataclasses.replace(
         cable, angle=cable.angle + angle, tip_radius=max(tip + radius, 0.0) if radius else cable.tip_radius

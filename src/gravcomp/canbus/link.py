@@ -72,6 +72,16 @@ class CanLink:
         """Whether the bus is open."""
         return self._bus is not None
 
+    @property
+    def fileno(self) -> int | None:
+        """File descriptor that becomes readable with the next frame; None where the interface has none, or without a bus."""
+        bus = self._bus
+        try:
+            number = -1 if bus is None else bus.fileno()
+        except (NotImplementedError, OSError, ValueError):
+            return None
+        return number if number >= 0 else None
+
     def open(self) -> None:
         """Open the bus if it is not open. Raises BusError."""
         with self._lock:
@@ -79,6 +89,10 @@ class CanLink:
                 self._bus = self._opener(self._settings, self._frame_ids)
                 self._failing_since, self.status = None, "open"
                 self.counters.opened += 1
+
+    def reopen(self) -> bool:
+        """Open a lost bus, unless its back-off is not over. Return whether it is open."""
+        return self._ensure_open()
 
     def receive(self, timeout: float) -> list[can.Message]:
         """Return all waiting frames, or wait for the first one up to `timeout` (s); empty when none comes or there is no bus.

@@ -65,7 +65,7 @@ class ClosedLoop:
         ambient = setup.truth.board.thermal.ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot)
-        self._problem = InverseController(setup.robot, setup.controller.inverse)
+        self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
         self._target: Target | None = None
         self._weightless = False
         self._cables = np.zeros(len(setup.robot.cables))  # m, displacement of the model's cables
@@ -152,7 +152,9 @@ class ClosedLoop:
             self._gravity = np.array(estimate.gravity)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
-        self.shape = shape = self._simulator.step(gravity, None if self._target is None else self._cables)
+        # The model starts at rest and relaxed, and creeps from then on.
+        elapsed = None if self.shape is None else SAMPLE_PERIOD
+        self.shape = shape = self._simulator.step(gravity, None if released else self._cables, duration=elapsed)
         self._cables, tension = self._released(shape) if self._target is None else self._compensated(shape, self._target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
         self._arriving.append((self._sent, tension))
@@ -168,7 +170,7 @@ class ClosedLoop:
         displacement = (
             self._cables if self._waiting else within_limits(free, self._cables, self.setup.robot.limits, SAMPLE_PERIOD)
         )
-        return displacement, np.zeros(len(free))
+        return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free))), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
         command = self._problem.step(
@@ -183,7 +185,8 @@ class ClosedLoop:
 
     def _idle_released(self, tension: np.ndarray) -> np.ndarray:
         wanted = np.where(tension > _IDLE, self._cables, self._cables - RELEASE_SLACK)
-        return within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
+        paid_out = within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
+        return self.setup.hardware.transmission.possible(paid_out, tension)
 
     def _record(self, shape: Shape) -> None:
         truth = self._virtual.truth

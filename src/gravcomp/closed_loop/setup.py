@@ -7,6 +7,7 @@ from typing import Any
 from gravcomp.config import from_mapping
 from gravcomp.description import Robot, RobotFile
 from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -38,6 +39,7 @@ class Setup:
 
         truth = from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        check_pairs(hardware, file.robot, file.source)
         return cls(
             source=file.source,
             robot=file.robot,

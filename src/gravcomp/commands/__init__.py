@@ -14,6 +14,7 @@ COMMANDS = {
     "calibrate-imu": "fit the IMU's scale, offsets, mount and bias over temperature to a recording at rest",
     "estimate": "estimate orientation and gravity from a recorded IMU stream, offline",
     "model": "build, inspect, solve and view a robot's model",
+    "mesh": "install Gmsh, which fills surfaces with elements and reads STEP files",
     "record": "record the graph's topics into a bag",
     "replay": "run the graph on a recorded IMU stream",
     "arm": "move the virtual robot through five poses on a seven-axis arm",

@@ -52,11 +52,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.arm.description import expanded, shipped_xacro
-    from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
     from gravcomp.launcher import Graph
     from gravcomp.launcher.domain import private_domain
-    from gravcomp.launcher.robot_graph import RobotGraph
+    from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
     builder = prepare(args.robot, virtual=True)
     xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
@@ -65,7 +64,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         urdf.write_text(expanded(xacro), encoding="utf-8")
         # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
         motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
-        graph = RobotGraph(args.robot, "udp_multicast", private_channel(), args.namespace, {"virtual_robot": motion})
+        graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), args.namespace, {"virtual_robot": motion})
         specs = [spec for spec in graph.loop() if args.gravity != "arm" or spec.executable != "imu_estimator"]
         if args.gravity != "imu":
             use = "publish" if args.gravity == "arm" else "check"

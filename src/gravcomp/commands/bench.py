@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
+    "robots": "every robot's mesh, reduced model and times; the model against what others measured",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
@@ -33,8 +34,17 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
 }
 """Keyword arguments of a benchmark's `run` that are options of the command: default and meaning."""
 
+LISTS: dict[str, dict[str, tuple[str, str]]] = {
+    "robots": {
+        "files": ("FILE", "robot files or shipped robots (default: all shipped ones and those in ../shared/robots)"),
+        "--figures": ("KEY", "only these figures, by their keys in --json"),
+    },
+}
+"""Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
+
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
+    "robots": {"every": 10},
     "estimator": {"every": 13},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
@@ -55,6 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--write", metavar="DOCUMENT", help="update the table of figures in a Markdown document, between its markers"
         )
         own.add_argument("--brief", action="store_true", help="fewer and shorter runs, for a first look")
+        for argument, (metavar, meaning) in LISTS.get(name, {}).items():
+            own.add_argument(argument, nargs="*", default=[], metavar=metavar, help=meaning)
         for option, (default, meaning) in OPTIONS.get(name, {}).items():
             if default is False:
                 own.add_argument(f"--{option}", action="store_true", help=meaning)
@@ -75,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
         figures_table.check_place(Path(args.write), command)
     module = importlib.import_module(f"gravcomp.bench.{args.benchmark}")
     options = BRIEF[args.benchmark] if args.brief else {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
+    options = options | {name.lstrip("-"): getattr(args, name.lstrip("-")) for name in LISTS.get(args.benchmark, {})}
     console = output.console()
     with console.status(command) as status:
         measured = module.run(lambda stage: status.update(f"{command}: {stage}"), **options)

@@ -56,13 +56,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:
-    from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
     from gravcomp.launcher import Graph
     from gravcomp.launcher.domain import private_domain
-    from gravcomp.launcher.robot_graph import LOOP, RobotGraph
+    from gravcomp.launcher.robot_graph import LOOP, RobotGraph, private_channels
 
     if not _SHORTEST <= args.duration <= 86400.0:
         raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
@@ -87,7 +86,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         compensated = relax_time + 0.75 * (compensate_until - relax_time)  # before the base turns
         moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
         pictures = PagePictures(Path(args.screenshots), moments)
-    graph = RobotGraph(args.robot, "udp_multicast", private_channel(), parameters={"virtual_robot": motion})
+    graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), parameters={"virtual_robot": motion})
     nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"

@@ -13,12 +13,18 @@ from gravcomp.commands import output
 CONFIGURATION = Path("src/doc/api")
 """Folder of Sphinx's conf.py and of the index page, relative to the repository."""
 
+PAGE = Path("src/doc/bodies.md")
+"""The page with a picture of each robot that it describes, relative to the repository."""
+
 _LEFT_OUT = (".*", "build", "install", "log", "reports", "__pycache__", "*.egg-info")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = "Build the documentation of the Python interface with Sphinx. A warning counts as an error."
+    parser.add_argument(
+        "--pictures", action="store_true", help=f"draw the pictures of the robots that {PAGE} describes again, and build nothing"
+    )
     parser.add_argument("--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository)")
 
 
@@ -27,8 +33,10 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.environment.packages import provide_extra
 
-    provide_extra("development")
     root = Path(os.environ["GRAVCOMP_ROOT"])
+    if args.pictures:
+        return _draw_pictures(root / PAGE)
+    provide_extra("development")
     out = Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs"
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -41,6 +49,23 @@ def run(args: argparse.Namespace) -> int:
     pages = sorted(out.rglob("*.html"))
     output.result({"built": built, "out": str(out), "pages": len(pages)}, f"{out / 'index.html'}: {len(pages)} pages")
     return 0 if built else 1
+
+
+def _draw_pictures(page: Path) -> int:
+    """Draw the picture that follows each robot on the page."""
+    from gravcomp.environment.packages import provide_extra
+    from gravcomp.report.body_picture import draw_body
+    from gravcomp.report.described_robots import robots_on
+
+    provide_extra("reports")
+    pictures = []
+    for robot, picture in robots_on(page):
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        draw_body(robot, str(picture))
+        output.note(f"{picture}")
+        pictures.append(str(picture))
+    output.result({"pictures": pictures}, f"{page}: {len(pictures)} pictures")
+    return 0
 
 
 def build(root: Path, out: Path) -> tuple[bool, str]:

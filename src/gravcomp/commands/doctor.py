@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = "Print what is installed, what is missing, and the command that installs it."
     parser.add_argument("--robot", metavar="FILE", help="also check this robot file")
     parser.add_argument("--interface", help="also listen to a CAN bus for two seconds: python-can interface, e.g. socketcan")
-    parser.add_argument("--channel", default="", help="channel of that bus, e.g. can0")
+    parser.add_argument("--channel", default="", help="channel of that bus, e.g. can0; several by commas")
     parser.add_argument("--graph", action="store_true", help="also check the running graph: rates, latencies, matching QoS")
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of the running graph, e.g. /left")
 
@@ -34,7 +34,8 @@ def run(args: argparse.Namespace) -> int:
     if args.robot:
         findings += robot_file.examine(args.robot)
     if args.interface:
-        findings += bus.examine(args.interface, args.channel)
+        for channel in args.channel.split(","):
+            findings += bus.examine(args.interface, channel.strip())
     if args.graph:
         findings += running_graph.examine(args.namespace)
     healthy = not any(finding.level == "missing" for finding in findings)

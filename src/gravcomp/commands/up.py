@@ -21,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="python-can interface in place of the file's, e.g. socketcan (default with --virtual: a private bus)",
     )
-    parser.add_argument("--channel", default="", help="channel of the interface, e.g. can0")
+    parser.add_argument(
+        "--channel", default="", help="channel of the interface, e.g. can0; with several buses one each, by commas"
+    )
     parser.add_argument("--virtual", action="store_true", help="start the virtual robot on the bus as well")
     parser.add_argument(
         "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
@@ -41,11 +43,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:
-    from gravcomp.canbus.multicast import private_channel
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
     from gravcomp.launcher import Graph
-    from gravcomp.launcher.robot_graph import RobotGraph
+    from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
     if args.namespace and not args.namespace.startswith("/"):
         raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
@@ -53,7 +54,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
         # On the bus of the robot file, several virtual robots on one machine would receive each other's frames.
-        interface, channel = "udp_multicast", private_channel()
+        interface, channel = "udp_multicast", private_channels(args.robot)
     graph = RobotGraph(args.robot, interface, channel, args.namespace)
     specs = graph.loop()
     if args.virtual:

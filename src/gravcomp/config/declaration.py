@@ -21,6 +21,7 @@ EDGE_UNITS = {
     "deg/s": ("_deg_s", math.pi / 180.0, "rad/s"),
     "MPa": ("_mpa", 1e6, "Pa"),
     "ms": ("_ms", 1e-3, "s"),
+    "s": ("_s", 1.0, "s"),
     "g": ("_g", 1e-3, "kg"),
 }
 

@@ -5,20 +5,26 @@ file.robot.segments[0].length          # m
 file.section("hardware")               # another section as a plain mapping
 """
 
-from gravcomp.description.body import Cap, Elements, Material, MeshBody
+from gravcomp.description.blended_outline import BlendedOutline
+from gravcomp.description.body import Cap, Elements, Fibres, Material, PronyTerm
 from gravcomp.description.cable import Cable
+from gravcomp.description.cable_line import CableLine
 from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.mesh_body import MeshBody, Transform
 from gravcomp.description.outline import Outline
+from gravcomp.description.pieces import Piece
 from gravcomp.description.point_load import PointLoad
 from gravcomp.description.rest_shape import RestShape
 from gravcomp.description.robot import Effectors, Payload, Robot
 from gravcomp.description.robot_file import RobotFile, load_robot_file, shipped_robots
-from gravcomp.description.section import Lumen, Section
+from gravcomp.description.section import Lumen, Section, Station
+from gravcomp.description.section_moments import SectionMoments, section_moments
 from gravcomp.description.segment import Segment
 
 __all__ = [
-    "Cable", "Cap", "Disks", "Effectors", "Elements", "ImuMount", "Limits", "Lumen", "Material", "MeshBody", "Outline", "Payload",
-    "PointLoad", "RestShape", "Robot", "RobotFile", "Section", "Segment", "load_robot_file", "shipped_robots",
+    "BlendedOutline", "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "Fibres", "ImuMount", "Limits", "Lumen",
+    "Material", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot", "RobotFile", "Section",
+    "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments", "shipped_robots",
 ]  # fmt: skip

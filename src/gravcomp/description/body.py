@@ -1,4 +1,4 @@
-"""What the robot's body is made of: materials, caps, a mesh from a file, and how tubes are divided into elements."""
+"""What the robot's body is made of: materials, caps, and how tubes are divided into elements."""
 
 import dataclasses
 
@@ -6,11 +6,29 @@ from gravcomp.config import parameter
 
 
 @dataclasses.dataclass(frozen=True)
+class PronyTerm:
+    """A term of a Prony series: a part of the stiffness that relaxes within a time."""
+
+    share: float = parameter(minimum=1e-6, maximum=0.99, description="part of the instantaneous stiffness that relaxes")
+    time: float = parameter(edge="s", minimum=1e-3, maximum=1e7, description="relaxation time")
+
+
+@dataclasses.dataclass(frozen=True)
+class Fibres:
+    """Fibres in the body, evenly spread: along the axis, around it, or wound about it both ways, as in a braid."""
+
+    ratio: float = parameter(
+        minimum=0.0, maximum=1e4, description="stiffness of all fibres along themselves, over Young's modulus of the body"
+    )
+    angle: float = parameter(0.0, edge="deg", minimum=0.0, maximum=90.0, description="angle to the axis; 0: along it, 90: hoops")
+
+
+@dataclasses.dataclass(frozen=True)
 class Material:
-    """An isotropic soft material."""
+    """A soft material, isotropic but for its fibres."""
 
     law: str = parameter(
-        "svk",
+        "neo_hookean",
         choices=("svk", "neo_hookean", "mooney_rivlin", "yeoh"),
         description="St. Venant-Kirchhoff, neo-Hookean, Mooney-Rivlin or Yeoh; all but the first for large strains",
     )
@@ -27,11 +45,37 @@ class Material:
         0.0,
         minimum=0.0,
         maximum=10.0,
-        description="additional stiffness that relaxes under load, over the long-term stiffness; used in dynamics only",
+        description="additional stiffness that relaxes under load, over the long-term stiffness",
     )
     creep_time: float = parameter(
         0.5, unit="s", minimum=1e-3, maximum=1e4, description="relaxation time of the additional stiffness"
     )
+    prony: tuple[PronyTerm, ...] = parameter(
+        (), description="Prony series, instead of creep_ratio; the modulus is the long-term one"
+    )
+
+    fibres: Fibres | None = parameter(None, description="fibres that make the material stiffer along themselves")
+
+    def __post_init__(self) -> None:
+        if not self.prony:
+            return
+        if self.creep_ratio:
+            raise ValueError("creep_ratio and prony are both given; allowed is one of them")
+        total = sum(term.share for term in self.prony)
+        if total >= 1.0:
+            raise ValueError(f"the shares of prony add up to {total:g}; allowed: below 1, as the rest is the long-term stiffness")
+        times = [term.time for term in self.prony]
+        for time in times:
+            if times.count(time) > 1:
+                raise ValueError(f"prony has the time {time:g} s {times.count(time)} times; the terms' times must differ")
+
+    @property
+    def branches(self) -> tuple[tuple[float, float], ...]:
+        """The Maxwell branches: stiffness over the long-term stiffness, and relaxation time in s; see `full_model.viscosity`."""
+        if not self.prony:
+            return ((self.creep_ratio, self.creep_time),) if self.creep_ratio else ()
+        lasting = 1.0 - sum(term.share for term in self.prony)
+        return tuple((term.share / lasting, term.time) for term in self.prony)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,19 +84,6 @@ class Cap:
 
     length: float = parameter(edge="mm", minimum=0.1, maximum=500.0, description="thickness along the axis")
     material: Material = parameter(description="material of the cap")
-
-
-@dataclasses.dataclass(frozen=True)
-class MeshBody:
-    """A body from a file: a closed surface, which is meshed, or a volume mesh; `mesh.body` reads the formats."""
-
-    file: str = parameter(description="path of the mesh, relative to the robot file")
-    length: float = parameter(
-        edge="mm", minimum=1.0, maximum=5000.0, description="length along z, checks unit and axis of the file"
-    )
-    file_unit: float = parameter(1.0, edge="mm", minimum=1e-6, maximum=1e6, description="length of one unit of the file")
-    element_size: float = parameter(3.0, edge="mm", minimum=0.05, maximum=500.0, description="edge length of the elements")
-    material: Material = parameter(default_factory=Material, description="material of the body")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,64 +1,120 @@
-"""The check that a cable runs inside the body, or through the disks."""
+"""The checks that a cable runs inside the body or through the disks, and crosses no other."""
 
+import itertools
 import math
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from gravcomp.description.cable import Cable
+from gravcomp.description.pieces import Piece
 from gravcomp.description.segment import Segment
 
+if TYPE_CHECKING:
+    from gravcomp.description.robot import Robot
 
-def check_path(key: str, cable: Cable, end: float, segments: Sequence[Segment], length: float) -> None:
-    """Raise ValueError, naming `key`, when the cable leaves the robot's length, the wall of a segment or its disks.
+# Places in every piece and every stretch between two via points at which a cable is checked.
+_PLACES = 9
+# Two cables that come nearer than this part of the section's width cross.
+_CROSSING = 2e-3
 
-    `end` (m) is the arc length where the cable is fixed, `length` (m) that of the robot; without segments only the length is
-    checked.
-    """
-    if end > length * (1 + 1e-9):
-        raise ValueError(f"{key} ends at {end * 1e3:g} mm; allowed: up to the robot's length {length * 1e3:g} mm")
-    straight = cable.via_points is None
-    if straight and cable.start >= end:
+
+def check_path(key: str, cable: Cable, robot: "Robot") -> None:
+    """Raise ValueError, naming `key`, when the cable leaves the robot's length, the wall of a segment or its disks."""
+    end = robot.cable_end(cable)
+    if end > robot.length * (1 + 1e-9):
+        raise ValueError(f"{key} ends at {end * 1e3:g} mm; allowed: up to the robot's length {robot.length * 1e3:g} mm")
+    if cable.via_points is None and cable.start >= end:
         raise ValueError(f"{key}.start_mm is {cable.start * 1e3:g}; allowed: below its end at {end * 1e3:g}")
-    base = 0.0
-    for segment in segments:
-        for x, y, s in _points(cable, end, base, segment):
+    for piece in robot.pieces:
+        segment = robot.segments[[s.name for s in robot.segments].index(piece.segment)]
+        points = _points(cable, robot, piece)
+        for x, y, s in points[-1:] + points:  # most tapers are narrowest at the tip
             if segment.disks is None:
-                _check_wall(key, segment, x, y, (s - base) / segment.length)
+                _check_wall(key, piece, x, y, s)
             else:
-                _check_disks(key, segment, x, y, (s - base) / segment.length)
-        base += segment.full_length
+                _check_disks(key, piece, segment, x, y, s)
 
 
-def _points(cable: Cable, end: float, base: float, segment: Segment) -> list[tuple[float, float, float]]:
-    """(x, y, s) in m of the places to check in the segment that begins at the arc length `base` (m)."""
-    top = base + segment.full_length
-    if cable.via_points is not None:
-        return [point for point in cable.via_points if base <= point[2] <= top]
-    low, high = max(base, cable.start), min(top, end)
-    if high - low <= 1e-9:
-        return []
-    return [(*cable.place(s, end), s) for s in (low, (low + high) / 2, high)]
-
-
-def _check_wall(key: str, segment: Segment, x: float, y: float, part: float) -> None:
-    part = min(max(part, 0.0), 1.0)
-    if segment.contains(x, y, part):
+def check_crossings(robot: "Robot") -> None:
+    """Raise ValueError where two cables cross; cables that share a channel or only begin or end together do not."""
+    if robot.body is not None:
         return
-    outline, lumens = segment.outline(part), segment.lumen_outlines(part)
+    # A path that turns back is not known from its arc length alone.
+    onward = [c for c in robot.cables if not c.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(c.via_points))]
+    for one, other in itertools.combinations(onward, 2):
+        heights = sorted({s for cable in (one, other) for piece in robot.pieces for s in _places(cable, robot, piece)})
+        low, high = (f(_ends(one, robot)[i], _ends(other, robot)[i]) for i, f in ((0, max), (1, min)))
+        s = np.array([height for height in heights if low <= height <= high])
+        if len(s) < 2:
+            continue
+        apart = np.array([robot.cable_place(one, height) for height in s])
+        apart -= [robot.cable_place(other, height) for height in s]
+        place = _crossing(s, apart, robot)
+        if place is not None:
+            raise ValueError(
+                f"the cables '{one.name}' and '{other.name}' cross at {place * 1e3:.4g} mm along the robot;"
+                " let their channels keep a distance"
+            )
+
+
+def _crossing(s: np.ndarray, apart: np.ndarray, robot: "Robot") -> float | None:
+    """The arc length at which the distance vectors (k, 2) at the arc lengths s (k,) pass through zero; None where none do."""
+    near = np.array([_CROSSING * 2 * robot.piece_at(height).section(height)[0].half_width for height in s])
+    distance = np.hypot(*apart.T)
+    for k in range(len(s) - 1):
+        step = apart[k + 1] - apart[k]
+        size = step @ step
+        at = min(max(-(apart[k] @ step) / size, 0.0), 1.0) if size else 0.0
+        # They come near within this stretch, and are apart before and after it.
+        apart_before, apart_after = (bool((distance[part] > near[part]).any()) for part in (slice(k + 1), slice(k + 1, None)))
+        if np.hypot(*(apart[k] + at * step)) < near[k] and apart_before and apart_after:
+            return float(s[k] + at * (s[k + 1] - s[k]))
+    return None
+
+
+def _ends(cable: Cable, robot: "Robot") -> tuple[float, float]:
+    return (cable.start if cable.via_points is None else cable.via_points[0][2]), robot.cable_end(cable)
+
+
+def _points(cable: Cable, robot: "Robot", piece: Piece) -> list[tuple[float, float, float]]:
+    """Points (x, y, s) in m of a cable in a piece, via points among them."""
+    if cable.via_points is None:
+        return [(*robot.cable_place(cable, s), s) for s in _places(cable, robot, piece)]
+    via, parts = np.array(cable.via_points), np.linspace(0.0, 1.0, _PLACES)[:, None]
+    legs = np.concatenate([a + parts * (b - a) for a, b in itertools.pairwise(via)])
+    inside = (legs[:, 2] >= piece.start) & (legs[:, 2] <= piece.start + piece.length)
+    return [(x, y, s) for x, y, s in legs[inside].tolist()]
+
+
+def _places(cable: Cable, robot: "Robot", piece: Piece) -> list[float]:
+    """Arc lengths (m) of the points of a cable in a piece."""
+    if cable.via_points is not None:
+        return [s for _, _, s in _points(cable, robot, piece)]
+    low, high = max(piece.start, cable.start), min(piece.start + piece.length, robot.cable_end(cable))
+    return [] if high - low <= 1e-9 else np.linspace(low, high, _PLACES).tolist()
+
+
+def _check_wall(key: str, piece: Piece, x: float, y: float, s: float) -> None:
+    outline, lumens = piece.section(s)
+    outside = outline.gauge(x, y) > 1.0 + 1e-9
+    crossed = next((lumen for lumen in lumens if lumen.gauge(x, y) < 1.0 - 1e-9), None)
+    if not outside and crossed is None:
+        return
     radius = math.hypot(x, y)
     if outline.round and all(lumen.round for lumen in lumens):
         inner = lumens[0].half_width if lumens else 0.0
         raise ValueError(
-            f"{key} runs {radius * 1e3:g} mm from the axis in segment '{segment.name}';"
+            f"{key} runs {radius * 1e3:g} mm from the axis in segment '{piece.segment}';"
             f" allowed: within its wall, {inner * 1e3:g} to {outline.half_width * 1e3:g} mm"
         )
-    inside = next((lumen for lumen in lumens if lumen.gauge(x, y) < 1.0), None)
-    where = f"in its lumen, {inside}" if inside else f"outside its outline, {outline}"
-    raise ValueError(f"{key} runs at ({x * 1e3:g}, {y * 1e3:g}) mm in segment '{segment.name}', {where}")
+    where = f"in its lumen, {crossed}" if crossed else f"outside its outline, {outline}"
+    raise ValueError(f"{key} runs at ({x * 1e3:g}, {y * 1e3:g}) mm in segment '{piece.name}', {where}")
 
 
-def _check_disks(key: str, segment: Segment, x: float, y: float, part: float) -> None:
+def _check_disks(key: str, piece: Piece, segment: Segment, x: float, y: float, s: float) -> None:
     assert segment.disks is not None  # the caller
-    outline = segment.outline(min(max(part, 0.0), 1.0))
+    outline, _ = piece.section(s)
     radius, reach = math.hypot(x, y), segment.disks.outer_diameter / 2
     if radius > reach:
         raise ValueError(

@@ -6,45 +6,34 @@
       motors:
         - {cable: s1c1, can_id: 1, direction: 1}
 
+    hardware:                                      # more than eight motors: buses with names
+      buses: [{name: left, channel: can0}, {name: right, channel: can1}]
+      motors:
+        - {cable: c0, can_id: 1, bus: left}
+        - {cable: c1, pair: c3, can_id: 1, bus: right}   # an antagonistic pair on one motor
+
 Cable displacement [m] is positive when pulled in:  displacement = direction x rotor turns / gear_ratio x 2 pi capstan_radius.
 """
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
+import numpy as np
+
 from gravcomp.config import ConfigError, from_mapping, parameter
+from gravcomp.description.can_buses import CanBus, CanInterface
+from gravcomp.description.motor import MOTOR_IDS, Motor
+from gravcomp.description.transmission import Transmission
+
+__all__ = [
+    "COUNTS_PER_TURN", "MOTOR_IDS", "CanBus", "CanInterface", "Drive", "Hardware", "Homing", "Motor", "Watchdog",
+    "parse_hardware",
+]  # fmt: skip
 
 COUNTS_PER_TURN = 8192
 """Counts of the C610's rotor angle per turn, 0..8191."""
-
-MOTOR_IDS = range(1, 9)
-"""CAN ids that a C610 can have."""
-
-
-@dataclasses.dataclass(frozen=True)
-class CanInterface:
-    """A CAN bus, named by python-can's interface and channel."""
-
-    interface: str = parameter(
-        "udp_multicast",
-        description="python-can interface: udp_multicast (virtual robot), socketcan, slcan, pcan, ...",
-        read_only=True,
-    )
-    channel: str = parameter(
-        "239.74.163.2:43113", description="channel: can0, /dev/ttyACM0, or multicast group:port", read_only=True
-    )
-    bitrate: int = parameter(
-        1_000_000,
-        unit="bit/s",
-        minimum=10_000,
-        maximum=1_000_000,
-        description="used by interfaces that set the bit rate",
-        read_only=True,
-    )
-    hop_limit: int = parameter(
-        0, minimum=0, maximum=255, description="hop limit of udp_multicast; 0: no frame leaves this host", read_only=True
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,23 +88,6 @@ class Drive:
 
 
 @dataclasses.dataclass(frozen=True)
-class Motor:
-    """A motor and its cable."""
-
-    cable: str = parameter(description="name of the cable in robot.cables")
-    can_id: int = parameter(minimum=1, maximum=8, description="CAN id that is set on the C610")
-    direction: int = parameter(1, choices=(1, -1), description="1: positive rotation of the rotor pulls the cable in")
-    offset: float = parameter(
-        0.0, edge="mm", minimum=-20, maximum=20, description="calibrated displacement of the cable at the motor's zero position"
-    )
-
-    @property
-    def label(self) -> str:
-        """Name of the motor in messages: CAN id and cable."""
-        return f"motor {self.can_id} ({self.cable})"
-
-
-@dataclasses.dataclass(frozen=True)
 class Homing:
     """Settings of homing, which finds the zero position of each cable (gravcomp.motors.homing)."""
 
@@ -167,39 +139,138 @@ class Watchdog:
 
 @dataclasses.dataclass(frozen=True)
 class Hardware:
-    """CAN bus, motors in the order of the cables, homing and watchdog."""
+    """CAN buses, motors, homing and watchdog.
 
-    motors: tuple[Motor, ...] = parameter(description="one motor per cable, in the order of robot.cables")
+    With one motor a cable, the motors are in the order of the cables. `order`: names of the cables in the robot's order, where
+    motors are shared; `parse_hardware` fills it.
+    """
+
+    motors: tuple[Motor, ...] = parameter(description="motors; with one a cable, in the order of robot.cables")
     can: CanInterface = dataclasses.field(default_factory=CanInterface)
     drive: Drive = dataclasses.field(default_factory=Drive)
     homing: Homing = dataclasses.field(default_factory=Homing)
     watchdog: Watchdog = dataclasses.field(default_factory=Watchdog)
+    buses: tuple[CanBus, ...] = parameter((), description="named buses, instead of can; each carries up to eight motors")
+    imu_bus: str | None = parameter(None, description="name of the bus of the IMU board; the first when not given")
+    order: tuple[str, ...] = parameter((), description="order of the cables where motors are shared; that of robot.cables")
 
     def __post_init__(self) -> None:
-        if not 1 <= len(self.motors) <= len(MOTOR_IDS):
-            raise ValueError(f"{len(self.motors)} motors; allowed: 1 to {len(MOTOR_IDS)}")
-        for what in ("can_id", "cable"):
-            values = [str(getattr(motor, what)) for motor in self.motors]
-            twice = sorted({value for value in values if values.count(value) > 1})
+        if not self.motors:
+            raise ValueError(f"0 motors; allowed: 1 to {len(MOTOR_IDS)} on a bus")
+        self._check_buses()
+        self._check_cables()
+        if self.buses:
+            object.__setattr__(self, "can", self.board_bus)
+
+    def _check_buses(self) -> None:
+        names = [bus.name for bus in self.buses]
+        for index, name in enumerate(names):
+            if not name.strip():
+                raise ValueError(f"buses[{index}].name is empty; every bus needs a name")
+        _refuse_twice("bus", "name", names)
+        _refuse_twice("bus", "interface and channel", [CanInterface.label.fget(bus) for bus in self.buses])  # type: ignore[attr-defined]
+        allowed = ", ".join(names) or "none (hardware.buses is not given)"
+        if self.imu_bus is not None and self.imu_bus not in names:
+            raise ValueError(f"imu_bus is '{self.imu_bus}'; allowed: {allowed}")
+        for index, motor in enumerate(self.motors):
+            if motor.bus is None and len(names) > 1:
+                raise ValueError(f"motors[{index}].bus is missing; allowed: {allowed}")
+            if motor.bus is not None and motor.bus not in names:
+                raise ValueError(f"motors[{index}].bus is '{motor.bus}'; allowed: {allowed}")
+        for index, bus in enumerate(self.all_buses):
+            ids = [str(motor.can_id) for motor in self.motors if self.bus_index(motor) == index]
+            where = f" on bus '{bus.name}'" if self.buses else ""
+            if len(ids) > len(MOTOR_IDS):
+                more = "" if self.buses else "; more motors need more buses (hardware.buses, and `bus` of each motor)"
+                raise ValueError(f"{len(ids)} motors{where}; allowed: 1 to {len(MOTOR_IDS)} on a bus{more}")
+            twice = sorted({can_id for can_id in ids if ids.count(can_id) > 1})
             if twice:
-                raise ValueError(f"{what} {', '.join(twice)} is given to more than one motor")
+                raise ValueError(
+                    f"can_id {', '.join(twice)} is given to more than one motor{where}; several cables of one motor are one"
+                    " entry, with `pair` or `also`"
+                )
+
+    def _check_cables(self) -> None:
+        named: dict[str, list[Motor]] = {}
+        for motor in self.motors:
+            for cable in motor.ratios:
+                named.setdefault(cable, []).append(motor)
+        for cable, motors in named.items():
+            if len(motors) > 1 and not all(motor.differential for motor in motors):
+                raise ValueError(
+                    f"cable {cable} is given to more than one motor: {', '.join(m.label for m in motors)};"
+                    " a differential needs `differential: true` at each of them"
+                )
+        if self.order and sorted(self.order) != sorted(named):
+            raise ValueError(f"order names the cables {', '.join(self.order)}; the motors have {', '.join(named)}")
+        matrix = self.transmission.matrix
+        if np.linalg.matrix_rank(matrix) < len(self.motors):
+            raise ValueError("two motors move the same cables with the same ratios; each motor needs an effect of its own")
+
+    @property
+    def all_buses(self) -> tuple[CanBus, ...]:
+        """The buses: those with names, or the only one, whose name is empty."""
+        return self.buses or (CanBus(name="", **{f.name: getattr(self.can, f.name) for f in dataclasses.fields(CanInterface)}),)
+
+    def bus_index(self, motor: Motor) -> int:
+        """Return the index of the motor's bus in `all_buses`."""
+        return 0 if motor.bus is None else [bus.name for bus in self.buses].index(motor.bus)
+
+    @property
+    def board_bus(self) -> CanBus:
+        """The bus of the IMU board."""
+        return next((bus for bus in self.all_buses if bus.name == self.imu_bus), self.all_buses[0])
 
     @property
     def cables(self) -> tuple[str, ...]:
-        """Names of the cables, in the order of the motors."""
-        return tuple(motor.cable for motor in self.motors)
+        """Names of the cables in their order."""
+        return self.order or tuple(dict.fromkeys(cable for motor in self.motors for cable in motor.ratios))
+
+    @functools.cached_property
+    def transmission(self) -> Transmission:
+        """The way from motors to cables."""
+        return Transmission(self.motors, self.cables)
+
+    def on(self, interface: str, channel: str) -> "Hardware":
+        """Return the hardware on other buses: an interface for all, and channels by commas, one a bus; empty: as described.
+
+        Raises ConfigError for another number of channels.
+        """
+        channels = [part.strip() for part in channel.split(",")] if channel else []
+        if channels and len(channels) != len(self.all_buses):
+            names = ", ".join(bus.name for bus in self.all_buses)
+            one_each = f"one each for the buses {names}, separated by commas" if self.buses else "one"
+            raise ConfigError(f"channel is '{channel}', {len(channels)} channels; needed: {one_each}")
+        given: list[dict[str, Any]] = [
+            {key: value for key, value in (("interface", interface), ("channel", own)) if value}
+            for own in channels or [""] * len(self.all_buses)
+        ]
+        if not self.buses:
+            return dataclasses.replace(self, can=dataclasses.replace(self.can, **given[0]))
+        return dataclasses.replace(self, buses=tuple(dataclasses.replace(bus, **new) for bus, new in zip(self.buses, given)))
 
 
 def parse_hardware(section: Any, *, source: str, cables: tuple[str, ...] | None = None) -> Hardware:
     """Read the section `hardware` of the file `source`.
 
     `cables` are the names of the robot's cables in their order; None skips the comparison with the motors.
-    Raises ConfigError when a value is wrong or the motors do not have these cables in this order.
+    Raises ConfigError when a value is wrong or the motors do not have these cables; with one motor a cable, in this order.
     """
     hardware = from_mapping(Hardware, section, source=source, key="hardware")
-    if cables is not None and hardware.cables != tuple(cables):
+    if cables is None:
+        return hardware
+    shared = not hardware.transmission.direct
+    if shared and sorted(hardware.cables) == sorted(cables):
+        return dataclasses.replace(hardware, order=tuple(cables))
+    if hardware.cables != tuple(cables):
         raise ConfigError(
             f"{source}: hardware.motors are for the cables {', '.join(hardware.cables)}; "
-            f"needed, in this order: {', '.join(cables)}"
+            f"needed{'' if shared else ', in this order'}: {', '.join(cables)}"
         )
     return hardware
+
+
+def _refuse_twice(what: str, key: str, values: list[str]) -> None:
+    twice = sorted({value for value in values if values.count(value) > 1})
+    if twice:
+        raise ValueError(f"buses: {key} {', '.join(repr(value) for value in twice)} is given to more than one {what}")

@@ -2,8 +2,24 @@
 
 import dataclasses
 import math
+from typing import Protocol
 
 import numpy as np
+
+
+class HasGauge(Protocol):
+    """A closed curve around its middle."""
+
+    @property
+    def x(self) -> float:
+        """The x of its middle (m)."""
+
+    @property
+    def y(self) -> float:
+        """The y of its middle (m)."""
+
+    def gauge(self, x: float, y: float) -> float:
+        """Return the distance of the point (x, y) from the middle, relative to that of the curve in its direction."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,6 +71,33 @@ class Outline:
         u, v = abs(x - self.x) / self.half_width, abs(y - self.y) / self.half_height
         return math.hypot(u, v) if self.shape == "ellipse" else max(u, v)
 
+    def parameter(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the parameters (...,) in rad, see `boundary`, of the curve in the directions of the points (x, y)."""
+        u, v = (x - self.x) / self.half_width, (y - self.y) / self.half_height
+        if self.shape == "ellipse":
+            return np.arctan2(v, u)
+        upright = np.abs(u) >= np.abs(v)
+        along = np.where(upright, v, -u) / np.where(upright, np.abs(u), np.abs(v)) * np.where(upright, np.sign(u), np.sign(v))
+        side = np.where(upright, np.where(u > 0, 0, 2), np.where(v > 0, 1, 3))
+        return side * (math.pi / 2) + along * (math.pi / 4)
+
+    def reach(self, x: float, y: float, angle: np.ndarray) -> np.ndarray:
+        """Return the distances (k,) in m from a point (x, y) inside to the curve in the directions `angle` (k,), in rad."""
+        u, v = (x - self.x) / self.half_width, (y - self.y) / self.half_height
+        du, dv = np.cos(angle) / self.half_width, np.sin(angle) / self.half_height
+        if self.shape == "ellipse":
+            a, b = du**2 + dv**2, u * du + v * dv
+            return (-b + np.sqrt(b**2 + a * (1.0 - u**2 - v**2))) / a
+        with np.errstate(divide="ignore"):
+            to_side = (1.0 - u * np.sign(du)) / np.abs(du)
+            to_top = (1.0 - v * np.sign(dv)) / np.abs(dv)
+        return np.minimum(to_side, to_top)
+
+    def alike(self, other: "Outline", slack: float) -> bool:
+        """Return whether the other outline is the same within `slack` (m)."""
+        pairs = zip(dataclasses.astuple(self)[1:], dataclasses.astuple(other)[1:])
+        return self.shape == other.shape and all(abs(a - b) < slack for a, b in pairs)
+
     @property
     def area(self) -> float:
         """Enclosed area (m^2)."""
@@ -77,3 +120,12 @@ class Outline:
         else:
             text = f"{self.shape} of {width:g} x {height:g} mm"
         return text if self.x == 0.0 == self.y else f"{text} at ({self.x * 1e3:g}, {self.y * 1e3:g}) mm"
+
+
+def encloses(outer: "HasGauge", inner: Outline, gap: float) -> bool:
+    """Return whether `inner` lies inside `outer` with at least `gap` (m) between them."""
+    for x, y in inner.boundary(np.linspace(0.0, 2 * math.pi, 48, endpoint=False)):
+        reach = math.hypot(x - outer.x, y - outer.y)
+        if outer.gauge(x, y) * (1.0 + (gap / reach if reach > 0 else 0.0)) > 1.0 + 1e-9:
+            return False
+    return True

@@ -3,20 +3,26 @@
 Frame `soft_base`: z runs along the straight robot from base to tip; the base is at z = 0.
 """
 
+import bisect
 import dataclasses
+import functools
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from gravcomp.config import parameter
-from gravcomp.description.body import Elements, MeshBody
+from gravcomp.description.body import Elements
 from gravcomp.description.cable import Cable
-from gravcomp.description.cable_path import check_path
+from gravcomp.description.cable_line import CableLine
+from gravcomp.description.cable_path import check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.mesh_body import MeshBody
+from gravcomp.description.pieces import Piece, pieces_of_segments
 from gravcomp.description.point_load import PointLoad
-from gravcomp.description.segment import Segment, check_joint
+from gravcomp.description.segment import Segment
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +54,9 @@ class Robot:
     segments: tuple[Segment, ...] = parameter((), description="tubes from base to tip")
     body: MeshBody | None = parameter(None, description="a body from a file, instead of segments")
     cables: tuple[Cable, ...] = parameter((), description="cables; their order is the order of every array")
+    cable_defaults: CableLine = parameter(
+        default_factory=CableLine, description="line of every cable that does not give its own; empty once the cables have it"
+    )
     elements: Elements | None = parameter(
         None,
         description="mesh of the segments; well-shaped when not given",
@@ -64,20 +73,59 @@ class Robot:
             raise ValueError(f"{found} of segments and body given; exactly one is needed")
         _refuse_repeats("segments", [s.name for s in self.segments])
         _refuse_repeats("cables", [c.name for c in self.cables])
-        for before, after in zip(self.segments, self.segments[1:]):
-            check_joint(before, after)
+        self._fill_cables()
+        _ = self.pieces  # refuses segments that do not meet
         segment_names = [s.name for s in self.segments]
         for index, cable in enumerate(self.cables):
             key = f"cables[{index}] ('{cable.name}')"
             if cable.segment is not None and cable.segment not in segment_names:
                 allowed = ", ".join(segment_names) or "none (the robot has a body)"
                 raise ValueError(f"{key}.segment is '{cable.segment}'; allowed: {allowed}")
-            check_path(key, cable, self.cable_end(cable), self.segments, self.length)
+            check_path(key, cable, self)
+        check_crossings(self)
+
+    def _fill_cables(self) -> None:
+        """Give each cable what `cable_defaults` has and it does not, and empty them: a changed cable is not filled again."""
+        object.__setattr__(self, "cables", tuple(cable.filled(self.cable_defaults) for cable in self.cables))
+        object.__setattr__(self, "cable_defaults", CableLine())
+        for index, cable in enumerate(self.cables):
+            try:
+                cable.check_stiffness()
+            except ValueError as error:
+                raise ValueError(f"cables[{index}] ('{cable.name}'): {error}") from error
+            if cable.pretension is not None and cable.pretension >= self.limits.tension_max:
+                raise ValueError(
+                    f"cables[{index}] ('{cable.name}').pretension is {cable.pretension:g} N;"
+                    f" allowed: below limits.tension_max = {self.limits.tension_max:g} N"
+                )
 
     @property
     def length(self) -> float:
         """Rest length from base to tip, with caps (m)."""
-        return self.body.length if self.body else sum(s.full_length for s in self.segments)
+        return self.body.full_length if self.body else sum(s.full_length for s in self.segments)
+
+    @functools.cached_property
+    def pieces(self) -> list[Piece]:
+        """The pieces of the segments, from base to tip; none for a body from a file."""
+        return pieces_of_segments(self.segments)
+
+    def piece_at(self, s: float) -> Piece:
+        """Return the piece at the arc length s (m), the later one where two meet. The robot needs segments."""
+        ends = [piece.start + piece.length for piece in self.pieces[:-1]]
+        return self.pieces[bisect.bisect_right(ends, s)]
+
+    def cable_place(self, cable: Cable, s: float) -> tuple[float, float]:
+        """Return (x, y) in m where the cable crosses the section at the arc length s (m)."""
+        x, y = cable.place(s, self.cable_end(cable))
+        if not cable.follow_taper:
+            return x, y
+        across = up = 1.0
+        for piece in self.pieces:  # a step in the section does not move the channel
+            low, high = max(cable.start, piece.start), min(s, piece.start + piece.length)
+            if low < high:
+                before, here = piece.section(low)[0], piece.section(high)[0]
+                across, up = across * here.half_width / before.half_width, up * here.half_height / before.half_height
+        return x * across, y * up
 
     @property
     def cable_names(self) -> tuple[str, ...]:
@@ -97,6 +145,18 @@ class Robot:
             return cable.end
         assert cable.segment is not None  # Cable.__post_init__
         return self.segment_end(cable.segment)
+
+    def line_length(self, cable: Cable) -> float:
+        """Return the length in m of the cable from capstan to end, with the robot straight."""
+        if cable.via_points is not None:
+            inside = sum(math.dist(a, b) for a, b in zip(cable.via_points, cable.via_points[1:]))
+        else:
+            inside = self.cable_end(cable) - cable.start
+        return (cable.free_length or 0.0) + inside
+
+    def cable_compliance(self, cable: Cable) -> float:
+        """Return the elongation in m/N of the cable from capstan to end under a tension that is the same along it."""
+        return self.line_length(cable) / cable.stiffness
 
     def with_material(self, **changes: Any) -> "Robot":
         """Return the robot with these fields of every segment's (or the body's) material changed; caps keep theirs."""

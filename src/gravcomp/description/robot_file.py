@@ -3,6 +3,7 @@
 import dataclasses
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.robot import Robot
@@ -57,11 +58,16 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
             raise ConfigError(f"{path}: {key} is {section!r}; a mapping of keys is needed")
     if "robot" not in document:
         raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
-    robot = from_mapping(Robot, document["robot"], source=str(path), key="robot")
-    if robot.body is not None and not Path(robot.body.file).is_absolute():
-        body = dataclasses.replace(robot.body, file=str(path.resolve().parent / robot.body.file))
-        robot = dataclasses.replace(robot, body=body)
+    robot = from_mapping(Robot, _with_whole_path(document["robot"], path), source=str(path), key="robot")
     return RobotFile(str(path), robot, document)
+
+
+def _with_whole_path(section: Any, path: Path) -> Any:
+    """Return the section `robot` with the path of the body's file, which is relative to the robot file at `path`."""
+    body = section.get("body") if isinstance(section, dict) else None
+    if not isinstance(body, dict) or not isinstance(body.get("file"), str):
+        return section
+    return {**section, "body": {**body, "file": str(path.resolve().parent / body["file"])}}
 
 
 def _resolve(name_or_path: str | Path) -> Path:

@@ -86,6 +86,6 @@ def _optional() -> list[Finding]:
         importlib.metadata.version("gmsh")
         findings.append(Finding("ok", "gmsh", importlib.metadata.version("gmsh")))
     except importlib.metadata.PackageNotFoundError:
-        remedy = "sudo apt-get install -y libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 && .venv/bin/pip install gmsh"
-        findings.append(Finding("optional", "gmsh", "not installed (needed for: meshing a body from its surface)", remedy))
+        use = "bodies from surfaces and STEP files"
+        findings.append(Finding("optional", "gmsh", f"not installed (needed for: {use})", "./gravcomp mesh install"))
     return findings

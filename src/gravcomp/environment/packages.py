@@ -23,6 +23,7 @@ from gravcomp.environment.interpreter import Interpreter
 BUILD_LOCK = "requirements-build.lock"
 EXTRAS = {
     "browser": ("requirements-browser.lock", "Packages for pictures of the page"),
+    "mesher": ("requirements-mesher.lock", "Meshers of surfaces"),
     "development": ("requirements-development.lock", "Packages for tests and checks"),
     "reports": ("requirements-reports.lock", "Packages for figures"),
 }

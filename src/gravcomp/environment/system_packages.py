@@ -38,7 +38,7 @@ def install(names: "list[str]", wanted: str) -> None:
     line = ("" if root else "sudo ") + "apt-get install -y --no-install-recommends " + " ".join(names)
     if not shutil.which("apt-get"):
         raise SetupError(f"missing on this machine: {wanted}. Install what provides them here; on Debian and Ubuntu: {line}")
-    if not root and not _yes(f"Missing: {wanted}.\nInstall with '{line}'? [y/N] "):
+    if not root and not confirmed(f"Missing: {wanted}.\nInstall with '{line}'? [y/N] "):
         raise SetupError(f"missing on this machine: {wanted}. Run: {line}")
     note(f"Installing {wanted}")
     prefix = [] if root else ["sudo"]
@@ -49,7 +49,8 @@ def install(names: "list[str]", wanted: str) -> None:
         raise SetupError(f"'{line}' failed:\n{done.stderr.strip() or done.stdout.strip()}")
 
 
-def _yes(question: str) -> bool:
+def confirmed(question: str) -> bool:
+    """Ask at the terminal; False without one."""
     if not (sys.stdin and sys.stdin.isatty()):
         return False
     print(question, end="", file=sys.stderr, flush=True)

@@ -61,12 +61,20 @@ class DynamicSolver:
         model.free(acceleration)[:] = self._matrix.factor().solve(-force)
         strain = model.elements.strains(u)
         self.state = Motion(
-            u.copy(), np.zeros_like(u), acceleration, tension, tendons, force, strain, strain, np.zeros_like(strain)
+            u.copy(), np.zeros_like(u), acceleration, tension, tendons, force, strain, strain, self._relaxed(strain)
         )
 
-    def take_over(self, u: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
+    def take_over(
+        self,
+        u: np.ndarray,
+        velocity: np.ndarray,
+        acceleration: np.ndarray,
+        tension: np.ndarray,
+        held: np.ndarray | None = None,
+    ) -> None:
         """Continue a motion of another model: displacements, velocity and acceleration (n, 3), tension (m,).
 
+        held (b, k, p, 6): by the branches of the materials; default: they have relaxed.
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         model = self.model
@@ -76,7 +84,8 @@ class DynamicSolver:
             force -= self._rayleigh.force(model.free(velocity))
         strain = model.elements.strains(u)
         tendons = model.tendons.state(model.mesh.nodes + u)
-        self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, strain, np.zeros_like(strain))
+        held = self._relaxed(strain) if held is None or self._viscosity is None else held
+        self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, strain, held)
 
     def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> Motion:
         """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one."""
@@ -99,7 +108,7 @@ class DynamicSolver:
                     break
                 fresh, jacobian = True, tendons.jacobian
                 answer = factor.solve((1.0 - scheme.alpha_f) * tendons.force_jacobian.T)
-                compliance = jacobian @ answer + np.diag(model.tendons.axial_compliance)
+                compliance = jacobian @ answer + np.diag(model.tendons.stretch(tendons))
             moved = model.free(u) - model.free(last.u)
             velocity = velocity_0 + scheme.velocity_rate * moved
             acceleration = acceleration_0 + scheme.acceleration_rate * moved
@@ -155,6 +164,10 @@ class DynamicSolver:
         held = self._viscosity.held_after(strain, last.strain, last.held, scheme.h) if self._viscosity else last.held
         self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, last.strain, held, scheme.h, residual)
         return self.state
+
+    def _relaxed(self, strain: np.ndarray) -> np.ndarray:
+        """Return what relaxed branches hold; no branches with Rayleigh damping."""
+        return self._viscosity.relaxed(strain) if self._viscosity else np.zeros((0, *strain.shape))
 
     def _viscous(self, h: float) -> ViscousStrain | None:
         """Return damping and creep of a step of h seconds from the present state; None with Rayleigh damping."""

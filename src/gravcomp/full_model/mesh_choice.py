@@ -1,58 +1,78 @@
-"""The division of segments into elements that reaches an accuracy.
+"""The division of segments into elements that reaches an accuracy at the least cost.
 
-The tip is computed under the robot's own weight, horizontally, and bent by a cable. A coarse mesh is refined in one direction
-after the other (along, around, radially) until the remaining error of that direction is within its share of `ACCURACY`: the
-changes of the tip form a geometric series, whose rest is known after two of them, and which says how far to refine.
+The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
+loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, the others staying as coarse as can be,
+its change of the tip is scaled to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the
+changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`.
+Around the axis the comparison has twice as many elements, so that the cables keep their places in the elements.
 
 The choice is kept in the cache, by content. Young's moduli enter rounded down to a power of two, so that a calibrated robot
-has the mesh of the robot from which it was calibrated.
+has the mesh of the robot from which it was calibrated. `mesh_error` measures what is only estimated here.
 """
 
 import dataclasses
 import json
 import logging
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
+from gravcomp.full_model.flat_elements import with_grading
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.pieces import pieces_of
 from gravcomp.mesh.refusal import well_shaped
-from gravcomp.mesh.tube import coarse_elements
-
-if TYPE_CHECKING:
-    from gravcomp.full_model.model import RobotModel
-    from gravcomp.full_model.statics import StaticSolver
+from gravcomp.mesh.tube import coarse_elements, tube_mesh
 
 ACCURACY = 1e-3
-_FORMAT = 1  # part of the key; to be raised when the choice changes
-_GRAVITY = 9.81
-# Directions in the order in which they are refined, with their share of the error and the ratio of two refinements.
-_SHARES = {"along": 0.5, "around": 0.3, "radial": 0.2}
-_REFINEMENTS = 10
-_MOST_UNKNOWNS = 20000
-# The ratio of two changes where it is not known yet.
-_RATIO = 0.4
-# The part of the last tension with an equilibrium that is used, and the parts in which a load is searched for.
-_SAFE, _PARTS = 0.7, 4
-# The bent robot's tip is turned by up to this angle (rad).
-_BENT = 1.6
+"""Error of the tip that a mesh may have, over the length."""
+
+_FORMAT = 2  # part of the key; to be raised when the choice changes
+# The part of `ACCURACY` that the estimate may use.
+_USED = 0.9
+# The power of the number of elements with which the change of a direction falls.
+_ORDER = {"along": 1.5, "around": 2.0, "radial": 1.0}
+_START_ALONG = 8
+_MOST_UNKNOWNS = 15000
+# A load that a finer mesh does not carry is made smaller by this factor, so often.
+_LESS, _TIMES = 0.7, 4
 
 
-def chosen_elements(robot: Robot) -> Elements:
-    """Return the chosen division. Raises MeshError for a robot that cannot be meshed."""
+@dataclasses.dataclass(frozen=True)
+class MeshChoice:
+    """A division; error: estimate of the tip's error over the length."""
+
+    elements: Elements
+    error: float
+
+
+def with_chosen_elements(robot: Robot) -> Robot:
+    """Return the robot with chosen elements, where it consists of segments and its file gives none. Raises MeshError."""
+    if robot.body is not None or robot.elements is not None:
+        return robot
+    return dataclasses.replace(robot, elements=chosen_mesh(robot).elements)
+
+
+def chosen_mesh(robot: Robot) -> MeshChoice:
+    """Return the choice for a robot of segments, whatever its `elements` are. Raises MeshError if it cannot be meshed."""
     rounded = _rounded(robot)
     path = cache_path("mesh", content_key(_FORMAT, rounded), ".json")
     if path.exists():
-        return Elements(**json.loads(path.read_text()))
-    elements = _choose(rounded)
+        stored = json.loads(path.read_text())
+        return MeshChoice(Elements(**stored["elements"]), stored["error"])
+    choice = _choose(rounded)
+    if choice.error > ACCURACY:
+        logging.getLogger(__name__).warning(
+            "the mesh chosen for '%s' leaves an estimated error of %.2g %% of the length; wanted: %g %%",
+            robot.name,
+            100 * choice.error,
+            100 * ACCURACY,
+        )
     part = path.with_suffix(".part")
-    part.write_text(json.dumps(dataclasses.asdict(elements)))
+    part.write_text(json.dumps(dataclasses.asdict(choice)))
     part.replace(path)
-    return elements
+    return choice
 
 
 def _rounded(robot: Robot) -> Robot:
@@ -60,7 +80,12 @@ def _rounded(robot: Robot) -> Robot:
 
     def material(m: Material) -> Material:
         return dataclasses.replace(
-            m, youngs_modulus=2.0 ** math.floor(math.log2(m.youngs_modulus)), damping_time=0.0, creep_ratio=0.0, creep_time=0.5
+            m,
+            youngs_modulus=2.0 ** math.floor(math.log2(m.youngs_modulus)),
+            damping_time=0.0,
+            creep_ratio=0.0,
+            creep_time=0.5,
+            prony=(),
         )
 
     segments = tuple(
@@ -69,147 +94,123 @@ def _rounded(robot: Robot) -> Robot:
         )
         for s in robot.segments
     )
-    cables = tuple(dataclasses.replace(c, axial_stiffness=None, friction=0.0) for c in robot.cables)
-    return Robot("chosen", segments=segments, cables=cables, limits=robot.limits, payload=robot.payload)
+    cables = tuple(c.without_line() for c in robot.cables)
+    return Robot("chosen", segments=segments, cables=cables, limits=robot.limits, payload=robot.payload, loads=robot.loads)
 
 
-def _choose(robot: Robot) -> Elements:
-    elements = _start(robot)
-    solver, model = _solver(robot, elements)
-    tension = _bending_tension(robot, solver, model)
-    here, total = _tips(solver, model, tension), 0.0
-    for direction, share in _SHARES.items():
-        elements, here, rest = _refined(robot, elements, direction, share * ACCURACY * robot.length, tension, here)
-        total += rest
-    if total > ACCURACY * robot.length:
-        logging.getLogger(__name__).warning(
-            "the mesh chosen leaves an error of about %.2g mm at the tip; allowed: %.2g mm",
-            1e3 * total,
-            1e3 * ACCURACY * robot.length,
-        )
-    return elements
+def _choose(robot: Robot) -> MeshChoice:
+    tips = _Tips(robot)
+    start = here = _start(robot)
+    tips.prepare(start)
+    changes: dict[str, np.ndarray] = {}  # of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction
+    while True:
+        gains = {}
+        for direction, order in _ORDER.items():
+            finer = _finer(robot, here, direction)
+            if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
+                continue
+            if direction not in changes:
+                number = getattr(here, direction)
+                compared = 2 * number if direction == "around" else getattr(finer, direction)
+                change = tips.change(*(_with(robot, start, direction, value) for value in (number, compared)))
+                changes[direction] = change * (1.0 - 0.5**order) / (1.0 - (number / compared) ** order)
+            gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
+        error = _largest(np.sum(list(changes.values()), axis=0)) if changes else 0.0
+        if error <= _USED * ACCURACY or not gains:
+            return MeshChoice(here, error)
+        best = max(gains, key=lambda direction: gains[direction])
+        here = _finer(robot, here, best)
+        del changes[best]
 
 
-def _refined(
-    robot: Robot, elements: Elements, direction: str, allowed: float, tension: np.ndarray | None, here: list[np.ndarray | None]
-) -> tuple[Elements, list[np.ndarray | None], float]:
-    """Refine in one direction until the rest of its error is at most `allowed` (m): the numbers, the tips there, and the rest."""
-    last, rest = None, np.inf
-    for _ in range(_REFINEMENTS):
-        finer = _finer(robot, elements, direction)
-        if finer == elements or _unknowns(robot, finer) > _MOST_UNKNOWNS:
-            break
-        there = _tips(*_solver(robot, finer), tension)
-        if any(a is not None and b is None for a, b in zip(here, there)):
-            logging.getLogger(__name__).warning(
-                "with a finer mesh the robot loses its equilibrium under a load of the mesh's choice:"
-                " the material is compressed beyond what its"
-                " law carries (svk softens in strong compression, neo_hookean does not)"
-            )
-            return elements, here, 0.0 if last is None else rest
-        change = _change(here, there)
-        ratio = min(max(change / last, 0.2), 0.7) if last else _RATIO
-        rest = change / (1.0 - ratio)
-        if rest <= allowed:
-            break
-        elements, here, last, rest = finer, there, change, change * ratio / (1.0 - ratio)
-        if rest <= allowed:
-            break
-    return elements, here, rest
+def _largest(changes: np.ndarray) -> float:
+    """The largest of the distances (l, 3); a load without equilibrium (NaN) does not count."""
+    distances = np.linalg.norm(changes, axis=1)
+    return float(np.nanmax(distances)) if not np.isnan(distances).all() else 0.0
+
+
+class _Tips:
+    """The tips of a robot's meshes under its loads, each computed once."""
+
+    def __init__(self, robot: Robot):
+        self._robot = robot
+        self._known: dict[Elements, np.ndarray] = {}
+        self._unknowns: dict[Elements, int] = {}
+
+    def prepare(self, elements: Elements) -> None:
+        """Find the loads with a mesh."""
+        from gravcomp.full_model.mesh_loads import mesh_loads
+
+        self._loads = mesh_loads(self._model(elements))
+
+    def unknowns(self, elements: Elements) -> int:
+        """Return the number of unknowns of a mesh."""
+        if elements not in self._unknowns:
+            self._unknowns[elements] = 3 * len(tube_mesh(dataclasses.replace(self._robot, elements=elements)).nodes)
+        return self._unknowns[elements]
+
+    def change(self, one: Elements, other: Elements) -> np.ndarray:
+        """Return the change of the tips (l, 3) from one mesh to another, over the length."""
+        for _ in range(_TIMES):
+            change = (self._tips(other) - self._tips(one)) / self._robot.length
+            if not np.isnan(change).any():
+                break
+            self._known.clear()
+            self._loads = [dataclasses.replace(load, tension=_LESS * load.tension) for load in self._loads]
+        return change
+
+    def _tips(self, elements: Elements) -> np.ndarray:
+        from gravcomp.full_model.mesh_loads import tips_under
+
+        if elements not in self._known:
+            self._known[elements] = tips_under(self._model(elements), self._loads)
+        return self._known[elements]
+
+    def _model(self, elements: Elements):  # type: ignore[no-untyped-def]
+        from gravcomp.full_model.model import RobotModel
+
+        return RobotModel(dataclasses.replace(self._robot, elements=elements))
 
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    pieces = pieces_of(robot)
-    parts = sum(len(piece.marks) + 1 for piece in pieces)
-    disks = any(piece.marks for piece in pieces)
-    coarse = coarse_elements(robot)
-    around = 4 if coarse.around == 8 else 6
-    along = parts if disks else max(6, parts)
+    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    disks = any(segment.disks for segment in robot.segments)
+    around = _around(robot, 4 if coarse_elements(robot).around == 8 else 1)
+    along = parts if disks else max(_START_ALONG, parts)
     # Between disks the layers are even; else they are graded towards the clamp, whose corner is singular.
-    start = Elements(around=around, along=along, radial=1, grading=1.0 if disks else 8.0, equal_stiffness=True)
+    start = Elements(around=around, along=along, radial=1, grading=1.0, equal_stiffness=True)
     shaped = well_shaped(robot, start)
     if shaped is None:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
-    return shaped
+    return shaped if disks else with_grading(robot, shaped)
+
+
+def _around(robot: Robot, multiple: int) -> int:
+    """The least number from 4 to 12 with an edge at every cable, a multiple of `multiple`; without any such number 6 or 8."""
+    angles = np.array([cable.angle for cable in robot.cables if cable.angle is not None])
+    first = math.pi / 4 if multiple == 4 else 0.0
+    for around in range(4 if multiple == 4 else 6, 13):
+        parts = (angles - first) * around / (2 * math.pi)
+        if around % multiple == 0 and np.abs(parts - np.rint(parts)).max(initial=0.0) < 1e-6:
+            return around
+    return 8 if multiple == 4 else 6
 
 
 def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
-    """The next numbers in a direction."""
+    """The next numbers in a direction; the same where there are none."""
     if direction == "around":
-        return dataclasses.replace(elements, around=min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
+        return _with(robot, elements, "around", min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
     if direction == "radial":
-        return dataclasses.replace(elements, radial=min(elements.radial + 1, 8))
+        return _with(robot, elements, "radial", min(elements.radial + 1, 8))
     parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
     disks = any(segment.disks for segment in robot.segments)
-    along = elements.along + parts if disks else math.ceil(1.5 * elements.along)
-    return dataclasses.replace(elements, along=min(along, 500))
+    return _with(robot, elements, "along", min(elements.along + parts if disks else math.ceil(1.4 * elements.along), 500))
 
 
-def _solver(robot: Robot, elements: Elements) -> "tuple[StaticSolver, RobotModel]":
-    from gravcomp.full_model.model import RobotModel
-    from gravcomp.full_model.statics import StaticSolver
-
-    model = RobotModel(dataclasses.replace(robot, elements=elements))
-    return StaticSolver(model), model
-
-
-def _bending_tension(robot: Robot, solver: "StaticSolver", model: "RobotModel") -> np.ndarray | None:
-    """Tensions (m,) that bend the weightless robot by its last cable up to the limits; None where it cannot."""
-    from gravcomp.full_model.cable_input import CableInput
-
-    if not robot.cables:
-        return None
-    unit, best = np.eye(len(robot.cables))[-1], None
-    # Along a geometric series, as the robot's softness is not known.
-    for tension in robot.limits.tension_max * 2.0 ** np.arange(-10.0, 0.5, 0.5):
-        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), iterations=15, exact=True)
-        if not state.converged:  # a finer mesh may lose the equilibrium a little earlier
-            best = None if best is None else _SAFE * best
-            break
-        if state.tendons.displacement[-1] > robot.limits.displacement_max:
-            break
-        best = tension * unit
-        if _turned(solver, model) > _BENT:
-            break
-    solver.reset()
-    return best
-
-
-def _turned(solver: "StaticSolver", model: "RobotModel") -> float:
-    _, one, two = model.effectors.sections(model.mesh.nodes + solver.state.u)[-1]
-    _, rest_one, rest_two = model.effectors.sections(model.mesh.nodes)[-1]
-    d, rest = np.cross(one, two), np.cross(rest_one, rest_two)
-    return float(np.arccos(np.clip(d @ rest / np.linalg.norm(d) / np.linalg.norm(rest), -1.0, 1.0)))
-
-
-def _tips(solver: "StaticSolver", model: "RobotModel", tension: np.ndarray | None) -> list[np.ndarray | None]:
-    """The tip (3,) under each load; None where there is no equilibrium."""
-    from gravcomp.full_model.cable_input import CableInput
-
-    loads = [(np.array([-_GRAVITY, 0.0, 0.0]), CableInput())]
-    if any(not segment.outline(0.0).round for segment in model.robot.segments):
-        loads.append((np.array([0.0, -_GRAVITY, 0.0]), CableInput()))
-    if tension is not None:
-        loads.append((np.zeros(3), CableInput(tension=tension)))
-    result: list[np.ndarray | None] = []
-    for gravity, cables in loads:
-        solver.reset()
-        state = solver.solve(gravity, cables, _PARTS)
-        section = model.effectors.sections(model.mesh.nodes + state.u)[-1]
-        result.append(section[0] if state.converged else None)
-    return result
-
-
-def _change(here: list, there: list) -> float:
-    """The largest distance (m) between the tips under the loads that both meshes carry."""
-    pairs = [np.linalg.norm(a - b) for a, b in zip(here, there) if a is not None and b is not None]
-    return float(max(pairs, default=0.0))
-
-
-def _unknowns(robot: Robot, elements: Elements) -> int:
-    from gravcomp.mesh.tube import tube_mesh
-
-    return 3 * len(tube_mesh(dataclasses.replace(robot, elements=elements)).nodes)
+def _with(robot: Robot, elements: Elements, direction: str, number: int) -> Elements:
+    """The elements with another number in a direction, and the grading that suits it."""
+    changed = dataclasses.replace(elements, **{direction: number})
+    return changed if any(segment.disks for segment in robot.segments) else with_grading(robot, changed)

@@ -12,11 +12,11 @@ from gravcomp.cables.tendons import Tendons, pieces_of
 from gravcomp.description import Robot
 from gravcomp.full_model.effectors import Effectors
 from gravcomp.full_model.hung_loads import hung_weights
+from gravcomp.full_model.mesh_choice import with_chosen_elements
 from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.mesh import Mesh, body_mesh
-from gravcomp.mesh.default_elements import with_elements
 from gravcomp.mesh.elements import constant_strain
 
 
@@ -33,7 +33,7 @@ class RobotModel:
 
         Raises MeshError for a body that cannot be meshed, a cable outside the body and parts that are not connected to the base.
         """
-        self.robot = robot = robot if mesh else with_elements(robot)
+        self.robot = robot = robot if mesh else with_chosen_elements(robot)
         mesh = mesh or body_mesh(robot)
         routes = route_cables(robot, mesh)
         cliques = [mesh.elements]

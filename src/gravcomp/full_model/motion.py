@@ -12,8 +12,8 @@ class Motion:
     """A state of motion at the end of a step.
 
     u, velocity and acceleration (n, 3) in SI; tension (m,) in N; tendons: the cables at u; force (3 n_free,): g of
-    `generalized_alpha` in N; strain and strain_before (k, p, 6): Green's strain now and one step before; held (k, p, 6): strain
-    held by the creep branch of `viscosity`; step: length of the last step in s; residual: largest force out of balance in N.
+    `generalized_alpha` in N; strain and strain_before (k, p, 6): Green's strain now and one step before; held (b, k, p, 6): that
+    of the branches of `viscosity`; step: length of the last step in s; residual: largest force out of balance in N.
     """
 
     u: np.ndarray

@@ -4,7 +4,7 @@ Unknown are the displacements u and the tensions lambda with
 
     f_int(u) = f_weight + H(u)^T lambda,
     driven by tension:       lambda given;
-    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: the cable's own elongation).
+    driven by displacement:  lambda >= 0, delta(u) + c lambda - wound >= 0, complementary (c: stretch of the cable).
 
 Newton's step solves A y = r and A X = H^T with A = K(u, lambda), so that the step is y + X dlambda and the compliance of the
 cables is W = H X; the tensions follow from the small complementarity problem (Coevoet et al. 2017, section IV). From the second
@@ -24,6 +24,7 @@ from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
+from gravcomp.mechanics.viscous_strain import ViscousStrain
 
 # Smallest det F that a step may leave in an element.
 _CRUSHED = 0.1
@@ -39,7 +40,10 @@ _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
 
 
 class StaticTracker:
-    """Tracks the equilibrium of a model. Owns the stiffness matrix, the current `state`, and the `sliding` of the cables."""
+    """Tracks the equilibrium of a model. Owns the stiffness matrix, the current `state`, and the `sliding` of the cables.
+
+    viscous: strain of what the materials' branches hold in the equilibrium (`full_model.creep`); None: they have relaxed.
+    """
 
     def __init__(self, model: RobotModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
         """Start from the straight robot.
@@ -51,6 +55,7 @@ class StaticTracker:
         self.tolerance = tolerance * model.length
         self.longest_step = longest_step * model.length
         self.near = near * model.length
+        self.viscous: ViscousStrain | None = None
         self._matrix = model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         self._stiffness = self._matrix.mean_diagonal()
@@ -127,7 +132,7 @@ class StaticTracker:
         factor, exact = self._reusable_factor(state), True
         reused = factor is not None
         if factor is not None:
-            force = model.elements.internal_force(state.u)
+            force = model.elements.internal_force(state.u, self.viscous)
         else:
             try:
                 factor, force, exact = self._new_factor(state, origin, stable)
@@ -139,7 +144,7 @@ class StaticTracker:
         out = weight - model.free(force)
         solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
         y, state.answer = solved[:, 0], solved[:, 1:]
-        state.compliance = jacobian @ state.answer + np.diag(model.tendons.axial_compliance)
+        state.compliance = jacobian @ state.answer + np.diag(model.tendons.stretch(state.tendons))
         free = state.tendons.displacement + jacobian @ y
         if not math.isfinite(state.compliance.sum() + free.sum()):
             return None
@@ -226,11 +231,14 @@ class StaticTracker:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the change (3 n_free,) of the unknowns and the tensions (m,) from the factor of a nearby shape."""
         model = self.model
-        force = model.elements.internal_force(state.u)
+        force = model.elements.internal_force(state.u, self.viscous)
         out = weight - model.free(force) + state.tension @ state.tendons.force_jacobian
         y = factor.solve(out)
         free = state.tendons.displacement + jacobian @ y
-        shift = (state.compliance - np.diag(model.tendons.axial_compliance)) @ state.tension
+        body = jacobian @ state.answer
+        # The stretch of the present shape: with friction the mean tension along a cable changes with its bends.
+        state.compliance = body + np.diag(model.tendons.stretch(state.tendons))
+        shift = body @ state.tension
         tension = cables.tensions(state.compliance, free - shift, state.tension > 0.0)
         return y + state.answer @ (tension - state.tension), tension
 
@@ -252,7 +260,7 @@ class StaticTracker:
         shifts = () if stable else (self._stiffness * 10.0**power for power in range(-6, 1))
         for shift in (0.0, *shifts):
             self._matrix.values[:] = 0.0
-            force = self.model.elements.assemble(state.u, self._matrix, origin=origin)
+            force = self.model.elements.assemble(state.u, self._matrix, self.viscous, origin)
             if state.tension.any():
                 self.model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
             if shift:
@@ -273,6 +281,6 @@ class StaticTracker:
 
     def _measure(self, state: Equilibrium, weight: np.ndarray) -> None:
         """Set the residual of `state`."""
-        force = self.model.free(self.model.elements.internal_force(state.u))
+        force = self.model.free(self.model.elements.internal_force(state.u, self.viscous))
         out = weight - force + state.tension @ state.tendons.force_jacobian
         state.residual = float(np.abs(out).max())

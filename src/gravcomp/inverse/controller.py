@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.description.transmission import Transmission
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.errors import backbone_missed, tip_errors
@@ -20,6 +21,7 @@ from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.outcome import outcome
 from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.retreat import Move, Retreat
+from gravcomp.inverse.scaling import NO_BOUND, UNCOUPLED, Couplings
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, evaluate
 from gravcomp.inverse.target import Target
@@ -37,10 +39,12 @@ class InverseController:
     Attributes: robot, of which the names and limits of the cables are used; options, which may be replaced at any time.
     """
 
-    def __init__(self, robot: Robot, options: InverseOptions | None = None):
-        """options: default `InverseOptions()`."""
+    def __init__(self, robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None):
+        """options: default `InverseOptions()`; transmission: of motors that are shared, default: one motor for each cable."""
         self.robot = robot
         self.options = options or InverseOptions()
+        self._transmission = None if transmission is None or transmission.direct else transmission
+        self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length)
@@ -93,6 +97,11 @@ class InverseController:
         previous = self._displacement
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
+        last = previous
+        if len(self._couplings.rows):
+            # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
+            path = response.compliance_aa @ tension + response.displacement_free
+            previous = np.where(self._couplings.rows.any(axis=0), np.maximum(previous, path), previous)
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
@@ -110,6 +119,8 @@ class InverseController:
                 interval=interval,
                 damping=self._damping.factor,
                 options=options,
+                least_tension=self._least_tension(),
+                couplings=self._couplings,
             )
             solution = self._solver.solve(programme)
         except SolverFailed as error:
@@ -136,9 +147,10 @@ class InverseController:
             target.tip_position,
             target.direction_or_zeros,
         )
+        displacement = self._possible(result.displacement, result.tension)
         errors = result.errors
         self._damping.observe(result.along, result.lengths)
-        self._retreat.observe(result.displacement - previous, interval)
+        self._retreat.observe(displacement - last, interval)
         if self._retreat.stride < 1.0:
             result.met[0] = False  # the shorter stride limits the step, not the motors
         missed = max(
@@ -152,9 +164,9 @@ class InverseController:
             names=self._names,
             options=options,
         )
-        self._displacement, self._tension, self._change = result.displacement, result.tension, result.change
+        self._displacement, self._tension, self._change = displacement, result.tension, result.change
         return Command(
-            displacement=result.displacement,
+            displacement=displacement,
             tension=result.tension,
             code=code,
             message=message,
@@ -167,7 +179,22 @@ class InverseController:
 
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
         """Return displacements (m,) on the way from `previous` (m,) to slack cables; free (m,): displacements of their paths."""
-        return within_limits(free - self.options.slack, previous, self.robot.limits, interval)
+        slack = within_limits(free - self.options.slack, previous, self.robot.limits, interval)
+        return self._possible(slack, np.zeros(len(free)))
+
+    def _possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return displacements (m,) that the motors can make, nearest for the cables with the largest tensions (m,)."""
+        return displacement if self._transmission is None else self._transmission.possible(displacement, tension)
+
+    def _least_tension(self) -> np.ndarray:
+        """Return the lower bounds (m,) of the tensions in N.
+
+        A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
+        """
+        limits, option = self.robot.limits, self.options.pretension
+        own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
+        least = np.maximum(own, limits.tension_min)
+        return np.where(self._couplings.rows.any(axis=0), 0.0, least) if len(self._couplings.rows) else least
 
     def _recovery_command(
         self,
@@ -185,7 +212,7 @@ class InverseController:
             # Back to the present shape, whichever command it belongs to: the model may be one sample behind.
             path = response.compliance_aa @ tension + response.displacement_free
             shape = np.where(tension > 0.0, path, path - self.options.slack)
-            displacement = within_limits(shape, previous, self.robot.limits, interval)
+            displacement = self._possible(within_limits(shape, previous, self.robot.limits, interval), tension)
             code, message = (
                 ControllerCode.UNREACHABLE,
                 "the model finds no equilibrium on the way to the target: the last shape is kept",
@@ -220,7 +247,9 @@ class InverseController:
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         displacement = self._paid_out(free, previous, interval)
         self.reset(displacement)
-        relaxed = bool(np.all(displacement <= free - self.options.slack + 1e-6))
+        # Antagonists cannot both be paid out: they are as slack as they can be where their motor no longer moves.
+        at_rest = bool(np.abs(displacement - previous).max(initial=0.0) < 1e-6)
+        relaxed = bool(np.all(displacement <= free - self.options.slack + 1e-6)) or (self._transmission is not None and at_rest)
         return Command(
             displacement=displacement,
             tension=np.zeros(free.size),
@@ -228,6 +257,13 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
+
+
+def _couplings(transmission: Transmission) -> Couplings:
+    """Return what the motors' transmission demands of the paths."""
+    rows, antagonists = transmission.couplings()
+    least = rows @ transmission.preload
+    return Couplings(rows, least, np.where(antagonists, NO_BOUND, least))
 
 
 def _tip(response: "Response", tension: np.ndarray) -> np.ndarray:

@@ -27,13 +27,13 @@ class StepBounds(NamedTuple):
 @njit(cache=True)
 def step_bounds(
     displacement: np.ndarray, tension: np.ndarray, path: np.ndarray, reach: float, farthest_out: float, farthest_in: float,
-    lowest: float, highest: float, change: float,
+    lowest: np.ndarray, highest: float, change: float,
 ) -> StepBounds:  # fmt: skip
     """Return the bounds of the next step.
 
     displacement (m,): last command in m; tension (m,) and path (m,): tension in N and path displacement in m of the present
-    state; reach in m and change in N: largest changes in a step; farthest_out and farthest_in in m, lowest and highest in N:
-    the limits.
+    state; reach in m and change in N: largest changes in a step; farthest_out and farthest_in in m, lowest (m,) and highest in
+    N: the limits.
     """
     held = np.minimum(np.maximum(tension, lowest), highest)
     return StepBounds(

@@ -7,10 +7,12 @@ Escande and Duriez, IEEE RA-L 2017)
     min   |M (W_ea lambda + e_free - e_target)|^2  +  c (eps lambda^T W_aa lambda  +  rho |lambda - lambda_now|_D^2)
     s.t.  tension_lower <= lambda <= tension_upper,
           displacement_lower <= W_aa lambda + delta_free <= displacement_upper,
+          n . (W_aa lambda + delta_free - s) >= 0 for antagonists on one motor, = 0 for cables that one motor pulls together,
 
-where M contains the roots of the weights, D is the diagonal of W_aa, and c = trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps
-and rho independent of the robot's size. The energy term eps selects, among tensions of equal effect, those without cables that
-work against each other. The proximal term rho makes the sequence of steps, a Gauss-Newton iteration, settle (see `damping`).
+where n and s are those of `description.transmission`, M contains the roots of the weights, D is the diagonal of W_aa, and c =
+trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps and rho independent of the robot's size. The energy term eps selects, among
+tensions of equal effect, those without cables that work against each other. The proximal term rho makes the sequence of steps, a
+Gauss-Newton iteration, settle (see `damping`).
 The part of the errors of tip and backbone along the robot counts less, because cables can only pull: they cannot undo their
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.
@@ -25,7 +27,7 @@ from numba import njit
 from gravcomp.description import Limits
 from gravcomp.inverse.limits import step_bounds
 from gravcomp.inverse.options import InverseOptions
-from gravcomp.inverse.scaling import Programme, ScaledProgramme, scaled
+from gravcomp.inverse.scaling import UNCOUPLED, Couplings, Programme, ScaledProgramme, scaled
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
@@ -43,12 +45,17 @@ def build_programme(
     interval: float,
     damping: float,
     options: InverseOptions,
+    least_tension: np.ndarray | None = None,
+    couplings: Couplings = UNCOUPLED,
 ) -> ScaledProgramme:
     """Return the programme at the present state, for the next `interval` s.
 
     tension (m,): present tensions in N, reference of the proximal term; displacement (m,): last command in m; backbone_station
-    (n,): stations of the effector's backbone rows; damping: factor of the proximal term.
+    (n,): stations of the effector's backbone rows; damping: factor of the proximal term; least_tension (m,) in N: lower bound of
+    each cable's tension, that of options and limits when not given; couplings: of cables that share motors.
     """
+    if least_tension is None:
+        least_tension = np.full(len(tension), max(options.pretension, limits.tension_min))
     return _built(
         np.ascontiguousarray(response.compliance_ea),
         response.effector_free,
@@ -60,7 +67,7 @@ def build_programme(
             limits.displacement_rate * interval,
             limits.displacement_min,
             limits.displacement_max,
-            min(max(options.pretension, limits.tension_min), limits.tension_max),
+            np.minimum(least_tension, limits.tension_max),
             limits.tension_max,
             limits.tension_rate * interval,
         ),
@@ -75,6 +82,7 @@ def build_programme(
         1.0 - math.sqrt(options.axial_weight),
         options.energy_weight,
         damping * options.proximal_weight,
+        couplings,
     )
 
 
@@ -92,7 +100,7 @@ def _built(
     change: np.ndarray, free: np.ndarray, compliance_aa: np.ndarray, displacement_free: np.ndarray, tension: np.ndarray,
     displacement: np.ndarray, limits: tuple, tip: np.ndarray, tip_weight: float, direction: np.ndarray, direction_weight: float,
     stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray, less: float, energy: float,
-    proximal: float,
+    proximal: float, couplings: Couplings,
 ) -> ScaledProgramme:  # fmt: skip
     """Compiled `build_programme`; limits: the last six arguments of `step_bounds`; `less` as in `_weighted_errors`."""
     jacobian, offset = _weighted_errors(
@@ -100,7 +108,7 @@ def _built(
     )
     hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
     bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
-    return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds))
+    return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds, couplings))
 
 
 @njit(cache=True)

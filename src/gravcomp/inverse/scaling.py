@@ -18,6 +18,18 @@ NO_BOUND = 1e20
 _QUANTUM = 2.0**-30
 
 
+class Couplings(NamedTuple):
+    """Bounds of q sums of path displacements, least <= rows . displacement <= most; rows (q, m), least and most (q,) in m."""
+
+    rows: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+
+
+UNCOUPLED = Couplings(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+"""Every cable has a motor of its own."""
+
+
 class Programme(NamedTuple):
     """min 1/2 x^T hessian x + gradient^T x  s.t.  the bounds; x (m,): tensions in N; displacement = compliance x + offset."""
 
@@ -26,6 +38,7 @@ class Programme(NamedTuple):
     compliance: np.ndarray
     offset: np.ndarray
     bounds: StepBounds
+    couplings: Couplings = UNCOUPLED
 
 
 class ScaledProgramme(NamedTuple):
@@ -51,10 +64,10 @@ class ScaledProgramme(NamedTuple):
 @njit(cache=True)
 def scaled(programme: Programme) -> ScaledProgramme:
     """Return the programme in the solver's units."""
-    hessian, gradient, compliance, offset, bounds = programme
-    m = len(gradient)
-    to_hessian, to_gradient, rows = np.empty((m, m)), np.empty(m), np.empty((m, m))
-    lower, upper, box_lower, box_upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    hessian, gradient, compliance, offset, bounds, couplings = programme
+    m, q = len(gradient), len(couplings.least)
+    to_hessian, to_gradient, rows = np.empty((m, m)), np.empty(m), np.zeros((m + q, m))
+    lower, upper, box_lower, box_upper = np.empty(m + q), np.empty(m + q), np.empty(m), np.empty(m)
     # Millimetres make the cost of order one.
     scale = 1e-3 / np.sqrt(0.5 * np.diag(hessian))
     for i in range(m):
@@ -70,6 +83,19 @@ def scaled(programme: Programme) -> ScaledProgramme:
             rows[i, k] *= row
         lower[i] = max((bounds.displacement_lower[i] - offset[i]) * row, -NO_BOUND)
         upper[i] = min((bounds.displacement_upper[i] - offset[i]) * row, NO_BOUND)
+    for c in range(q):
+        length, present = 0.0, 0.0
+        for i in range(m):
+            present += couplings.rows[c, i] * offset[i]
+            for k in range(m):
+                rows[m + c, k] += couplings.rows[c, i] * compliance[i, k] * scale[k]
+        for k in range(m):
+            length += rows[m + c, k] ** 2
+        row = 1.0 / np.sqrt(length)
+        for k in range(m):
+            rows[m + c, k] *= row
+        lower[m + c] = max((couplings.least[c] - present) * row, -NO_BOUND)
+        upper[m + c] = min((couplings.most[c] - present) * row, NO_BOUND)
     trace = hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
     return ScaledProgramme(
         to_hessian,
@@ -93,12 +119,12 @@ def unscaled(
     """Return the tensions (m,) in N within their bounds, and the unwanted tensions (m,) in N, both rounded to `_QUANTUM`.
 
     Unwanted is the distance by which the programme would go below the lower bound if cables could push, 0 where that bound is
-    not active. unknowns: m scaled tensions first; multipliers: of the m rows, then of the box.
+    not active. unknowns: m scaled tensions first; multipliers: of the rows, then of the box, which has one for each unknown.
     """
-    m = len(scale)
+    m, box = len(scale), len(multipliers) - len(unknowns)
     tension, unwanted = np.empty(m), np.empty(m)
     for i in range(m):
         tension[i] = min(max(np.rint(unknowns[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
         # The Hessian's diagonal is 1, so a multiplier is also the step beyond its bound.
-        unwanted[i] = np.rint(max(0.0, -multipliers[m + i]) * scale[i] / _QUANTUM) * _QUANTUM
+        unwanted[i] = np.rint(max(0.0, -multipliers[box + i]) * scale[i] / _QUANTUM) * _QUANTUM
     return tension, unwanted

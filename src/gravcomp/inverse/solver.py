@@ -101,10 +101,10 @@ def _with_elastic_bounds(
     box_upper: np.ndarray,
 ) -> tuple[np.ndarray, ...]:  # fmt: skip
     """Return the programme's parts with one more variable for each row, which makes the row's bounds elastic."""
-    m, free = len(rows), np.full(len(rows), NO_BOUND)
-    larger = np.zeros((2 * m, 2 * m))
-    larger[:m, :m], larger[m:, m:] = hessian, _ELASTIC_COST * np.eye(m)
+    count, m, free = len(rows), len(gradient), np.full(len(rows), NO_BOUND)
+    larger = np.zeros((m + count, m + count))
+    larger[:m, :m], larger[m:, m:] = hessian, _ELASTIC_COST * np.eye(count)
     return (
-        larger, np.append(gradient, np.zeros(m)), np.hstack([rows, np.eye(m)]), lower, upper,
+        larger, np.append(gradient, np.zeros(count)), np.hstack([rows, np.eye(count)]), lower, upper,
         np.append(box_lower, -free), np.append(box_upper, free),
     )  # fmt: skip

@@ -6,18 +6,19 @@ It takes half a minute on a new machine. During this time the motors would get o
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.description.transmission import Transmission
 from gravcomp.full_model.shape import Response
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import straight_target
 
 
-def warm_up(robot: Robot, options: InverseOptions | None = None) -> None:
+def warm_up(robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None) -> None:
     """Compile, or load from the cache, all functions that a command for the robot needs. options: default `InverseOptions()`."""
     m, stations = len(robot.cables), np.linspace(0.0, 1.0, 3)
     if not m:
         return
-    controller = InverseController(robot, options)
+    controller = InverseController(robot, options, transmission)
     points = np.linspace(0.0, robot.length, len(stations))[:, None] * [0.0, 0.0, 1.0]
     effector = np.concatenate([points[-1], [0.0, 0.0, 1.0], points.ravel()])
     # Arbitrary numbers with the types and the memory layout of a real response.

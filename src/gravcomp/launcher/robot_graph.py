@@ -18,7 +18,8 @@ LOOP = (
 class RobotGraph:
     """Nodes of one robot.
 
-    robot: name of a shipped robot or path of a robot file; interface, channel: CAN bus in place of the file's; namespace: of all
+    robot: name of a shipped robot or path of a robot file; interface, channel: CAN bus in place of the file's (with several buses
+    one channel each, separated by commas); namespace: of all
     nodes; parameters: {executable: {parameter: value}} in addition to the robot file.
     """
 
@@ -42,13 +43,26 @@ class RobotGraph:
         return NodeSpec(package, executable, given, self.namespace)
 
 
+def private_channels(robot: str) -> str:
+    """Return channels for the buses of a robot that no other run on this host uses, separated by commas. Raises ConfigError."""
+    from gravcomp.canbus.multicast import private_channel
+    from gravcomp.description import load_robot_file
+    from gravcomp.description.hardware import parse_hardware
+
+    file = load_robot_file(robot)
+    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    return ",".join(private_channel() for _ in hardware.all_buses)
+
+
 def check_robot_file(robot: str) -> None:
     """Check every section of a robot file before any process starts. Raises ConfigError."""
     from gravcomp.config import from_mapping
     from gravcomp.description import load_robot_file
     from gravcomp.description.hardware import parse_hardware
+    from gravcomp.description.pairs import check_pairs
     from gravcomp.virtual.parameters import VirtualRobotParameters
 
     file = load_robot_file(robot)
-    parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    check_pairs(hardware, file.robot, file.source)
     from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")

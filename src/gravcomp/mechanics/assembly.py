@@ -1,40 +1,67 @@
 """Internal forces, tangent stiffness and energy, summed over the quadrature points of all elements; compiled by Numba.
 
-Arguments that all functions share: u (n, 3) displacements; connectivity (k, c) nodes of the elements; gradients (k, p, 3, c)
-and weights (k, p) of `element_arrays`; law (k,) and constants (k, m) of `MaterialConstants`; moving: whether damping and creep
-act, with factor (k,) and past (k, p, 6) of `ViscousStrain`.
+Arguments that all functions share: u (n, 3) displacements; solid; moving: whether damping and creep act, with factor (k,) and
+past (k, p, 6) of `ViscousStrain`.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from gravcomp.materials import laws
+from gravcomp.materials.fibres import add_fibre_stress, fibre_energy
+from gravcomp.materials.invariants import bulk_modulus
 from gravcomp.materials.linear import add_linear_tangent
+from gravcomp.materials.volume import add_mean_volume, mean_volume_energy, volume_measure
 from gravcomp.mechanics.kinematics import deformation_gradient, green_strain, strain_matrix, strain_rate
 from gravcomp.mechanics.viscous_strain import add_viscous_stress
 from gravcomp.rounding import REORDERED
 
 
+class Solid(NamedTuple):
+    """Constant arrays of k elements with p quadrature points.
+
+    connectivity (k, c) nodes of the elements; gradients (k, p, 3, c) and weights (k, p) of `element_arrays`; law (k,) and
+    constants (k, m) of `MaterialConstants`; fibres (k, p, f, 6) of `fibre_directions`; averaged (k,): whether the element's
+    pressure follows from its mean volume, see `materials.volume`.
+    """
+
+    connectivity: np.ndarray
+    gradients: np.ndarray
+    weights: np.ndarray
+    law: np.ndarray
+    constants: np.ndarray
+    fibres: np.ndarray
+    averaged: np.ndarray
+
+
 @njit(cache=True, fastmath=REORDERED)
 def add_internal_force(
-    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, connectivity: np.ndarray, gradients: np.ndarray,
-    weights: np.ndarray, law: np.ndarray, constants: np.ndarray, force: np.ndarray,
-) -> None:  # fmt: skip
+    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, solid: Solid, force: np.ndarray
+) -> None:
     """Add the internal forces f = sum w B^T S to force (n, 3)."""
-    c = connectivity.shape[1]
+    c = solid.connectivity.shape[1]
     f = np.empty((3, 3))
     p1 = np.empty((3, 3))
     e = np.empty(6)
     s = np.empty(6)
     d = np.empty((6, 6))
+    slope = np.empty(6)
     local = np.empty((3, c))
-    for k in range(connectivity.shape[0]):
+    for k in range(solid.connectivity.shape[0]):
         local[:, :] = 0.0
-        nodes = connectivity[k]
-        for p in range(weights.shape[1]):
-            gradient = gradients[k, p]
-            _point(u, moving, factor[k], past[k, p], nodes, gradient, law[k], constants[k], f, e, s, d, False)
-            w = weights[k, p]
+        nodes = solid.connectivity[k]
+        first, shear = _viscous_constants(solid, k)
+        mean = _mean_volume(u, u, False, solid, k) if solid.averaged[k] else 0.0
+        for p in range(solid.weights.shape[1]):
+            gradient = solid.gradients[k, p]
+            deformation_gradient(u, nodes, gradient, f)
+            green_strain(f, e)
+            _stress(solid, k, p, mean, e, slope, s, d, False)
+            if moving:
+                add_viscous_stress(factor[k], past[k, p], first, shear, e, s)
+            w = solid.weights[k, p]
             for i in range(3):  # first Piola-Kirchhoff stress F S
                 p1[i, 0] = w * (f[i, 0] * s[0] + f[i, 1] * s[3] + f[i, 2] * s[5])
                 p1[i, 1] = w * (f[i, 0] * s[3] + f[i, 1] * s[1] + f[i, 2] * s[4])
@@ -48,8 +75,7 @@ def add_internal_force(
 
 @njit(cache=True, fastmath=REORDERED)
 def add_force_and_stiffness(
-    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, origin: np.ndarray, foreseen: bool,
-    connectivity: np.ndarray, gradients: np.ndarray, weights: np.ndarray, law: np.ndarray, constants: np.ndarray,
+    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, origin: np.ndarray, foreseen: bool, solid: Solid,
     force: np.ndarray, position: np.ndarray, values: np.ndarray,
 ) -> None:  # fmt: skip
     """Add internal forces to force (n, 3) and the tangent stiffness to `values` at `position` (of `scatter_positions`).
@@ -57,29 +83,40 @@ def add_force_and_stiffness(
     If `foreseen`, the geometric stiffness uses the stress that the last Newton step from `origin` (n, 3) predicted: see
     `SolidElements.assemble`.
     """
-    c = connectivity.shape[1]
+    c = solid.connectivity.shape[1]
     n = 3 * c
     f = np.empty((3, 3))
     e = np.empty(6)
     s = np.empty(6)
     d = np.zeros((6, 6))
+    slope = np.empty(6)
     b = np.empty((6, n))
     db = np.empty((6, n))
     sg = np.empty((3, c))
     local_f = np.empty(n)
     local_k = np.empty((n, n))
+    swelling = np.empty(n)
     geometric = np.empty((c, c))
-    for k in range(connectivity.shape[0]):
+    for k in range(solid.connectivity.shape[0]):
         local_f[:] = 0.0
         local_k[:, :] = 0.0
+        swelling[:] = 0.0
         geometric[:, :] = 0.0
-        nodes = connectivity[k]
-        for p in range(weights.shape[1]):
-            gradient = gradients[k, p]
-            w = weights[k, p]
-            _point(u, moving, factor[k], past[k, p], nodes, gradient, law[k], constants[k], f, e, s, d, True)
+        nodes, averaged = solid.connectivity[k], solid.averaged[k]
+        first, shear = _viscous_constants(solid, k)
+        mean = _mean_volume(u, origin, False, solid, k) if averaged else 0.0
+        foreseen_mean = _mean_volume(u, origin, True, solid, k) if averaged and foreseen else 0.0
+        volume = 0.0
+        for p in range(solid.weights.shape[1]):
+            gradient = solid.gradients[k, p]
+            w = solid.weights[k, p]
+            volume += w
+            deformation_gradient(u, nodes, gradient, f)
+            green_strain(f, e)
+            _stress(solid, k, p, mean, e, slope, s, d, True)
             if moving:
-                add_linear_tangent(constants[k, 0], constants[k, 1], factor[k], d)
+                add_viscous_stress(factor[k], past[k, p], first, shear, e, s)
+                add_linear_tangent(first, shear, factor[k], d)
             strain_matrix(f, gradient, b)
             for m in range(6):
                 ws = w * s[m]
@@ -88,12 +125,16 @@ def add_force_and_stiffness(
                 for r in range(n):
                     local_f[r] += b[m, r] * ws
                     db[m, r] = d0 * b[0, r] + d1 * b[1, r] + d2 * b[2, r] + d3 * b[3, r] + d4 * b[4, r] + d5 * b[5, r]
+                if averaged:
+                    for r in range(n):
+                        swelling[r] += w * slope[m] * b[m, r]
             for r in range(n):
                 b0, b1, b2, b3, b4, b5 = b[0, r], b[1, r], b[2, r], b[3, r], b[4, r], b[5, r]
                 for q in range(r + 1):
                     local_k[r, q] += b0 * db[0, q] + b1 * db[1, q] + b2 * db[2, q] + b3 * db[3, q] + b4 * db[4, q] + b5 * db[5, q]
             if foreseen:
-                _foreseen_stress(origin, nodes, gradient, law[k], constants[k], f, e, s, d)
+                _foreseen_strain(origin, nodes, gradient, f, e)
+                _stress(solid, k, p, foreseen_mean, e, slope, s, d, False)
             for a in range(c):
                 g0, g1, g2 = w * gradient[0, a], w * gradient[1, a], w * gradient[2, a]
                 sg[0, a] = s[0] * g0 + s[3] * g1 + s[5] * g2
@@ -103,6 +144,11 @@ def add_force_and_stiffness(
                 g0, g1, g2 = gradient[0, a], gradient[1, a], gradient[2, a]
                 for q in range(a + 1):
                     geometric[a, q] += g0 * sg[0, q] + g1 * sg[1, q] + g2 * sg[2, q]
+        if averaged:
+            bulk = bulk_modulus(solid.constants[k]) / volume
+            for r in range(n):
+                for q in range(r + 1):
+                    local_k[r, q] += bulk * swelling[r] * swelling[q]
         entry = 0
         for i in range(3):
             for a in range(c):
@@ -118,18 +164,25 @@ def add_force_and_stiffness(
 
 
 @njit(cache=True, fastmath=REORDERED)
-def total_energy(
-    u: np.ndarray, connectivity: np.ndarray, gradients: np.ndarray, weights: np.ndarray, law: np.ndarray, constants: np.ndarray
-) -> float:
+def total_energy(u: np.ndarray, solid: Solid) -> float:
     """Return the elastic energy in J."""
     total = 0.0
     f = np.empty((3, 3))
     e = np.empty(6)
-    for k in range(connectivity.shape[0]):
-        for p in range(weights.shape[1]):
-            deformation_gradient(u, connectivity[k], gradients[k, p], f)
+    slope = np.empty(6)
+    for k in range(solid.connectivity.shape[0]):
+        law, constants = solid.law[k], solid.constants[k]
+        volume, sum_of_squares = 0.0, 0.0
+        for p in range(solid.weights.shape[1]):
+            w = solid.weights[k, p]
+            deformation_gradient(u, solid.connectivity[k], solid.gradients[k, p], f)
             green_strain(f, e)
-            total += weights[k, p] * laws.energy(law[k], constants[k], e)
+            total += w * (laws.energy(law, constants, e) + fibre_energy(solid.fibres[k, p], e))
+            volume += w
+            sum_of_squares += w * volume_measure(law, e, slope) ** 2
+        if solid.averaged[k]:
+            mean = _mean_volume(u, u, False, solid, k)
+            total += mean_volume_energy(constants, volume * mean * mean, sum_of_squares)
     return total
 
 
@@ -148,24 +201,48 @@ def add_between_nodes(local: np.ndarray, position: np.ndarray, values: np.ndarra
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _point(
-    u: np.ndarray, moving: bool, factor: float, past: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, law: int,
-    constants: np.ndarray, f: np.ndarray, e: np.ndarray, s: np.ndarray, d: np.ndarray, tangent: bool,
-) -> None:  # fmt: skip
-    """Write f, e and s (with damping) at one point, and the elastic dS/dE into d if `tangent`."""
-    deformation_gradient(u, nodes, gradient, f)
-    green_strain(f, e)
-    laws.stress(law, constants, e, s, d, tangent)
-    if moving:
-        add_viscous_stress(factor, past, constants, e, s)
+def _stress(
+    solid: Solid, k: int, p: int, mean: float, e: np.ndarray, slope: np.ndarray, s: np.ndarray, d: np.ndarray, tangent: bool
+) -> None:
+    """Write the elastic stress s (6) for the strain e (6) at point p of element k, and dS/dE into d (6, 6) if `tangent`.
+
+    mean: mean of the element's volume measure, used where it is averaged; its derivative by the strain goes to slope (6).
+    """
+    laws.stress(solid.law[k], solid.constants[k], e, s, d, tangent)
+    add_fibre_stress(solid.fibres[k, p], e, s, d, tangent)
+    if solid.averaged[k]:
+        add_mean_volume(solid.law[k], solid.constants[k], e, mean, slope, s, d, tangent)
+
+
+@njit(cache=True)
+def _viscous_constants(solid: Solid, k: int) -> tuple[float, float]:
+    """Return Lame's constants of damping and creep in element k.
+
+    Where the pressure is that of the mean volume, damping and creep act on the shape alone: at single points they would lock.
+    """
+    first, shear = solid.constants[k, 0], solid.constants[k, 1]
+    return (-2.0 / 3.0 * shear if solid.averaged[k] else first), shear
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _foreseen_stress(
-    origin: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, law: int, constants: np.ndarray, f: np.ndarray, e: np.ndarray,
-    s: np.ndarray, d: np.ndarray,
-) -> None:  # fmt: skip
-    """Write the stress s (6) for the strain that is linear in the step from `origin` to the present f (3, 3)."""
+def _mean_volume(u: np.ndarray, origin: np.ndarray, foreseen: bool, solid: Solid, k: int) -> float:
+    """Return the mean of the volume measure in element k; of the foreseen strains if `foreseen`."""
+    f, e, slope = np.empty((3, 3)), np.empty(6), np.empty(6)
+    total, volume = 0.0, 0.0
+    for p in range(solid.weights.shape[1]):
+        deformation_gradient(u, solid.connectivity[k], solid.gradients[k, p], f)
+        if foreseen:
+            _foreseen_strain(origin, solid.connectivity[k], solid.gradients[k, p], f, e)
+        else:
+            green_strain(f, e)
+        total += solid.weights[k, p] * volume_measure(solid.law[k], e, slope)
+        volume += solid.weights[k, p]
+    return total / volume
+
+
+@njit(cache=True, fastmath=REORDERED)
+def _foreseen_strain(origin: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, f: np.ndarray, e: np.ndarray) -> None:
+    """Write the strain e (6) that is linear in the step from `origin` to the present f (3, 3)."""
     start = np.empty((3, 3))
     step = np.empty((3, 3))
     deformation_gradient(origin, nodes, gradient, start)
@@ -177,4 +254,3 @@ def _foreseen_stress(
     strain_rate(start, step, rate)
     for m in range(6):
         e[m] += rate[m]
-    laws.stress(law, constants, e, s, d, False)

@@ -4,8 +4,8 @@ At every quadrature point, with F = I + du/dX, E = (F^T F - I) / 2 and S the sec
 
     f = sum w B^T S,      K = sum w (B^T D B + grad N . S grad N),      D = dS/dE,   B = dE/dq.
 
-S and D come from the material's law (`materials.laws`); `assembly` sums them. Damping and creep add the stress of
-`viscous_strain`.
+S and D come from the material's law (`materials.laws`) and its fibres; `assembly` sums them. Damping and creep add the stress of
+`viscous_strain`. Quadratic tetrahedra have one pressure each (`materials.volume`).
 """
 
 import numpy as np
@@ -14,6 +14,7 @@ from gravcomp.materials.constants import MaterialConstants
 from gravcomp.mechanics import assembly, kinematics
 from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
 from gravcomp.mechanics.element_arrays import reference_geometry, scatter_positions
+from gravcomp.mechanics.fibre_directions import scaled_fibres
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import Mesh
 from gravcomp.mesh.elements import mass_quadrature, shape_values, stiffness_quadrature
@@ -22,7 +23,8 @@ from gravcomp.mesh.elements import mass_quadrature, shape_values, stiffness_quad
 class SolidElements:
     """The elements of a mesh whose nodes are in the pattern's order, the clamped ones last.
 
-    Attributes: mesh; constants; n_free: number of free nodes; gradients (k, p, 3, c) and weights (k, p) at the quadrature points.
+    Attributes: mesh; constants; n_free: number of free nodes; gradients (k, p, 3, c) and weights (k, p) at the quadrature points;
+    fibres (k, p, f, 6) of `fibre_directions`; averaged (k,): elements with one pressure, of their mean volume.
     """
 
     def __init__(self, mesh: Mesh, pattern: BlockPattern):
@@ -33,6 +35,17 @@ class SolidElements:
         rule = stiffness_quadrature(mesh.kind)
         self.gradients, self.weights = reference_geometry(mesh, rule.points, rule.weights)
         self._connectivity = mesh.elements.astype(np.int64)
+        self.fibres = scaled_fibres(mesh, rule.points)
+        self.averaged = np.full(len(mesh.elements), mesh.kind == "tet10")
+        self._solid = assembly.Solid(
+            self._connectivity,
+            self.gradients,
+            self.weights,
+            self.constants.law,
+            self.constants.values,
+            self.fibres,
+            self.averaged,
+        )
         self._position = scatter_positions(mesh.elements, pattern)
         self._elastic = ViscousStrain(np.zeros(len(self.weights)), np.zeros((*self.weights.shape, 6)))
 
@@ -40,10 +53,7 @@ class SolidElements:
         """Return internal forces (n, 3) in N at displacements `u` (n, 3), with damping and creep if a viscous strain is given."""
         force = np.zeros_like(u)
         strain = viscous or self._elastic
-        assembly.add_internal_force(
-            u, viscous is not None, strain.factor, strain.past, self._connectivity, self.gradients, self.weights,
-            self.constants.law, self.constants.values, force,
-        )  # fmt: skip
+        assembly.add_internal_force(u, viscous is not None, strain.factor, strain.past, self._solid, force)
         return force
 
     def assemble(
@@ -63,9 +73,8 @@ class SolidElements:
         force = np.zeros_like(u)
         strain = viscous or self._elastic
         assembly.add_force_and_stiffness(
-            u, viscous is not None, strain.factor, strain.past, u if origin is None else origin, origin is not None,
-            self._connectivity, self.gradients, self.weights, self.constants.law, self.constants.values, force, self._position,
-            matrix.values,
+            u, viscous is not None, strain.factor, strain.past, u if origin is None else origin, origin is not None, self._solid,
+            force, self._position, matrix.values,
         )  # fmt: skip
         return force
 
@@ -81,8 +90,7 @@ class SolidElements:
 
     def energy(self, u: np.ndarray) -> float:
         """Return the elastic energy in J."""
-        constants = self.constants
-        return assembly.total_energy(u, self._connectivity, self.gradients, self.weights, constants.law, constants.values)
+        return assembly.total_energy(u, self._solid)
 
     def nodal_mass(self) -> np.ndarray:
         """Return (n,) the integral of density times shape function in kg: the mass that gravity acts on.

@@ -1,7 +1,8 @@
 """Strain whose linear stress is that of damping and creep: C : (factor E - past), added to the elastic stress in motion.
 
-C is the stiffness of small strain; `full_model.viscosity` computes factor and past from the strains of the steps before. The
-law sees strain alone, so it does not brake a rotating body, and the tangent stays symmetric and exact.
+C is the stiffness of small strain, or its part without change of volume (see `assembly`); `full_model.viscosity` computes factor
+and past from the strains of the steps before. The law sees strain alone, so it does not brake a rotating body, and the tangent
+stays symmetric and exact.
 """
 
 import dataclasses
@@ -22,12 +23,12 @@ class ViscousStrain:
 
 
 @njit(cache=True, fastmath=REORDERED)
-def add_viscous_stress(factor: float, past: np.ndarray, constants: np.ndarray, e: np.ndarray, s: np.ndarray) -> None:
+def add_viscous_stress(factor: float, past: np.ndarray, first: float, shear: float, e: np.ndarray, s: np.ndarray) -> None:
     """Add the stress of damping and creep at one point to s (6).
 
-    past (6); e (6): Green's strain; constants as in `materials.laws`.
+    past (6); e (6): Green's strain; first, shear: Lame's constants of C in Pa.
     """
     viscous = np.empty(6)
     for m in range(6):
         viscous[m] = factor * e[m] - past[m]
-    add_linear_stress(constants[0], constants[1], viscous, s)
+    add_linear_stress(first, shear, viscous, s)

@@ -5,10 +5,10 @@ piece meets a narrow one, the narrow one's wall goes on as a level inside the wi
 """
 
 import dataclasses
+from collections.abc import Sequence
 
-from gravcomp.description import Outline
+from gravcomp.description import BlendedOutline, Outline, Piece
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.pieces import Piece
 
 _SAME = 1e-9  # m
 
@@ -20,7 +20,7 @@ class Levels:
     spans: for every piece its innermost and outermost level; the innermost is -1 for a solid piece, which reaches to the axis.
     """
 
-    curves: list[list[Outline | None]]
+    curves: Sequence[Sequence[Outline | BlendedOutline | None]]
     spans: list[tuple[int, int]]
 
     @property
@@ -56,17 +56,12 @@ def _equal_levels(pieces: list[Piece]) -> Levels:
 
 def _require_same(pieces: list[Piece], index: int, curves: list[Outline | None], plane: int, outline: Outline, what: str) -> None:
     before = curves[plane]
-    if before is not None and not _alike(before, outline):
+    if before is not None and not before.alike(outline, _SAME):
         raise MeshError(
             f"segments '{pieces[index - 1].name}' and '{pieces[index].name}' have different {what} where they meet"
             f" ({before}; {outline}): only round, concentric sections may change in a step"
         )
     curves[plane] = outline
-
-
-def _alike(one: Outline, other: Outline) -> bool:
-    pairs = zip(dataclasses.astuple(one)[1:], dataclasses.astuple(other)[1:])
-    return one.shape == other.shape and all(abs(a - b) < _SAME for a, b in pairs)
 
 
 def _round_levels(pieces: list[Piece]) -> Levels:

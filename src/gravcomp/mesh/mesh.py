@@ -5,11 +5,10 @@ import dataclasses
 import numpy as np
 
 from gravcomp.description import Material
-from gravcomp.mesh.axis import STRAIGHT, RestAxis
+from gravcomp.mesh_files import MeshError
+from gravcomp.rest_axis import STRAIGHT, RestAxis
 
-
-class MeshError(ValueError):
-    """A body that cannot be meshed, or an unusable mesh; the text says what was found and what is allowed."""
+__all__ = ["Mesh", "MeshError"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,7 +32,7 @@ class Mesh:
 
     @property
     def straight(self) -> np.ndarray:
-        """Coordinates (n, 3) of the nodes on the straightened robot: place in the section, and arc length; see `mesh.axis`."""
+        """Coordinates (n, 3) of the nodes on the straightened robot: place in the section, and arc length; see `rest_axis`."""
         return self.nodes if self.straight_nodes is None else self.straight_nodes
 
     @property

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from gravcomp.description import Outline
+from gravcomp.description import BlendedOutline, Outline
 from gravcomp.mesh.levels import Levels
 from gravcomp.mesh.mesh import MeshError
 
@@ -24,12 +24,12 @@ _BULGE = 0.35
 class SectionGrid:
     """The cells of every section, and where their nodes lie.
 
-    cells (k, 3, 3): numbers of the nodes of each cell; interval (k,): the level at its outer side; place (planes, n, 2):
+    cells (k, 3, 3): numbers of the nodes of each cell; present (pieces, k): whether a piece has the cell; place (planes, n, 2):
     where the nodes lie in each plane between the pieces, in m, NaN where no piece reaches.
     """
 
     cells: np.ndarray
-    interval: np.ndarray
+    present: np.ndarray
     place: np.ndarray
 
 
@@ -42,7 +42,7 @@ def section_grid(levels: Levels, around: int, radial: int, equal_stiffness: bool
     Raises MeshError where `around` is no multiple of 4 and has to be.
     """
     curves = [outline for row in levels.curves for outline in row if outline is not None]
-    cornered = levels.solid or any(outline.shape == "rectangle" for outline in curves)
+    cornered = levels.solid or any(outline.shape != "ellipse" for outline in curves)
     if cornered and around % 4:
         nearest = 4 * max(1, round(around / 4))
         raise MeshError(
@@ -63,18 +63,24 @@ def section_grid(levels: Levels, around: int, radial: int, equal_stiffness: bool
     cells = (2 * ring[:, None, None] + a) * 2 * around + (2 * sector[:, None, None] + b) % (2 * around)
     place = half.reshape(len(half), -1, 2)
     if not levels.solid:
-        return SectionGrid(cells, interval[ring], place)
-    core_cells, core_place = _core(around // 4, half[:, 0], place.shape[1])
+        return SectionGrid(cells, _present(levels, interval[ring]), place)
+    inner_cells, inner_place = core_cells(around // 4, half[:, 0], place.shape[1])
     return SectionGrid(
-        np.concatenate([cells, core_cells]),
-        np.concatenate([interval[ring], np.zeros(len(core_cells), dtype=interval.dtype)]),
-        np.concatenate([place, core_place], axis=1),
+        np.concatenate([cells, inner_cells]),
+        _present(levels, np.concatenate([interval[ring], np.zeros(len(inner_cells), dtype=interval.dtype)])),
+        np.concatenate([place, inner_place], axis=1),
     )
 
 
-def _stood_out(outline: Outline, around: int) -> Outline:
+def _present(levels: Levels, interval: np.ndarray) -> np.ndarray:
+    """(pieces, k): which cells each piece has, from the level (k,) at the outer side of each."""
+    low, high = np.array(levels.spans).T[:, :, None]
+    return (interval > low) & (interval <= high)
+
+
+def _stood_out(outline: Outline | BlendedOutline, around: int) -> Outline | BlendedOutline:
     """An ellipse so much larger that its facets enclose the second moment of area of the ellipse."""
-    if outline.shape != "ellipse":
+    if not isinstance(outline, Outline) or outline.shape != "ellipse":
         return outline
     h = math.pi / around
     t, weight = np.polynomial.legendre.leggauss(8)
@@ -114,7 +120,7 @@ def _shares(levels: Levels, level: int, plane: int, radial: int) -> np.ndarray:
     return (ratio**even - 1.0) / (ratio - 1.0)
 
 
-def _core_boundary(outline: Outline, angle: np.ndarray, across: int, radial: int) -> np.ndarray:
+def _core_boundary(outline: Outline | BlendedOutline, angle: np.ndarray, across: int, radial: int) -> np.ndarray:
     """Return the sides (angles, 2) of the core, inside the innermost level; its cells are about as wide as those around it."""
     part = across / (across + radial)
     middle = np.array([outline.x, outline.y])
@@ -124,8 +130,8 @@ def _core_boundary(outline: Outline, angle: np.ndarray, across: int, radial: int
     return middle + part * ((1.0 - _BULGE) * square + _BULGE * curve)
 
 
-def _core(across: int, side: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cells (c c, 3, 3) of the core, and the places (planes, m, 2) of its inner nodes, which are numbered from `first`.
+def core_cells(across: int, side: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells (c c, 3, 3) of a core, and the places (planes, m, 2) of its inner nodes, which are numbered from `first`.
 
     side (planes, 8 c, 2): the nodes on its sides, from the corner (1, 1) counterclockwise.
     """

@@ -4,15 +4,18 @@ For a height Z of the straight body, points of the section there are fitted by x
 every point weighted by its share of the area). p is where the axis has gone, f_1 and f_2 are where the section's x and y
 have gone; the axis' direction is d = f_1 x f_2 / |f_1 x f_2|. p, f_1 and f_2 are weighted sums of node positions.
 
+A body that ends in a rounding has no section at its tip: there points of its last elements are fitted, along Z too.
+
 On a body whose axis is bent at rest, Z is the arc length along the axis, and the section is perpendicular to it there.
 """
 
 import numpy as np
 
-from gravcomp.mesh.elements import shape_gradients, shape_values
+from gravcomp.mesh.elements import is_hexahedron, shape_gradients, shape_values
 from gravcomp.mesh.embedding import locate
 from gravcomp.mesh.local_coordinates import local_coordinates_from
 from gravcomp.mesh.mesh import Mesh, MeshError
+from gravcomp.mesh.tet_sections import near_tip, on_plane
 
 _RINGS, _SPOKES = 9, 18
 
@@ -24,18 +27,38 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
     """
     rows = np.zeros((3 * len(heights), len(mesh.nodes)))
     layered = _layered(mesh)
+    rounded = not _ends_flat(mesh)
     for index, height in enumerate(heights):
-        plane, area, nodes, weights = _in_layer(mesh, height) if layered else _on_rings(mesh, height)
-        design = np.column_stack([np.ones(len(plane)), plane])
+        if rounded and height > (1.0 - 1e-9) * mesh.length:
+            places, area, nodes, weights = near_tip(mesh)
+            design = np.column_stack([np.ones(len(places)), places])
+        else:
+            plane, area, nodes, weights = _in_section(mesh, height, layered)
+            design = np.column_stack([np.ones(len(plane)), plane])
         normal = design.T @ (area[:, None] * design)
         scale = np.sqrt(np.diag(normal))
-        if len(plane) < 6 or not scale.all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e6:
+        if len(design) < 6 or not scale.all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e6:
             raise MeshError(f"the body has no cross-section at z = {height * 1e3:g} mm to fix the backbone to")
         fit = np.linalg.solve(normal, design.T * area)
         for row in range(3):
             np.add.at(rows[3 * index + row], nodes, fit[row][:, None] * weights)
     rows[np.abs(rows) < 1e-9 * np.abs(rows).max(axis=1, keepdims=True)] = 0.0
     return rows
+
+
+def _ends_flat(mesh: Mesh) -> bool:
+    """Whether the nodes at the tip span a face across the axis; that of a bent body from a file is so only nearly."""
+    if mesh.axis.bent and not is_hexahedron(mesh.kind):
+        return False
+    tip = mesh.nodes[mesh.tip]
+    return len(tip) >= 3 and bool(np.linalg.svd(tip - tip.mean(axis=0), compute_uv=False)[1] > 1e-3 * mesh.length)
+
+
+def _in_section(mesh: Mesh, height: float, layered: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points of the section: places (q, 2), areas (q,), nodes and weights (q, c) of each."""
+    if layered:
+        return _in_layer(mesh, height)
+    return _on_rings(mesh, height) if is_hexahedron(mesh.kind) else on_plane(mesh, height)
 
 
 def _layered(mesh: Mesh) -> bool:

@@ -1,6 +1,6 @@
 """Meshes of a row of segments, built from their dimensions: graded toward the clamp, whose corner is singular.
 
-A division of the cross-section (`section_grid`) is swept along the axis in layers (`layers`). Its cells become 20-node
+A division of the cross-section (`section_division`) is swept along the axis in layers (`layers`). Its cells become 20-node
 hexahedra, or six tetrahedra each (Kuhn's division). The robot is meshed straight and then laid along its axis at rest.
 """
 
@@ -11,11 +11,10 @@ import numpy as np
 from gravcomp.description import Elements, Robot
 from gravcomp.mesh.elements import is_hexahedron, reference_nodes
 from gravcomp.mesh.layers import layers_of
-from gravcomp.mesh.levels import levels_of
 from gravcomp.mesh.mesh import Mesh
 from gravcomp.mesh.pieces import pieces_of, rest_axis
 from gravcomp.mesh.quadratic import TET_EDGES
-from gravcomp.mesh.section_grid import section_grid
+from gravcomp.mesh.section_division import divided_sections
 
 
 def tube_mesh(
@@ -27,8 +26,7 @@ def tube_mesh(
     """
     elements = robot.elements or coarse_elements(robot)
     pieces = pieces_of(robot)
-    levels = levels_of(pieces)
-    grid = section_grid(levels, around or elements.around, radial or elements.radial, elements.equal_stiffness)
+    grid = divided_sections(pieces, around or elements.around, radial or elements.radial, elements.equal_stiffness)
     heights, piece_of_layer = layers_of(pieces, along or elements.along, elements.grading)
 
     numbers, region = [], []
@@ -37,8 +35,7 @@ def tube_mesh(
     levels_high = 2 * len(heights) - 1
     for pattern in patterns:
         for layer, piece in enumerate(piece_of_layer):
-            low, high = levels.spans[piece]
-            cells = grid.cells[(grid.interval > low) & (grid.interval <= high)]
+            cells = grid.cells[grid.present[piece]]
             planar = cells[:, pattern[:, 0], pattern[:, 1]]
             numbers.append(planar * levels_high + 2 * layer + pattern[:, 2])
             region.append(np.full(len(planar), piece))
@@ -67,7 +64,8 @@ def tube_mesh(
 def coarse_elements(robot: Robot) -> Elements:
     """Return numbers of elements that every robot of segments can be meshed with."""
     pieces = pieces_of(robot)
-    cornered = any(piece.inner is None or piece.outer[0].shape == "rectangle" for piece in pieces)
+    several = any(len(piece.lumens) > 1 for piece in pieces)
+    cornered = not several and any(not piece.lumens or piece.outer[0].shape == "rectangle" for piece in pieces)
     parts = sum(len(piece.marks) + 1 for piece in pieces)
     return Elements(around=8 if cornered else 6, along=max(10, parts))
 

@@ -6,12 +6,13 @@ returns the frames to send. The table of states and causes is in gravcomp_hw/REA
     INACTIVE --activate--> FAULT (waiting for feedback) --all motors answer--> HOLDING, HOMING or STOPPED (by `zero`)
     HOLDING --good commands--> ACTIVE --stale or refused command, stale IMU--> HOLDING
     any --bus, feedback--> FAULT --they are back--> as after activation
+    ACTIVE --one of several buses--> HOLDING (the other buses' cables) --it is back--> as after activation
     any --stall, runaway, encoder, wrong id, uncertain turns--> FAULT (latched) --resume, home--> HOLDING, HOMING
     any --stop--> STOPPED;  --release--> cables paid out, then STOPPED;  --home--> HOMING --> HOLDING
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import can
 
@@ -21,7 +22,7 @@ from gravcomp.motors.cable_loops import CableLoops
 from gravcomp.motors.command_check import CommandCheck
 from gravcomp.motors.fault_watch import FaultWatch
 from gravcomp.motors.homing import HomingProcedure, Phase
-from gravcomp.motors.output import CurrentOutput
+from gravcomp.motors.output import BusOutputs
 from gravcomp.motors.rotors import Rotors
 from gravcomp.motors.state import DRIVING, CableSnapshot, State, ZeroRecord
 
@@ -34,6 +35,10 @@ GOOD_COMMANDS = 3
 _RECOVERY_TIME = 0.2  # s of complete feedback after which a fault of bus or feedback is over
 _LONGEST_STEP = 0.02  # s; after a longer pause the loops continue as if only this time had passed
 _LONGEST_PAUSE = 0.1  # s between two ticks. The guard zeroes the currents then, and the cables may have moved
+_SHARED = (
+    "no homing: motors that move several cables cannot find a zero position by tightening; hold the robot straight with all its"
+    " cables just taut and start with zero: start"
+)
 _RECOVERY = "; call ~/resume or ~/home to continue"
 
 
@@ -53,12 +58,16 @@ class Bridge:
         self.refused_commands = 0
         self.report = ""
         self._hardware, self._zero_policy, self._require_imu = hardware, zero, require_imu
-        self._index = {motor.can_id: i for i, motor in enumerate(hardware.motors)}
+        self._transmission = hardware.transmission
+        self._bus_index = {bus.name: index for index, bus in enumerate(hardware.all_buses)}
+        self._index = {(hardware.bus_index(motor), motor.can_id): i for i, motor in enumerate(hardware.motors)}
         self._rotors = Rotors(hardware)
         self._faults = FaultWatch(hardware, self._rotors)
         self._check = CommandCheck(hardware)
         self._loops = CableLoops(hardware, self._rotors, self._faults)
-        self._output = CurrentOutput([m.can_id for m in hardware.motors], hardware.drive.current_limit)
+        self._output = BusOutputs(hardware)
+        self._down: frozenset[int] = frozenset()  # indices of the buses that are closed
+        self._lost: list[int] = []  # motors without a bus, while the others hold
         self._stamp: object | None = None
         self._command_time = self._imu_time = -math.inf
         self._good_commands = 0
@@ -100,7 +109,7 @@ class Bridge:
         """Leave STOPPED or a latched FAULT; hold the cables where they are now."""
         if self.state not in (State.STOPPED, State.FAULT):
             return self.state in DRIVING, f"nothing to resume: the state is {self.state.name}"
-        missing = self._faults.missing_feedback(now)
+        missing = self._missing(now)
         if missing:
             return False, f"cannot resume: {missing}"
         self._clear_faults()
@@ -110,7 +119,7 @@ class Bridge:
 
     def release(self, now: float) -> tuple[bool, str]:
         """Pay all cables out to `displacement_min`, then stop. Stop immediately when the zero position is unknown."""
-        if self.state not in DRIVING or not self._rotors.zeros.known:
+        if self.state not in DRIVING or not self._rotors.zeros.known or self._lost:
             done, _ = self.stop("release requested")
             return done, "no current; the cables were not paid out because the motors were not driving or have no zero"
         self._enter(State.HOLDING, "paying the cables out")
@@ -124,7 +133,9 @@ class Bridge:
             return False, "not active: activate the bridge first"
         if self.state is State.HOMING:
             return False, "homing is already running"
-        missing = self._faults.missing_feedback(now)
+        if not self._homable:
+            return False, _SHARED
+        missing = self._missing(now)
         if missing:
             return False, f"cannot home: {missing}"
         self._clear_faults()
@@ -143,15 +154,24 @@ class Bridge:
         except codec.FrameError:
             self.rejected_frames += 1
             return
-        index = self._index.get(motor_id)
+        bus = self._bus_of(message)
+        index = self._index.get((bus, motor_id))
         if index is None:
-            self._faults.on_unknown_id(motor_id, now)
+            self._faults.on_unknown_id(bus, motor_id, now)
         elif not self._rotors.on_feedback(index, feedback.angle, feedback.speed, feedback.current, now):
             self.rejected_frames += 1
 
     def on_imu_sample(self, now: float) -> None:
         """Take note of a valid IMU sample."""
         self._imu_time = now
+
+    def on_board_frame(self, message: can.Message, now: float) -> bool:
+        """Return whether a frame of the IMU board came on the board's bus; else it is counted as a sign of swapped buses."""
+        bus = self._bus_of(message)
+        if bus == self._bus_index[self._hardware.board_bus.name]:
+            return True
+        self._faults.on_board_elsewhere(bus, now)
+        return False
 
     def imu_lost(self, why: str) -> None:
         """Hold immediately: IMU samples come, but they are not valid."""
@@ -163,6 +183,12 @@ class Bridge:
         """Enter FAULT: the bus is lost. The fault ends when all motors answer again."""
         if self.state in DRIVING:
             self._fault(f"CAN bus lost: {why}", latched=False)
+
+    def buses_down(self, lost: Mapping[str, str]) -> None:
+        """Take the buses that are closed, with the reasons. All are a fault; without some, the cables of the others hold."""
+        self._down = frozenset(self._bus_index[name] for name in lost)
+        if len(self._down) == len(self._bus_index):
+            self.bus_lost("; ".join(lost.values()))
 
     def command(
         self,
@@ -178,7 +204,7 @@ class Bridge:
         `age` (s) is that of the IMU sample from which the command was computed; `stamp` appears in the snapshot. Return
         None when the command is followed, else the reason why it is refused.
         """
-        if self.state not in (State.ACTIVE, State.HOLDING) or self._releasing:
+        if self.state not in (State.ACTIVE, State.HOLDING) or self._releasing or self._lost:
             return f"not following commands: {self.message}"
         reason = self._check.objection(displacement, tension, now, age)
         if reason is None and self._imu_is_stale(now):
@@ -191,7 +217,7 @@ class Bridge:
             else:
                 self.message = f"command refused: {reason}"
             return reason
-        self._loops.follow(displacement, tension)
+        self._loops.follow(self._transmission.motors(displacement), self._transmission.forces(tension) if len(tension) else [])
         # Time of the IMU sample: commands that still wait in queues after a node has died do not keep the bridge active.
         self._command_time, self._stamp = now - max(age, 0.0), stamp
         self._good_commands += 1
@@ -226,14 +252,15 @@ class Bridge:
 
     def snapshot(self) -> CableSnapshot:
         """Return the state of the bridge and the measured state of the cables."""
+        cables, current = self._transmission, self._rotors.current()
         return CableSnapshot(
             state=self.state,
             message=self.message,
-            command=list(self._loops.target),
-            displacement=self._rotors.displacement(),
-            velocity=self._rotors.velocity(),
-            current=self._rotors.current(),
-            tension=self._rotors.tension(),
+            command=cables.cables(self._loops.target),
+            displacement=cables.cables(self._rotors.displacement()),
+            velocity=cables.velocities(self._rotors.velocity()),
+            current=[current[motor] for motor in cables.first_motor],
+            tension=cables.tensions(self._rotors.force()),
             stamp=self._stamp if self.state is State.ACTIVE else None,
         )
 
@@ -249,7 +276,7 @@ class Bridge:
             self._homing = None
         if state is not State.ACTIVE:
             self._good_commands = 0
-        self._releasing = False
+        self._releasing, self._lost = False, []
         self.state, self.message = state, message
 
     def _fault(self, message: str, *, latched: bool) -> None:
@@ -266,9 +293,15 @@ class Bridge:
     def _watch(self, now: float) -> None:
         """Check in this order: turns, feedback, unknown ids, encoders, age of command and IMU sample."""
         self._watch_turns()
-        missing = self._faults.missing_feedback(now)
-        if self.state in DRIVING and missing:
+        silent = self._faults.silent(now, self._down)
+        missing = self._faults.missing(silent)
+        lost = self._faults.lost_buses(silent)
+        if self.state in (State.ACTIVE, State.HOLDING) and lost:
+            self._hold_without(lost, silent)
+        elif self.state in DRIVING and missing:
             self._fault(missing, latched=False)
+        elif self._lost:
+            self._await_buses(now)
         if self.state is State.FAULT and not self._latched:
             self._await_feedback(missing, now)
         if self.state not in DRIVING:
@@ -284,6 +317,21 @@ class Bridge:
             elif self._imu_is_stale(now):
                 self._hold(f"no IMU sample for {1e3 * watchdog.imu_timeout:.0f} ms")
 
+    def _hold_without(self, buses: Sequence[str], motors: list[int]) -> None:
+        """Hold the cables of the other buses while `buses` are lost; `motors` (indices) have no current."""
+        if motors != self._lost:
+            names = ", ".join(f"'{name}'" for name in buses)
+            self._hold(f"CAN bus {names} lost: the cables on the other buses hold")
+            self._lost = motors
+        self._complete_since = None
+
+    def _await_buses(self, now: float) -> None:
+        """Continue as after activation when the lost buses have answered for a while."""
+        self._complete_since = now if self._complete_since is None else self._complete_since
+        if now - self._complete_since >= _RECOVERY_TIME:
+            self._clear_faults()
+            self._begin(now)
+
     def _watch_turns(self) -> None:
         """Do not drive with an uncertain number of turns until the user has decided or homing has found the zero position."""
         if self._turns_reported or self.state is State.HOMING:
@@ -294,9 +342,10 @@ class Bridge:
             self._turns_reported = True
 
     def _await_feedback(self, missing: str | None, now: float) -> None:
-        if missing:
+        swapped = self._faults.unknown_id() if len(self._bus_index) > 1 else None
+        if missing or swapped:
             self._complete_since = None
-            self.message = missing
+            self.message = swapped or missing or ""
             return
         self._complete_since = now if self._complete_since is None else self._complete_since
         if now - self._complete_since >= _RECOVERY_TIME:
@@ -309,6 +358,9 @@ class Bridge:
             if self._zero_policy == "home":
                 self._enter(State.STOPPED, "not homed: call ~/home to find the zero of the cables")
                 return
+            if self._zero_policy == "home_at_start" and not self._homable:
+                self._enter(State.STOPPED, _SHARED)
+                return
             if self._zero_policy == "home_at_start":
                 self._start_homing(now)
                 return
@@ -320,7 +372,11 @@ class Bridge:
         self._rotors.zeros.begin_homing(self._rotors.counts())
         self._loops.reset()
         self._homing = HomingProcedure(
-            self._hardware.homing, self._hardware.drive, self._hardware.cables, self._rotors.displacement(), now
+            self._hardware.homing,
+            self._hardware.drive,
+            tuple(motor.cable for motor in self._hardware.motors),
+            self._rotors.displacement(),
+            now,
         )
         self._loops.expect_no_tension()
         self._enter(State.HOMING, self._homing.progress)
@@ -340,6 +396,17 @@ class Bridge:
         self._latched = self._turns_reported = False
         self._faults.clear()
 
+    @property
+    def _homable(self) -> bool:
+        """Whether each motor has a cable of its own, which becomes taut when the motor winds it in."""
+        return all(len(motor.ratios) == 1 and not motor.differential for motor in self._hardware.motors)
+
+    def _missing(self, now: float) -> str | None:
+        return self._faults.missing(self._faults.silent(now, self._down))
+
+    def _bus_of(self, message: can.Message) -> int:
+        return self._bus_index.get(str(message.channel), 0)
+
     def _imu_is_stale(self, now: float) -> bool:
         return self._require_imu and now - self._imu_time > self._hardware.watchdog.imu_timeout
 
@@ -356,7 +423,7 @@ class Bridge:
             self.message = self._homing.progress
             fault = self._loops.step(dt, targets, self._hardware.homing.velocity)
         else:
-            fault = self._loops.step(dt)
+            fault = self._loops.step(dt, without=self._lost)
         if fault:
             self._fault(fault, latched=True)
         elif self._releasing and self._loops.arrived:

@@ -1,6 +1,6 @@
-"""Position loops of all cables: from targets and expected tensions to motor currents."""
+"""Position loops of all motors: from targets and expected forces at the capstans to motor currents."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from gravcomp.description.hardware import Hardware
 from gravcomp.motors.fault_watch import FaultWatch
@@ -9,15 +9,16 @@ from gravcomp.motors.rotors import Rotors
 
 
 class CableLoops:
-    """The loops of the cables of `hardware`, with the measured state from `rotors`.
+    """The loops of the motors of `hardware`, with the measured state from `rotors`.
 
-    Attributes: target (m), currents (A, in the motors' own direction); one entry per cable.
+    Attributes: target (m, at the capstan), currents (A, in the motors' own direction); one entry per motor.
     """
 
     def __init__(self, hardware: Hardware, rotors: Rotors, faults: FaultWatch):
         self._hardware, self._rotors, self._faults = hardware, rotors, faults
         n = len(hardware.motors)
-        self._loops = [PositionLoop(hardware.drive) for _ in range(n)]
+        self._pays_out = hardware.transmission.pays_out
+        self._loops = [PositionLoop(hardware.drive, two_way=not alone) for alone in self._pays_out]
         self._tension = [0.0] * n
         self.target, self.currents = [0.0] * n, [0.0] * n
 
@@ -33,7 +34,7 @@ class CableLoops:
         self._faults.reset_monitors()
 
     def follow(self, displacement: Sequence[float], tension: Sequence[float]) -> None:
-        """Set targets (m), clamped to the displacement limits, and expected tensions (N; none: 0)."""
+        """Set targets (m), clamped to the displacement limits, and expected forces (N; none: 0)."""
         drive = self._hardware.drive
         self.target = [min(max(x, drive.displacement_min), drive.displacement_max) for x in displacement]
         self._tension = list(tension) or [0.0] * len(self.target)
@@ -43,8 +44,9 @@ class CableLoops:
         self.target = [loop.setpoint for loop in self._loops]
 
     def pay_out(self) -> None:
-        """Move all cables to `displacement_min`."""
-        self.follow([self._hardware.drive.displacement_min] * len(self.target), [])
+        """Move all cables to `displacement_min`; motors with antagonists go to zero, where no cable is pulled in."""
+        farthest = self._hardware.drive.displacement_min
+        self.follow([farthest if alone else 0.0 for alone in self._pays_out], [])
 
     def expect_no_tension(self) -> None:
         """Set the expected tensions to 0."""
@@ -54,14 +56,24 @@ class CableLoops:
         """Set all currents to zero."""
         self.currents = [0.0] * len(self.currents)
 
-    def step(self, dt: float, targets: Sequence[float] | None = None, velocity_limit: float | None = None) -> str | None:
+    def step(
+        self,
+        dt: float,
+        targets: Sequence[float] | None = None,
+        velocity_limit: float | None = None,
+        without: Collection[int] = (),
+    ) -> str | None:
         """Compute the currents of one control period of `dt` s. Return the fault of a motor, or None.
 
-        `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing.
+        `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing. Motors `without` a bus
+        get zero current.
         """
         targets = self.target if targets is None else targets
         displacement, velocity = self._rotors.displacement(), self._rotors.velocity()
         for i, loop in enumerate(self._loops):
+            if i in without:
+                self.currents[i] = 0.0
+                continue
             current = loop.step(targets[i], self._tension[i], displacement[i], velocity[i], dt, velocity_limit)
             fault = self._faults.motor_fault(i, current, velocity[i], loop.setpoint - displacement[i])
             if fault:

@@ -13,25 +13,35 @@ class CommandCheck:
     """Checks commands one after another; remembers the last one to find jumps."""
 
     def __init__(self, hardware: Hardware):
-        self._motors, self._drive, self._watchdog = hardware.motors, hardware.drive, hardware.watchdog
+        self._cables, self._transmission = hardware.cables, hardware.transmission
+        self._labels = hardware.cables if self._transmission.direct else tuple(motor.label for motor in hardware.motors)
+        self._drive, self._watchdog = hardware.drive, hardware.watchdog
         self._last: list[float] | None = None
         self._last_time = -math.inf
 
     def objection(self, displacement: Sequence[float], tension: Sequence[float], now: float, age: float) -> str | None:
         """Return why the command must not be followed, or None.
 
-        Checked in this order: number of values, finite values, displacement limits, age of the IMU sample, jump.
+        Checked in this order: number of values, finite values, displacements that shared motors can make, displacement
+        limits of the drive, age of the IMU sample, jump.
         `displacement` in m, `tension` in N (may be empty), `now` and `age` in s.
         """
-        n, watchdog = len(self._motors), self._watchdog
+        n, watchdog = len(self._cables), self._watchdog
         if len(displacement) != n or len(tension) not in (0, n):
             return f"{len(displacement)} displacements and {len(tension)} tensions for {n} cables"
         if not all(map(math.isfinite, displacement)) or not all(map(math.isfinite, tension)):
             return "it contains a value that is not a number"
         low, high = self._drive.displacement_min, self._drive.displacement_max
-        for motor, x in zip(self._motors, displacement):
+        turned = self._transmission.motors(displacement)
+        for name, wanted, possible in zip(self._cables, displacement, self._transmission.cables(turned)):
+            if abs(wanted - possible) > _MARGIN:
+                return (
+                    f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm"
+                    " is possible"
+                )
+        for label, x in zip(self._labels, turned):
             if not low - _MARGIN <= x <= high + _MARGIN:
-                return f"{motor.cable} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
+                return f"{label} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
         if not _LEAST_AGE <= age <= watchdog.command_timeout:
             return f"its IMU sample is older than {1e3 * watchdog.command_timeout:.0f} ms or in the future"
         last, last_time = self._last, self._last_time

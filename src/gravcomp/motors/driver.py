@@ -1,4 +1,4 @@
-"""The thread that runs the bridge: it receives, controls at a fixed rate and sends, independently of the rest of the process.
+"""The thread that runs the bridge on its buses: it receives, controls and sends, independently of the rest of the process.
 
     bus --frames--> Bridge (states, loops) --currents--> bus          every control period
         --frames--> ImuStream --samples--> queue                      as they come
@@ -20,13 +20,14 @@ from collections.abc import Callable, Sequence
 import can
 
 from gravcomp.canbus import c610, codec
+from gravcomp.canbus.buses import CanBuses
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
-from gravcomp.canbus.link import CanLink, lateness
+from gravcomp.canbus.link import lateness
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import MOTOR_IDS, Hardware
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.guard_client import GuardClient
-from gravcomp.motors.state import CableSnapshot, State, ZeroRecord
+from gravcomp.motors.state import CableSnapshot, State, ZeroRecord, record_key, record_of_bus
 
 RECEIVED_FRAMES = [c610.feedback_id(i) for i in MOTOR_IDS] + list(IMU_FRAMES)
 """Ids of the frames that the bridge uses."""
@@ -58,16 +59,16 @@ class DriverOptions:
 
 
 class BridgeDriver:
-    """Runs a Bridge on its bus.
+    """Runs a Bridge on its buses, with one guard process a bus.
 
     Attributes: bridge; imu (ImuStream); link; queue of ImuSample and CableSnapshot (None at the end); overruns (control periods
     that were late by more than one period); delay (s, from IMU sample to current frame, of the last command followed).
     """
 
-    def __init__(self, hardware: Hardware, options: DriverOptions = DriverOptions(), *, link: CanLink | None = None):
+    def __init__(self, hardware: Hardware, options: DriverOptions = DriverOptions(), *, link: CanBuses | None = None):
         self.bridge = Bridge(hardware, zero=options.zero, require_imu=options.require_imu)
         self.imu = ImuStream()
-        self.link = link or CanLink(hardware.can, RECEIVED_FRAMES)
+        self.link = link or CanBuses(hardware.all_buses, hardware.board_bus.name, RECEIVED_FRAMES)
         self.queue: queue.SimpleQueue[ImuSample | CableSnapshot | None] = queue.SimpleQueue()
         self.overruns = 0
         self.delay = 0.0
@@ -75,7 +76,7 @@ class BridgeDriver:
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
-        self._guard: GuardClient | None = None
+        self._guards: dict[int, GuardClient] = {}  # by the index of the bus
         self._samples: collections.OrderedDict[int, ImuSample] = collections.OrderedDict()
         self._heater = (0.0, -float("inf"))
         self._heater_sequence = 0
@@ -95,11 +96,14 @@ class BridgeDriver:
 
     def activate(self) -> None:
         """Start to drive the motors. Raises GuardError when there is no guard process, or another bridge drives this bus."""
-        if self._options.guard and self._guard is None:
-            self._guard = GuardClient.connect(self._hardware)
-            if self._guard.record:
+        for bus in range(len(self._hardware.all_buses)) if self._options.guard else ():
+            if bus in self._guards:
+                continue
+            guard = self._guards[bus] = GuardClient.connect(self._hardware, bus=bus)
+            if guard.record:
+                record = {record_key(bus, can_id): rotor for can_id, rotor in guard.record.items()}
                 with self._lock:
-                    self.bridge.restore(self._guard.record)
+                    self.bridge.restore(record)
         with self._lock:
             self.bridge.activate(time.monotonic())
 
@@ -119,9 +123,9 @@ class BridgeDriver:
             if self.link.is_open:
                 self._send_zeros()
             self.bridge.unconfigure()
-        if self._guard is not None:
-            self._guard.close()
-            self._guard = None
+        for guard in self._guards.values():
+            guard.close()
+        self._guards.clear()
         self.link.close()
         self.queue.put(None)
 
@@ -181,8 +185,7 @@ class BridgeDriver:
         with self._lock:
             now = time.monotonic()
             self._take(frames, now)
-            if not self.link.is_open:
-                self.bridge.bus_lost(self.link.status)
+            self.bridge.buses_down(self.link.lost)
             if now >= self._next_tick + (-near if frames else near):
                 self.link.send(self.bridge.tick(now))
                 self.overruns += now > self._next_tick + 2 * period
@@ -208,6 +211,8 @@ class BridgeDriver:
             if frame.arbitration_id not in IMU_FRAMES:
                 self.bridge.on_frame(frame, now - late)
                 continue
+            if not self.bridge.on_board_frame(frame, now - late):
+                continue
             received = wall - late
             sample = self.imu.on_frame(frame, received)
             if sample is not None:
@@ -229,19 +234,21 @@ class BridgeDriver:
         self.queue.put(entry)
 
     def _beat(self, record: ZeroRecord | None) -> None:
-        if self._guard is not None and not self._guard.beat(record):
-            self._guard = None
-            threading.Thread(target=self._new_guard, args=[record], name="guard", daemon=True).start()
+        for bus, guard in list(self._guards.items()):
+            own = record_of_bus(record, bus)
+            if not guard.beat(own):
+                del self._guards[bus]
+                threading.Thread(target=self._new_guard, args=[bus, own], name="guard", daemon=True).start()
 
-    def _new_guard(self, record: ZeroRecord | None) -> None:
-        """Start another guard after the last one died; stop the motors when that fails."""
+    def _new_guard(self, bus: int, record: ZeroRecord | None) -> None:
+        """Start another guard of a bus after the last one died; stop the motors when that fails."""
         try:
-            guard = GuardClient.connect(self._hardware, record)
+            guard = GuardClient.connect(self._hardware, record, bus)
         except Exception as error:
             why = f"the guard is gone: {error}"
             self.request(lambda bridge, now: bridge.stop(why))
             return
-        self._guard = guard
+        self._guards[bus] = guard
         if self._ending.is_set():
             guard.close()
 

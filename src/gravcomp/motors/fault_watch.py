@@ -1,5 +1,7 @@
 """Detection of faults in feedback, encoders and motors. It reports what is wrong; the bridge changes its state."""
 
+from collections.abc import Collection, Sequence
+
 from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
 from gravcomp.motors.encoder import JUMPS
 from gravcomp.motors.monitor import MotorMonitor
@@ -14,12 +16,16 @@ class FaultWatch:
 
     def __init__(self, hardware: Hardware, rotors: Rotors):
         self._rotors, self._drive, self._watchdog = rotors, hardware.drive, hardware.watchdog
+        self._hardware = hardware
+        self._bus = [hardware.bus_index(motor) for motor in hardware.motors]
         self._monitors = [MotorMonitor(hardware.drive, hardware.watchdog) for _ in hardware.motors]
-        self._unknown_ids: dict[int, tuple[int, float]] = {}  # id -> frames in a row, time of the last
+        self._unknown_ids: dict[tuple[int, int], tuple[int, float]] = {}  # bus and id -> frames in a row, time of the last
+        self._board_elsewhere: dict[int, tuple[int, float]] = {}  # the same for the IMU board on a bus that is not its own
 
     def clear(self) -> None:
         """Forget unknown ids and jumps; the encoders accept their next feedback."""
         self._unknown_ids.clear()
+        self._board_elsewhere.clear()
         self._rotors.resynchronise_jumped()
 
     def reset_monitors(self) -> None:
@@ -27,29 +33,59 @@ class FaultWatch:
         for monitor in self._monitors:
             monitor.reset()
 
-    def on_unknown_id(self, can_id: int, now: float) -> None:
-        """Count a feedback frame from a motor that no cable has."""
-        count, last = self._unknown_ids.get(can_id, (0, now))
-        self._unknown_ids[can_id] = (count + 1 if now - last < _UNKNOWN_ID_PAUSE else 1, now)
+    def on_unknown_id(self, bus: int, can_id: int, now: float) -> None:
+        """Count a feedback frame from a motor that no cable has on the bus with this index."""
+        self._unknown_ids[bus, can_id] = _counted(self._unknown_ids.get((bus, can_id)), now)
 
-    def missing_feedback(self, now: float) -> str | None:
-        """Motors that do not answer."""
+    def on_board_elsewhere(self, bus: int, now: float) -> None:
+        """Count a frame of the IMU board from the bus with this index, which is not the board's."""
+        self._board_elsewhere[bus] = _counted(self._board_elsewhere.get(bus), now)
+
+    def silent(self, now: float, down: Collection[int] = ()) -> list[int]:
+        """Return the motors that do not answer, with those on the buses (indices) that are down."""
         limit = self._watchdog.feedback_timeout
-        silent = [
-            motor.label
-            for motor, encoder in zip(self._rotors.motors, self._rotors.encoders)
-            if encoder.count is None or now - encoder.time > limit
+        return [
+            index
+            for index, encoder in enumerate(self._rotors.encoders)
+            if encoder.count is None or now - encoder.time > limit or self._bus[index] in down
         ]
+
+    def missing(self, silent: Sequence[int]) -> str | None:
+        """Motors that do not answer, in words."""
         if not silent:
             return None
         if len(silent) == len(self._rotors.motors):
             return "no motor answers: are the C610 powered, and is the bus connected?"
-        return f"no feedback from {', '.join(silent)}"
+        return f"no feedback from {', '.join(self._rotors.motors[index].label for index in silent)}"
+
+    def lost_buses(self, silent: Sequence[int]) -> list[str]:
+        """Return the names of the buses on which no motor answers, if all others answer completely; else none."""
+        lost = [bus for bus in set(self._bus) if all(i in silent for i, own in enumerate(self._bus) if own == bus)]
+        complete = all(self._bus[index] in lost for index in silent)
+        return (
+            [self._hardware.all_buses[bus].name for bus in sorted(lost)] if complete and len(lost) < len(set(self._bus)) else []
+        )
 
     def unknown_id(self) -> str | None:
-        """Motors that answer although no cable has their id."""
-        ids = [str(can_id) for can_id, (count, _) in self._unknown_ids.items() if count >= _UNKNOWN_ID_FRAMES]
-        return f"motor id {', '.join(ids)} answers, but no cable has it: check the ids of the C610" if ids else None
+        """Motors that answer although no cable has their id on that bus, and an IMU board on another bus than its own."""
+        buses = self._hardware.all_buses
+        for bus, (count, _) in self._board_elsewhere.items():
+            if count >= _UNKNOWN_ID_FRAMES:
+                return (
+                    f"the IMU board answers on bus '{buses[bus].name}', but is described on bus"
+                    f" '{self._hardware.board_bus.name}': are the buses swapped?"
+                )
+        found = [key for key, (count, _) in self._unknown_ids.items() if count >= _UNKNOWN_ID_FRAMES]
+        if not found:
+            return None
+        ids = ", ".join(str(can_id) for _, can_id in found)
+        if len(buses) == 1:
+            return f"motor id {ids} answers, but no cable has it: check the ids of the C610"
+        names = ", ".join(sorted({f"'{buses[bus].name}'" for bus, _ in found}))
+        described = [(own, motor.can_id) for own, motor in zip(self._bus, self._rotors.motors)]
+        elsewhere = all(any(can_id == known and bus != own for own, known in described) for bus, can_id in found)
+        advice = "another bus has it: are the buses swapped?" if elsewhere else "check the ids of the C610"
+        return f"motor id {ids} answers on bus {names}, but no cable has it there; {advice}"
 
     def jumping_angle(self) -> str | None:
         """Encoder whose angle jumps."""
@@ -74,3 +110,9 @@ class FaultWatch:
         """Stall, runaway or wrong sign of one motor; arguments as of `MotorMonitor.update`."""
         reason = self._monitors[index].update(self._rotors.encoders[index].time, current, velocity, lag)
         return f"{self._rotors.motors[index].label} {reason}" if reason else None
+
+
+def _counted(before: tuple[int, float] | None, now: float) -> tuple[int, float]:
+    """Return the number of frames in a row and the time of the last one, with a frame at `now`."""
+    count, last = before or (0, now)
+    return (count + 1 if now - last < _UNKNOWN_ID_PAUSE else 1, now)

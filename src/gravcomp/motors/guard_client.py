@@ -30,7 +30,7 @@ class GuardError(Exception):
 
 
 class GuardClient:
-    """A connection to the guard. Attribute: record, the ZeroRecord of an earlier run, or None."""
+    """A connection to the guard of one bus. Attribute: record, of an earlier run, by CAN id, or None."""
 
     def __init__(self, connection: socket.socket, record: ZeroRecord | None):
         self.record = record
@@ -38,12 +38,13 @@ class GuardClient:
         self._unanswered: float | None = None  # s, time of the first heartbeat without answer
 
     @classmethod
-    def connect(cls, hardware: Hardware, record: ZeroRecord | None = None) -> "GuardClient":
-        """Connect to the guard of the bus `hardware.can`, and start it when there is none.
+    def connect(cls, hardware: Hardware, record: ZeroRecord | None = None, bus: int = 0) -> "GuardClient":
+        """Connect to the guard of the bus with this index in `hardware.all_buses`, and start it when there is none.
 
-        `record` is what the bridge has itself. Raises GuardError when another bridge drives this bus or no guard answers.
+        `record`, by CAN id, is what the bridge has itself. Raises GuardError when another bridge drives this bus or no guard
+        answers.
         """
-        settings, can = GuardSettings.of(hardware), hardware.can
+        settings, can = GuardSettings.of(hardware, bus), hardware.all_buses[bus]
         deadline, process = time.monotonic() + _START_TIMEOUT, None
         while True:
             connection = new_socket()
@@ -53,7 +54,7 @@ class GuardClient:
                 connection.send(json.dumps({"hello": os.getpid(), "beat": encoded(record)}).encode())
                 answer = json.loads(connection.recv(LONGEST_MESSAGE) or b"{}")
                 if "busy" in answer:
-                    raise GuardError(f"another bridge (process {answer['busy']}) already drives {can.interface} {can.channel}")
+                    raise GuardError(f"another bridge (process {answer['busy']}) already drives {can.label}")
                 if "record" in answer:
                     connection.setblocking(False)
                     return cls(connection, decoded(answer["record"]))
@@ -68,7 +69,7 @@ class GuardClient:
             if process is None or process.poll() is not None:
                 process = _start_process(settings)
             if time.monotonic() > deadline:
-                raise GuardError(f"the guard process of {can.interface} {can.channel} does not answer")
+                raise GuardError(f"the guard process of {can.label} does not answer")
             time.sleep(_RETRY_PERIOD)
 
     def beat(self, record: ZeroRecord | None) -> bool:

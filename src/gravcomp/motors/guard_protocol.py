@@ -15,7 +15,7 @@ import hashlib
 import json
 import socket
 
-from gravcomp.description.hardware import Hardware
+from gravcomp.description.hardware import CanInterface, Hardware
 from gravcomp.motors.state import RotorRecord, ZeroRecord
 
 ANSWER_TIMEOUT = 1.0
@@ -37,10 +37,12 @@ class GuardSettings:
     zero_timeout: float
 
     @classmethod
-    def of(cls, hardware: Hardware) -> "GuardSettings":
-        """Return the settings for this hardware."""
-        can_ids = [motor.can_id for motor in hardware.motors]
-        return cls(dataclasses.asdict(hardware.can), can_ids, hardware.watchdog.zero_timeout)
+    def of(cls, hardware: Hardware, bus: int = 0) -> "GuardSettings":
+        """Return the settings for the bus with this index in `hardware.all_buses`."""
+        can_ids = [motor.can_id for motor in hardware.motors if hardware.bus_index(motor) == bus]
+        settings = hardware.all_buses[bus]
+        can = {field.name: getattr(settings, field.name) for field in dataclasses.fields(CanInterface)}
+        return cls(can, can_ids, hardware.watchdog.zero_timeout)
 
     @property
     def address(self) -> str:

@@ -20,8 +20,10 @@ REST_ERROR = 4e-6
 class PositionLoop:
     """Position loop of one cable. Attributes: setpoint (m), setpoint_velocity (m/s)."""
 
-    def __init__(self, drive: Drive):
+    def __init__(self, drive: Drive, two_way: bool = False):
+        """two_way: the motor pulls an antagonist when it turns back, so that the expected force may be negative."""
         self._drive = drive
+        self._least = -drive.tension_limit if two_way else drive.pretension
         self.reset(0.0)
 
     def reset(self, displacement: float) -> None:
@@ -41,7 +43,7 @@ class PositionLoop:
         self._advance(target, limit, dt)
         error = self.setpoint - displacement
         wanted = min(max(self.setpoint_velocity + drive.position_gain * error, -limit), limit)
-        feed_forward = min(max(tension, drive.pretension), drive.tension_limit) / drive.tension_per_ampere
+        feed_forward = min(max(tension, self._least), drive.tension_limit) / drive.tension_per_ampere
         proportional = drive.velocity_gain * (wanted - velocity) + feed_forward
         at_rest = abs(error) < REST_ERROR and self.setpoint_velocity == 0.0
         integral = self._integral if at_rest else self._integral + drive.velocity_integral * (wanted - velocity) * dt

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import can
 
 from gravcomp.canbus import c610
+from gravcomp.description.hardware import Hardware
 
 
 class CurrentOutput:
@@ -37,3 +38,27 @@ class CurrentOutput:
         # A whole number of counts, so that rounding cannot exceed the limit.
         limit = math.floor(self._limit * c610.COUNTS_PER_AMPERE) / c610.COUNTS_PER_AMPERE
         return min(max(float(current), -limit), limit)
+
+
+class BusOutputs:
+    """The clamps of all buses of the hardware; frames carry the name of their bus in `channel` where there are several."""
+
+    def __init__(self, hardware: Hardware):
+        self._parts = []
+        for index, bus in enumerate(hardware.all_buses):
+            own = [i for i, motor in enumerate(hardware.motors) if hardware.bus_index(motor) == index]
+            output = CurrentOutput([hardware.motors[i].can_id for i in own], hardware.drive.current_limit)
+            self._parts.append((bus.name or None, own, output))
+
+    def frames(self, currents: Sequence[float], *, enabled: bool) -> list[can.Message]:
+        """Return the frames for all buses from the currents (A) in the order of the motors; zero unless `enabled`."""
+        result = []
+        for name, own, output in self._parts:
+            for frame in output.frames([currents[i] for i in own] if enabled else (), enabled=enabled):
+                frame.channel = name
+                result.append(frame)
+        return result
+
+    def zero(self) -> list[can.Message]:
+        """Return the frames with zero current."""
+        return self.frames((), enabled=False)

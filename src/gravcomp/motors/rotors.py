@@ -1,18 +1,20 @@
-"""Measured state of the cables: the encoders and zero positions of all motors, in the order of the cables.
+"""Measured state of the motors: their encoders and zero positions, in the order of the motors.
 
-displacement = direction x (count - zero) x travel per count + offset,    tension = current x tension per ampere
+displacement = direction x (count - zero) x travel per count + offset,    force = current x tension per ampere
+
+Displacements and forces are those at the capstans; with one motor a cable they are the cables' (`description.transmission`).
 """
 
 import math
 
 from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
 from gravcomp.motors.encoder import JUMPS, Encoder
-from gravcomp.motors.state import ZeroRecord
+from gravcomp.motors.state import ZeroRecord, record_key
 from gravcomp.motors.zeros import ZeroPositions
 
 
 class Rotors:
-    """Counts the turns of all rotors and converts them to cable displacements.
+    """Counts the turns of all rotors and converts them to displacements at the capstans.
 
     Attributes: motors (hardware.motors), encoders (one per motor), zeros (their zero positions).
     """
@@ -22,6 +24,7 @@ class Rotors:
         self.encoders = [Encoder() for _ in self.motors]
         self.zeros = ZeroPositions(len(self.motors))
         self._drive, self._zero_timeout = hardware.drive, hardware.watchdog.zero_timeout
+        self._keys = [record_key(hardware.bus_index(motor), motor.can_id) for motor in self.motors]
 
     def on_feedback(self, index: int, angle: int, speed: float, current: float, now: float) -> bool:
         """Take the feedback of one motor, see `Encoder.update`. Return False when it is implausible.
@@ -44,7 +47,7 @@ class Rotors:
         return [encoder.count for encoder in self.encoders]
 
     def displacement(self) -> list[float]:
-        """Cable displacements (m); 0 while the count or the zero position is unknown."""
+        """Displacements (m); 0 while the count or the zero position is unknown."""
         travel, result = self._drive.travel_per_count, []
         for index, motor in enumerate(self.motors):
             count, zero = self.encoders[index].count, self.zeros[index]
@@ -52,7 +55,7 @@ class Rotors:
         return result
 
     def velocity(self) -> list[float]:
-        """Cable velocities (m/s)."""
+        """Velocities (m/s)."""
         per_rpm = COUNTS_PER_TURN / 60 * self._drive.travel_per_count
         return [motor.direction * encoder.speed * per_rpm for motor, encoder in zip(self.motors, self.encoders)]
 
@@ -60,9 +63,9 @@ class Rotors:
         """Measured currents (A); positive currents pull in."""
         return [motor.direction * encoder.current for motor, encoder in zip(self.motors, self.encoders)]
 
-    def tension(self) -> list[float]:
-        """Cable tensions (N) from the measured currents, without friction."""
-        return [max(0.0, current * self._drive.tension_per_ampere) for current in self.current()]
+    def force(self) -> list[float]:
+        """Forces (N) at the capstans from the measured currents, without friction."""
+        return [current * self._drive.tension_per_ampere for current in self.current()]
 
     def trust_turns(self) -> None:
         """Take all counts as certain."""
@@ -88,11 +91,11 @@ class Rotors:
         During homing the zero positions are those from before it.
         """
         record: ZeroRecord = {}
-        for motor, encoder, zero in zip(self.motors, self.encoders, self.zeros.lasting):
+        for key, encoder, zero in zip(self._keys, self.encoders, self.zeros.lasting):
             rotor = None if zero is None else encoder.record(zero)
             if rotor is None:
                 return None
-            record[motor.can_id] = rotor
+            record[key] = rotor
         return record
 
     def restore(self, record: ZeroRecord) -> None:
@@ -100,7 +103,7 @@ class Rotors:
 
         Earlier feedback does not matter: a count that began with it has the angle, not the turns.
         """
-        for index, motor in enumerate(self.motors):
-            if motor.can_id in record and self.zeros[index] is None:
-                self.encoders[index].restore(record[motor.can_id])
-                self.zeros[index] = record[motor.can_id].zero
+        for index, key in enumerate(self._keys):
+            if key in record and self.zeros[index] is None:
+                self.encoders[index].restore(record[key])
+                self.zeros[index] = record[key].zero

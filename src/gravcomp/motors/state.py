@@ -53,4 +53,18 @@ class RotorRecord:
 
 
 ZeroRecord = dict[int, RotorRecord]
-"""Rotor records by CAN id."""
+"""Rotor records by `record_key`; on the only bus, or the first, that is the CAN id."""
+
+_KEYS_A_BUS = 16
+
+
+def record_key(bus: int, can_id: int) -> int:
+    """Return the key of a motor's record from the index of its bus and its CAN id."""
+    return _KEYS_A_BUS * bus + can_id
+
+
+def record_of_bus(record: ZeroRecord | None, bus: int) -> ZeroRecord | None:
+    """Return the records of the motors on one bus, by CAN id."""
+    if record is None:
+        return None
+    return {key % _KEYS_A_BUS: rotor for key, rotor in record.items() if key // _KEYS_A_BUS == bus}

@@ -6,10 +6,13 @@ import numpy as np
 from numba import njit
 
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.law_deviation import DeviationPoint, LawDeviation, add_deviation_stiffness, deviation_at
+from gravcomp.reduction.law_deviation import DeviationPoint, KeptStiffness, LawDeviation, deviation_at, near_stiffness
 from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import strain_at, tangent
+
+# Distance at which the stiffness of a law's deviation is used again, as a fraction of the model's reach.
+_NEAR = 0.03
 
 
 class Body(NamedTuple):
@@ -55,14 +58,22 @@ def elastic_force(point: Point, stress: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def elastic_stiffness(body: Body, point: Point, stress: np.ndarray, scale: float) -> np.ndarray:
-    """Return the lower triangle of the stiffness (r, r).
+def elastic_stiffness(
+    body: Body, point: Point, q: np.ndarray, stress: np.ndarray, scale: float, kept: KeptStiffness
+) -> np.ndarray:
+    """Return the lower triangle of the stiffness (r, r) at q (r,), where the model is `point`.
 
-    stress (k,): as in `elastic_force`; scale: its derivative by the strain.
+    stress (k,): as in `elastic_force`; scale: its derivative by the strain; kept: of the law's deviation.
     """
     stiffness = tangent(point.jacobian, body.quadratic, stress, scale)
-    add_deviation_stiffness(body.deviation, point.deviation, stiffness)
+    if len(body.deviation.weight):
+        stiffness += near_stiffness(body.deviation, point.deviation, q, kept)
     return stiffness
+
+
+def kept_stiffness(model: ReducedModel) -> KeptStiffness:
+    """Return an empty memory for the stiffness of the law's deviation."""
+    return KeptStiffness.none(model.size, _NEAR * model.reach)
 
 
 def cable_arrays(cables: CableInput, count: int) -> tuple[np.ndarray, np.ndarray]:

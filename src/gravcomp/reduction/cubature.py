@@ -56,12 +56,11 @@ class Cubature:
     def deviation(self, elements: SolidElements, basis: np.ndarray) -> LawDeviation:
         """Return the arrays of the points for a basis (3 n_free, r)."""
         gradient = mode_gradients(elements, basis, self.element, self.point)
-        constants = elements.constants
         return LawDeviation(
             np.ascontiguousarray(gradient.transpose(3, 1, 2, 0).reshape(basis.shape[1], -1), dtype=np.float32),
             self.weight,
-            constants.law[self.element],
-            constants.values[self.element],
+            elements.constants.law[self.element],
+            _constants(elements, self.element),
         )
 
 
@@ -131,6 +130,18 @@ def sparse_weights(gram: np.ndarray, products: np.ndarray, square: float, allowe
     return index, weights[index], float(left)
 
 
+def _constants(elements: SolidElements, element: np.ndarray) -> np.ndarray:
+    """Return the constants (p, c) of the deviation at points of the elements (p,).
+
+    In elements with one pressure, the deviation is that of the shape alone, with a bulk modulus of zero: the pressure of a single
+    point would lock, and the polynomials already have that of the element, in the form of the law that is linear in the strain.
+    """
+    constants = elements.constants.values[element]
+    averaged = elements.averaged[element]
+    constants[averaged, 0] = -2.0 / 3.0 * constants[averaged, 1]
+    return constants
+
+
 def _forces(
     elements: SolidElements,
     basis: np.ndarray,
@@ -143,7 +154,7 @@ def _forces(
     gradient = mode_gradients(elements, basis, element, point)
     deformation = np.einsum("pija,sa->spij", gradient, coordinates, optimize=True) + np.eye(3)
     piola = np.empty_like(deformation)
-    _piola(deformation, elements.constants.law[element], elements.constants.values[element], piola)
+    _piola(deformation, elements.constants.law[element], _constants(elements, element), piola)
     weighed = np.einsum("pija,ka->pijk", gradient, weighing, optimize=True)
     return np.einsum("spij,pijk->skp", piola, weighed, optimize=True).reshape(-1, len(element))
 

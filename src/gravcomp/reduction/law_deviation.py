@@ -46,6 +46,24 @@ class DeviationPoint(NamedTuple):
     force: np.ndarray
 
 
+class KeptStiffness(NamedTuple):
+    """The deviation's stiffness at coordinates near by, which is used again while q has moved by less than `reach` from there.
+
+    The deviation is a small part of the stiffness and changes little over such a distance, and so do Newton's steps and the
+    compliance. The force, and with it the equilibrium, does not depend on it. lower (r, r): triangle; q (r,): where it was
+    computed, NaN: nowhere yet. Both are written by `near_stiffness`.
+    """
+
+    lower: np.ndarray
+    q: np.ndarray
+    reach: float
+
+    @staticmethod
+    def none(size: int, reach: float) -> "KeptStiffness":
+        """Return an empty one for `size` coordinates."""
+        return KeptStiffness(np.zeros((size, size)), np.full(size, np.nan), reach)
+
+
 @njit(cache=True, fastmath=REORDERED)
 def deviating_stress(law: int, constants: np.ndarray, e: np.ndarray, s: np.ndarray, d: np.ndarray, tangent: bool) -> None:
     """Write T into s (6) for Green's strain e (6), and D - C into d (6, 6) if `tangent`; arguments as in `laws.stress`."""
@@ -90,6 +108,17 @@ def deviation_at(of: LawDeviation, q: np.ndarray) -> DeviationPoint:
             value += row[k] * piola[k]
         force[i] = value
     return DeviationPoint(f, e, stress, force)
+
+
+@njit(cache=True)
+def near_stiffness(of: LawDeviation, point: DeviationPoint, q: np.ndarray, kept: KeptStiffness) -> np.ndarray:
+    """Return the lower triangle of the deviation's stiffness (r, r) at q (r,) or near by; `point` is that at q."""
+    away = ((q - kept.q) ** 2).sum()
+    if not away <= kept.reach**2:  # also true for NaN
+        kept.lower[:] = 0.0
+        kept.q[:] = q
+        add_deviation_stiffness(of, point, kept.lower)
+    return kept.lower
 
 
 @njit(cache=True, fastmath=REORDERED)

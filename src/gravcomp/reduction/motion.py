@@ -1,10 +1,10 @@
 """Motion in reduced coordinates, with the scheme of the full model (`full_model.dynamics`) in r unknowns.
 
-    M_r = Phi^T M Phi,     g(q) = J^T (eps + beta d eps / dt + rho eta) + f_deviation - Phi^T f_weight - H^T lambda,
+    M_r = Phi^T M Phi,     g(q) = J^T (eps + beta d eps / dt + sum rho_i eta_i) + f_deviation - Phi^T f_weight - H^T lambda,
 
 integrated by generalized-alpha. The strains eps(q) of the reduced elasticity are objective; so are Kelvin-Voigt damping with
-their second backward difference and the creep of `full_model.viscosity` (rho, held strain eta). beta, rho and T are the same in
-the whole robot.
+their second backward difference and the branches of `full_model.viscosity` (rho, held strain eta). beta, rho and T are the same
+in the whole robot.
 """
 
 import dataclasses
@@ -13,8 +13,8 @@ import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.full_model.viscosity import branch
-from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
+from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
+from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.motion_step import motion_step
 from gravcomp.reduction.reduced_cables import ReducedTendons
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -25,7 +25,7 @@ class ReducedMotion:
     """A state of motion at the end of a step.
 
     q, velocity and acceleration (r,); tension (m,) in N; point: the model at q; force (r,): g; strain_before (k,): strain one
-    step before; held (k,): strain held by the creep branch; step: length of the last step in s; residual: norm of the force out
+    step before; memory: of the branches; step: length of the last step in s; residual: norm of the force out
     of balance in N.
     """
 
@@ -36,7 +36,7 @@ class ReducedMotion:
     point: Point
     force: np.ndarray
     strain_before: np.ndarray
-    held: np.ndarray
+    memory: Memory
     step: float = 0.0
     residual: float = 0.0
     converged: bool = True
@@ -58,7 +58,7 @@ class ReducedDynamicSolver:
         length: float,
         options: DynamicsOptions | None = None,
         tolerance: float = 1e-6,
-        creep: tuple[float, float] = (0.0, 1.0),
+        branches: tuple[tuple[float, float], ...] = (),
     ):
         """Start at rest with the straight robot.
 
@@ -76,17 +76,16 @@ class ReducedDynamicSolver:
             Default `DynamicsOptions()`.
         tolerance
             Correction of the tip's displacement, as a fraction of the length, that ends a step.
-        creep
-            Rho, and T in s, of `full_model.viscosity`.
+        branches
+            Rho, and T in s, of the branches of `full_model.viscosity`.
 
         """
         options = options or DynamicsOptions()
         self.model, self.options = model, options
         self._mass = mass
-        self._damping_time, self._creep_ratio = (damping_time, creep[0]) if options.damping == "kelvin_voigt" else (0.0, 0.0)
-        self._creep_time = creep[1]
+        self._damping_time, self._branches = (damping_time, branches) if options.damping == "kelvin_voigt" else (0.0, ())
         self._tolerance = tolerance * length
-        self._body = body_of(model)
+        self._body, self._kept = body_of(model), kept_stiffness(model)
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)), np.zeros(3))
 
     def place(self, q: np.ndarray, tension: np.ndarray, gravity: np.ndarray) -> None:
@@ -94,18 +93,20 @@ class ReducedDynamicSolver:
         point = point_at(self._body, q, np.zeros(len(tension)))
         force = elastic_force(point, point.strain) - self.model.weight @ gravity - tension @ point.tendons.jacobian
         acceleration = np.linalg.solve(self._mass, -force)
-        self.state = ReducedMotion(
-            q, np.zeros_like(q), acceleration, tension, point, force, point.strain, np.zeros_like(point.strain)
-        )
+        memory = Memory.of(self._branches, q, point.strain)
+        self.state = ReducedMotion(q, np.zeros_like(q), acceleration, tension, point, force, point.strain, memory)
 
-    def take_over(self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray) -> None:
-        """Continue a motion of another model: q, velocity and acceleration (r,), tension (m,).
+    def take_over(
+        self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tension: np.ndarray, memory: Memory | None = None
+    ) -> None:
+        """Continue a motion of another model: q, velocity and acceleration (r,), tension (m,), memory (default: relaxed).
 
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         point = point_at(self._body, q, np.zeros(len(tension)))
-        force = -self._mass @ acceleration - self._rayleigh(point) @ velocity
-        self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, np.zeros_like(point.strain))
+        force = -self._mass @ acceleration - self._rayleigh(point, q) @ velocity
+        memory = memory or Memory.of(self._branches, q, point.strain)
+        self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, memory)
 
     def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> ReducedMotion:
         """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one."""
@@ -113,11 +114,11 @@ class ReducedDynamicSolver:
         scheme = GeneralizedAlpha.of(h, self.options.spectral_radius)
         now, before = 1.0 - scheme.alpha_f, scheme.alpha_f
         rate, history = _backward_difference(last, h)
-        decay, gain = branch(h, self._creep_time)
-        scale = 1.0 + self._damping_time * rate + self._creep_ratio * gain
+        stiffer, held = last.memory.stress(h)
+        scale = 1.0 + self._damping_time * rate + stiffer
         strain = last.point.strain
-        offset = self._damping_time * history + self._creep_ratio * (decay * last.held - gain * strain)
-        drag = self._rayleigh(last.point)
+        offset = self._damping_time * history + held
+        drag = self._rayleigh(last.point, last.q)
         velocity_0, acceleration_0 = scheme.predict(last.velocity, last.acceleration)
         # Contribution of the last step's forces, including inertia, to the balance of this step.
         rest = self._mass @ ((1.0 - scheme.alpha_m) * acceleration_0 + scheme.alpha_m * last.acceleration) + before * last.force
@@ -125,7 +126,7 @@ class ReducedDynamicSolver:
         inertia = ((1.0 - scheme.alpha_m) * scheme.acceleration_rate) * self._mass + (now * scheme.velocity_rate) * drag
         converged, q, tension, point, force, residual = motion_step(
             self._body, last.point, last.q, last.tension, rest, inertia, model.weight @ gravity,
-            *cable_arrays(cables, last.tension.size), now, scale, offset, self._tolerance,
+            *cable_arrays(cables, last.tension.size), now, scale, offset, self._kept, self._tolerance,
         )  # fmt: skip
         if not converged:
             self.state = dataclasses.replace(last, converged=False)
@@ -139,18 +140,18 @@ class ReducedDynamicSolver:
             point=point,
             force=force,
             strain_before=strain,
-            held=decay * last.held + gain * (point.strain - strain),
+            memory=last.memory.after(q, point.strain, h),
             step=h,
             residual=residual,
         )
         return self.state
 
-    def _rayleigh(self, point: Point) -> np.ndarray:
-        """Return alpha M + beta K (r, r) at a point; zeros without Rayleigh damping."""
+    def _rayleigh(self, point: Point, q: np.ndarray) -> np.ndarray:
+        """Return alpha M + beta K (r, r) at q (r,), where the model is `point`; zeros without Rayleigh damping."""
         options = self.options
         if options.damping != "rayleigh":
             return np.zeros_like(self._mass)
-        stiffness = np.tril(elastic_stiffness(self._body, point, point.strain, 1.0))
+        stiffness = np.tril(elastic_stiffness(self._body, point, q, point.strain, 1.0, self._kept))
         stiffness += np.tril(stiffness, -1).T
         return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 

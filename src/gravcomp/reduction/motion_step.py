@@ -6,7 +6,8 @@ from numba import njit
 from gravcomp.cables.slack import pivoted
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking
+from gravcomp.reduction.law_deviation import KeptStiffness
+from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.rounding import REORDERED
 
 _MOST_ITERATIONS = 16
@@ -15,7 +16,7 @@ _MOST_ITERATIONS = 16
 @njit(cache=True, fastmath=REORDERED)
 def motion_step(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, rest: np.ndarray, inertia: np.ndarray, weight: np.ndarray,
-    wound: np.ndarray, given: np.ndarray, now: float, scale: float, offset: np.ndarray, tolerance: float,
+    wound: np.ndarray, given: np.ndarray, now: float, scale: float, offset: np.ndarray, kept: KeptStiffness, tolerance: float,
 ) -> tuple[bool, np.ndarray, np.ndarray, Point, np.ndarray, float]:  # fmt: skip
     """Solve the balance of a step, rest + inertia (q - q_n) + now g(q) = 0, by Newton's method.
 
@@ -41,6 +42,8 @@ def motion_step(
         Weight of the forces at the end of the step.
     scale, offset
         The stress is scale eps + offset (k,).
+    kept
+        Of `elastic_stiffness`.
     tolerance
         Largest correction of the tip in m.
 
@@ -57,7 +60,7 @@ def motion_step(
             left = of_tip @ out - body.tip @ (pull @ answer)
             if (left**2).sum() < tolerance**2:
                 return True, q, tension, point, force, np.sqrt(out @ (body.force_norm @ out))
-        elastic = now * elastic_stiffness(body, point, stress, scale) + inertia
+        elastic = now * elastic_stiffness(body, point, q, stress, scale, kept) + inertia
         matrix = elastic.copy()
         add_stiffness(cables, point.tendons, now * tension, matrix)
         definite, factor = factorise(matrix)
@@ -77,9 +80,9 @@ def motion_step(
             wanted = given
         else:
             free = point.tendons.displacement + point.tendons.jacobian @ y - compliance @ tension
-            held = np.isfinite(wound)
+            held, own = np.isfinite(wound), stretch(cables, point.tendons)
             for i in range(m):
-                compliance[i, i] += cables.axial_compliance[i]
+                compliance[i, i] += own[i]
             wanted = pivoted(compliance, wound - free, held, held & (tension > 0.0))
         q = q + y + (wanted - tension) @ answer
         if not np.isfinite(q.sum()):

@@ -12,7 +12,8 @@ class ReducedCables(NamedTuple):
     """The cables of a reduced model.
 
     rest (s, 3): e_k(0) in m; change (3 s, r): D_k; cable (s,): cable of each straight piece; rest_length (m,) of the paths in m;
-    axial_compliance (m,) of the cables in m/N; friction (m,) coefficient.
+    axial_compliance (m,) from capstan to end in m/N, without friction; friction (m,) coefficient; sheath_angle (m,) in rad and
+    free_length (m,) in m between capstan and robot.
     """
 
     rest: np.ndarray
@@ -21,18 +22,22 @@ class ReducedCables(NamedTuple):
     rest_length: np.ndarray
     axial_compliance: np.ndarray
     friction: np.ndarray
+    sheath_angle: np.ndarray
+    free_length: np.ndarray
 
 
 class ReducedTendons(NamedTuple):
     """The cables at coordinates q.
 
-    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that of the cable; displacement (m,) of the paths in m;
-    jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose times the tensions is the cables' force.
+    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that at the capstan; mean_share (m,): its mean along
+    each cable; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose
+    times the tensions is the cables' force.
     """
 
     tangent: np.ndarray
     length: np.ndarray
     share: np.ndarray
+    mean_share: np.ndarray
     displacement: np.ndarray
     jacobian: np.ndarray
     force_jacobian: np.ndarray
@@ -58,12 +63,13 @@ def tendons_at(cables: ReducedCables, q: np.ndarray, pulling: np.ndarray) -> Red
         row = jacobian[cables.cable[k]]
         for a in range(r):
             row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
-    share, force_jacobian = np.ones(count), jacobian
+    share, mean_share, force_jacobian = np.ones(count), np.ones(len(pulling)), jacobian
     for i in range(len(pulling)):
         if cables.friction[i] * pulling[i] != 0.0:
             force_jacobian = _with_friction(cables, tangent, cables.friction * pulling, share, r)
+            _mean_shares(cables, length, cables.friction * pulling, share, mean_share)
             break
-    return ReducedTendons(tangent, length, share, displacement, jacobian, force_jacobian)
+    return ReducedTendons(tangent, length, share, mean_share, displacement, jacobian, force_jacobian)
 
 
 @njit(cache=True, fastmath=REORDERED)
@@ -81,7 +87,7 @@ def _with_friction(cables: ReducedCables, tangent: np.ndarray, friction: np.ndar
             before = tangent[k - 1]
             turned += np.arccos(max(-1.0, min(1.0, x * before[0] + y * before[1] + z * before[2])))
         else:
-            turned = 0.0
+            turned = cables.sheath_angle[i]
         share[k] = np.exp(-friction[i] * turned)
         x, y, z = share[k] * x, share[k] * y, share[k] * z
         row = jacobian[i]
@@ -89,6 +95,27 @@ def _with_friction(cables: ReducedCables, tangent: np.ndarray, friction: np.ndar
         for a in range(r):
             row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
     return jacobian
+
+
+@njit(cache=True)
+def _mean_shares(cables: ReducedCables, length: np.ndarray, friction: np.ndarray, share: np.ndarray, mean: np.ndarray) -> None:
+    """Write the mean share (m,), as `cables.friction` does, of pieces with length (s,) and share (s,); friction as above."""
+    total = cables.free_length.copy()
+    for i in range(len(friction)):
+        turn = friction[i] * cables.sheath_angle[i]
+        mean[i] = cables.free_length[i] * (-np.expm1(-turn) / turn if abs(turn) > 1e-9 else 1.0)
+    for k in range(len(cables.cable)):
+        i = cables.cable[k]
+        mean[i] += share[k] * length[k]
+        total[i] += length[k]
+    for i in range(len(friction)):
+        mean[i] /= total[i]
+
+
+@njit(cache=True)
+def stretch(cables: ReducedCables, tendons: ReducedTendons) -> np.ndarray:
+    """Return the elongation (m,) of each cable under unit tension at its capstan, in m/N."""
+    return cables.axial_compliance * tendons.mean_share
 
 
 @njit(cache=True, fastmath=REORDERED)
@@ -134,9 +161,9 @@ def lacking(
 
     It is 0 for slack cables. compliance (m, m) in m/N.
     """
-    change = np.zeros_like(tension)
+    change, elongation = np.zeros_like(tension), stretch(cables, tendons) * tension
     for i in range(len(tension)):
-        gap = wound[i] - tendons.displacement[i] - cables.axial_compliance[i] * tension[i]
+        gap = wound[i] - tendons.displacement[i] - elongation[i]
         if gap > 0.0 or (tension[i] > 0.0 and gap <= 0.0):  # false for NaN
             change[i] = gap / compliance[i, i]
     return change

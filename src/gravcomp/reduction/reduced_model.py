@@ -18,7 +18,7 @@ from gravcomp.full_model.observation import observe
 from gravcomp.reduction.cubature import Cubature
 from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_cables import ReducedCables
-from gravcomp.reduction.strain_polynomials import StrainPolynomials
+from gravcomp.reduction.strain_polynomials import StrainPolynomials, strain_at
 from gravcomp.rounding import REORDERED
 
 
@@ -55,6 +55,11 @@ class ReducedModel:
         answer (k, r): changes of q for which the changes of the effector are computed.
         """
         return _observed(self.section_rest, self.section_change, q, answer)
+
+    def projected(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the coordinates (r,) of displacements (3 n_free,), and the strain of the elasticity there."""
+        q = self.coordinates_of @ unknowns
+        return q, strain_at(self.elasticity.linear, self.elasticity.quadratic, q)[1]
 
     def tip(self, q: np.ndarray) -> np.ndarray:
         """Return the position (3,) of the tip at q (r,) in m."""
@@ -121,6 +126,8 @@ def project(
             rest_length=model.tendons.rest_length,
             axial_compliance=model.tendons.axial_compliance,
             friction=model.tendons.friction.coefficient,
+            sheath_angle=model.tendons.friction.sheath_angle,
+            free_length=model.tendons.friction.free_length,
         ),
         section_rest=model.effectors.sections(model.mesh.nodes),
         section_change=section_changes(model, basis),

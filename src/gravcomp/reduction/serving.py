@@ -1,9 +1,10 @@
 """Steps of the reduced model, as long as its error is small.
 
-The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured
-every few seconds and after every large motion, with the full model: one Newton step with its own factorised stiffness from the
-reduced shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. Otherwise
-the full model computes the steps, and from time to time both are compared, until they agree again.
+The reduced model is used while it converges, stays within the trained range, and its error is small. The error is measured every
+few seconds and after every large motion, with the full model: one Newton step with its own factorised stiffness from the reduced
+shape, u* = u - A^-1 R(u), is second-order close to the true equilibrium, so |tip(u*) - tip(u)| is the error. The same measurement
+says whether the shape leaves the range of a material's law. Otherwise the full model computes the steps, and from time to time
+both are compared, until they agree again.
 """
 
 import dataclasses
@@ -12,10 +13,14 @@ import time
 import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 
@@ -25,6 +30,7 @@ _TOLERANCE = 1e-3
 _CHECK_EVERY, _CHECK_AT_LEAST, _CHECK_MOVED = 300, 20, 0.1
 # Steps of the full model before the reduced model is tried again.
 _RETURN_AFTER = 25
+_DIFFERENT_CREEP = "the materials creep differently, which the reduced model does not have"
 _UNTRAINED = "the shape is outside the range that the reduced model was trained for"
 
 
@@ -35,8 +41,14 @@ class ReducedServing:
     model measures the error; when the reduced model is left, the solver is at its last shape.
     """
 
-    def __init__(self, model: RobotModel, reduced: ReducedModel, full: StaticSolver):
+    def __init__(self, model: RobotModel, reduced: ReducedModel, full: StaticSolver, creep: Creep | None = None):
+        """creep: the full model's memory, default: it has none."""
         self._model, self.reduced, self._full = model, reduced, full
+        self._creep = creep if creep is not None and creep.exists else None
+        branches = {material.branches for material in model.mesh.materials}
+        self._uniform = len(branches) == 1
+        at_rest = np.zeros(reduced.size), np.zeros(reduced.elasticity.linear.shape[1])
+        self._memory = Memory.of(branches.pop() if self._uniform else (), *at_rest)
         self._tolerance = _TOLERANCE * model.length
         self._tracker = ReducedTracker(reduced, model.length)
         self.reset()
@@ -44,9 +56,10 @@ class ReducedServing:
     def reset(self) -> None:
         """Return to the straight robot; the reduced model is used."""
         self._tracker.place(np.zeros(self.reduced.size), np.zeros(self._model.tendons.count))
-        self._error = self.reduced.error
+        self._error, self._beyond_range = self.reduced.error, ""
         self._since_check = _CHECK_EVERY - _CHECK_AT_LEAST
         self._checked_at = self._tracker.state.q
+        self._memory = self._memory.relaxed(self._tracker.state.q, self._tracker.strain)
         self._until_return = 0
         self.reason = ""
 
@@ -60,6 +73,8 @@ class ReducedServing:
     def stand_by(self) -> None:
         """Wait for a shape of the full model, which is used until both models agree."""
         self.reason, self._until_return = "the reduced model has just been built", 0
+        # What the full model's branches hold is not known here. It fades, and both models have to agree before this one is used.
+        self._memory = self._memory.relaxed(*self._projected(self._full.state))
 
     @property
     def trusted(self) -> bool:
@@ -73,12 +88,18 @@ class ReducedServing:
         self._model.free(u)[:] = self.reduced.basis @ self._tracker.state.q
         return u
 
-    def step(self, gravity: np.ndarray, cables: CableInput) -> Shape | None:
-        """Return the shape under gravity (3,) and the cables' input, tracked from the last one; None: use the full model."""
+    def step(self, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> Shape | None:
+        """Return the shape under gravity (3,) and the cables' input, tracked from the last one; None: use the full model.
+
+        h: s in which the body has crept since the last shape; None: it has relaxed.
+        """
         if not self.trusted:
             return None
         started = time.perf_counter()
-        state = self._tracker.track(gravity, cables, iterations=10)
+        if h is not None and not self._uniform:
+            self._leave(_DIFFERENT_CREEP, wait=_RETURN_AFTER)
+            return None
+        state = self._tracker.track(gravity, cables, iterations=10, creep=None if h is None else self._memory.stress(h))
         if not state.converged:
             self._leave("the reduced model did not converge", wait=0)
             return None
@@ -90,30 +111,46 @@ class ReducedServing:
         far = moved @ moved > (_CHECK_MOVED * self.reduced.reach) ** 2 and self._since_check >= _CHECK_AT_LEAST
         if far or self._since_check >= _CHECK_EVERY:
             self._since_check, self._checked_at = 0, state.q
-            self._error = self._measured_error(gravity, cables)
+            self._error = self._measured_error(gravity, cables, h)
             if not self._error < self._tolerance:
                 self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
                 return None
+        self._remember(state.q, self._tracker.strain, h)
         return self._shape(state, gravity, started)
 
-    def take_over(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput) -> None:
-        """After a step of the full model: use the reduced model again if both agree. Compared every few steps only."""
+    def take_over(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> None:
+        """After a step of the full model, of h s: use the reduced model again if both agree. Compared every few steps only."""
         self._until_return -= 1
         if self._until_return <= 0:
-            self.follow(state, gravity, cables)
+            self.follow(state, gravity, cables, h)
+        elif self._creep is not None and state.converged:
+            self._remember(*self._projected(state), h)
 
-    def follow(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput) -> None:
-        """Go to a shape of the full model; use the reduced model from there if both agree on it."""
+    def follow(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> None:
+        """Go to a shape of the full model, in h s; use the reduced model from there if both agree on it."""
         self.reason = self.reason or _UNTRAINED
         self._until_return = _RETURN_AFTER
         if not state.converged:
             return
-        q = self.reduced.coordinates_of @ self._model.free(state.u)
+        q, strain = self._projected(state)
         self._tracker.place(q, state.tension, self._full.sliding)
-        own = self._tracker.track(gravity, cables, iterations=10)
+        own = self._tracker.track(gravity, cables, iterations=10, creep=None if h is None else self._memory.stress(h))
+        self._remember(q, strain, h)
+        if h is not None and not self._uniform:
+            self.reason = _DIFFERENT_CREEP
+            return
         error = float(np.linalg.norm(self.reduced.tip(own.q) - self._tip(state.u)))
         if own.converged and self.reduced.outside(own.q) <= 1.0 and error < 0.5 * self._tolerance:
             self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
+
+    def _projected(self, state: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
+        """Return the coordinates (r,) of a shape of the full model and their strain (m,)."""
+        return self.reduced.projected(self._model.free(state.u))
+
+    def _remember(self, q: np.ndarray, strain: np.ndarray, h: float | None) -> None:
+        """Let the body creep to q (r,), where the strain is (m,), in h s; None: it is relaxed there."""
+        if self._creep is not None:
+            self._memory = self._memory.relaxed(q, strain) if h is None else self._memory.after(q, strain, h)
 
     def _leave(self, reason: str, wait: int) -> None:
         """Stop using the reduced model, for at least `wait` steps."""
@@ -121,8 +158,13 @@ class ReducedServing:
         self._hand_over()
 
     def _hand_over(self) -> None:
-        """Set the full model to the reduced model's shape."""
+        """Set the full model to the reduced model's shape, and its memory to that before the present step."""
         u, sliding = self.displacements, self._tracker.sliding
+        if self._creep is not None and self._uniform:
+            assert isinstance(self._model.elements, SolidElements)
+            self._creep.strain, self._creep.held = self._memory.at_points(self._model.elements, self.reduced.basis)
+        elif self._creep is not None:
+            self._creep.relax(u)
         self._full.sliding = sliding
         self._full.state = dataclasses.replace(
             self._full.state,
@@ -131,10 +173,12 @@ class ReducedServing:
             tendons=self._model.tendons.state(self._model.mesh.nodes + u, sliding.direction),
         )
 
-    def _measured_error(self, gravity: np.ndarray, cables: CableInput) -> float:
-        """Return the tip error of the reduced model in m."""
+    def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None) -> float:
+        """Return the tip error of the reduced model in m, after a step of h s."""
         self._hand_over()
+        self._full.viscous = None if h is None or self._creep is None else self._creep.step(h)
         before = self._tip(self._full.state.u)
+        self._beyond_range = beyond_range(self._model, self._full.state.u)
         return float(np.linalg.norm(self._tip(self._full.track(gravity, cables, iterations=1).u) - before))
 
     def _tip(self, u: np.ndarray) -> np.ndarray:
@@ -162,4 +206,5 @@ class ReducedServing:
             solve_time=time.perf_counter() - started,
             model="reduced",
             status=ShapeStatus.OK,
+            message=self._beyond_range,
         )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
-from gravcomp.description import Robot
+from gravcomp.description import Cable, CableLine, Robot
 from gravcomp.full_model.model import RobotModel
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.corotational import CorotationalElements
@@ -21,7 +21,7 @@ from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 8
+_FORMAT = 9
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,15 @@ def path_of(model: RobotModel) -> Path:
     materials = [dataclasses.asdict(material) for material in model.mesh.materials]
     for material in materials:
         material["youngs_modulus"] = round(material["youngs_modulus"] / first_modulus(model), 9)
-        for viscous in ("damping_time", "creep_ratio", "creep_time"):
+        for viscous in ("damping_time", "creep_ratio", "creep_time", "prony"):
             del material[viscous]
+        if material["fibres"] is None:
+            del material["fibres"]
         for law in LAWS.values():  # a constant counts only for the law that has it
             for name in set(law.own_constants) - set(LAWS[material["law"]].own_constants):
                 material.pop(name, None)
     mesh, robot = model.mesh, model.robot
-    cables = [dataclasses.asdict(cable) for cable in robot.cables]
-    for cable in cables:  # the reduction does not depend on it, and a calibration must not require a new one
-        del cable["axial_stiffness"]
+    cables = [_path_of_cable(cable) for cable in robot.cables]
     key = content_key(
         _FORMAT,
         mesh.kind,
@@ -89,8 +89,17 @@ def path_of(model: RobotModel) -> Path:
         robot.payload,
         *_loads(robot),
         *_disks(robot),
+        *(["mean volume"] if model.elements.averaged.any() else []),
     )
     return cache_path("reduction", key, ".npz")
+
+
+def _path_of_cable(cable: Cable) -> dict:
+    """Return what the reduction depends on: path and friction. A calibration of the line's stretch does not require a new one."""
+    path = dataclasses.asdict(cable)
+    for field in dataclasses.fields(CableLine):
+        del path[field.name]
+    return path | {"friction": cable.friction or 0.0}
 
 
 def _loads(robot: Robot) -> list:

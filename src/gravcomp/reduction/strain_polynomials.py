@@ -143,7 +143,8 @@ class _Points:
     """A part of the quadrature points.
 
     gradient (p, 3, 3, r) of the modes; linear (6 p, r): their linear strains; strains (6 p, s) of the snapshots; first_lame,
-    shear and weight (p,).
+    shear and weight (p,); fibres (p, f, 6); averaged (p,): points of elements with one pressure; together: number of points of an
+    element.
     """
 
     gradient: np.ndarray
@@ -152,12 +153,24 @@ class _Points:
     first_lame: np.ndarray
     shear: np.ndarray
     weight: np.ndarray
+    fibres: np.ndarray
+    averaged: np.ndarray
+    together: int
 
     def stress(self, strains: np.ndarray) -> np.ndarray:
-        """Return C : strains (6 p, k), times the weights of the points."""
+        """Return C : strains (6 p, k), times the weights of the points; C includes the fibres."""
         strains = strains.reshape(len(self.weight), 6, -1)
         stress = self.shear[:, None, None] * strains
-        stress[:, :3] = 2.0 * stress[:, :3] + (self.first_lame[:, None] * strains[:, :3].sum(axis=1))[:, None, :]
+        trace = strains[:, :3].sum(axis=1)
+        stress[:, :3] = 2.0 * stress[:, :3] + (self.first_lame[:, None] * trace)[:, None, :]
+        if self.averaged.any():  # the pressure is that of the element's mean volume
+            shape = -1, self.together
+            weight = self.weight.reshape(shape)
+            mean = np.einsum("ep,epk->ek", weight, trace.reshape(*weight.shape, -1)) / weight.sum(axis=1, keepdims=True)
+            bulk = np.where(self.averaged, self.first_lame + 2.0 / 3.0 * self.shear, 0.0)
+            stress[:, :3] += (bulk[:, None] * (np.repeat(mean, self.together, axis=0) - trace))[:, None, :]
+        if self.fibres.shape[1]:
+            stress += np.einsum("pfm,pfn,pnk->pmk", self.fibres, self.fibres, strains, optimize=True)
         return (stress * self.weight[:, None, None]).reshape(6 * len(self.weight), -1)
 
     def products(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -180,6 +193,9 @@ def _parts(elements: SolidElements, basis: np.ndarray, snapshots: np.ndarray) ->
             first_lame=np.repeat(elements.constants.first[part], count),
             shear=np.repeat(elements.constants.shear[part], count),
             weight=elements.weights[part].ravel(),
+            fibres=np.concatenate(elements.fibres[part]),
+            averaged=np.repeat(elements.averaged[part], count),
+            together=count,
         )
 
 

@@ -2,9 +2,10 @@
 
     A = K(q) + K_cables(q, lambda),   A y = Phi^T f_weight - f(q),   A X = H^T,   W = H X,   dq = y + X lambda
 
-with the tensions lambda from the cables' complementarity. One step is enough to track a turning gravity; another is taken if
-the correction with the last factor moves the tip by more than the tolerance. All of it is one compiled function: with many
-small calls, a control step would spend more time on calling than on computing.
+with the tensions lambda from the cables' complementarity. Creep adds a stress that is linear in the strain (`memory`). One step
+is enough to track a turning gravity; another is taken if the correction with the last factor moves the tip by more than the
+tolerance. All of it is one compiled function: with many small calls, a control step would spend more time on calling than on
+computing.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +16,10 @@ from numba import njit
 from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, point_at
+from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking
+from gravcomp.reduction.law_deviation import KeptStiffness
+from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
 
@@ -53,6 +55,8 @@ class ReducedTracker:
         self.model = model
         self._limits = longest_step * length, near * length, tolerance * length
         self._body = body_of(model)
+        self._kept = kept_stiffness(model)
+        self._no_offset = np.zeros(model.elasticity.linear.shape[1])
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
     def place(self, q: np.ndarray, tension: np.ndarray, sliding: Sliding | None = None) -> None:
@@ -62,8 +66,19 @@ class ReducedTracker:
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
         self._point = point_at(self._body, q, self.sliding.direction)
 
-    def track(self, gravity: np.ndarray, cables: CableInput, iterations: int = 4) -> ReducedState:
-        """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`."""
+    @property
+    def strain(self) -> np.ndarray:
+        """Strain (k,) of the elasticity at the present state."""
+        return self._point.strain
+
+    def track(
+        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, creep: tuple[float, np.ndarray] | None = None
+    ) -> ReducedState:
+        """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`.
+
+        creep: of `Memory.stress`; None: the branches have relaxed.
+        """
+        stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
         if self.model.cables.friction.any():
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
@@ -78,6 +93,9 @@ class ReducedTracker:
             wound,
             given,
             self.sliding.direction,
+            1.0 + stiffer,
+            offset,
+            self._kept,
             iterations,
             *self._limits,
         )
@@ -90,31 +108,35 @@ class ReducedTracker:
 @njit(cache=True, fastmath=REORDERED)
 def _tracked(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
-    pulling: np.ndarray, iterations: int, longest_step: float, near: float, tolerance: float,
+    pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
+    iterations: int, longest_step: float, near: float, tolerance: float,
 ) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
     """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
-    wound and given: of `body.cable_arrays`; pulling (m,): of `tendons_at`; the last three in m.
+    wound and given: of `body.cable_arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
+    offset; kept: of `elastic_stiffness`; the last three in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual = False, np.inf
     for _ in range(iterations):
-        matrix = elastic_stiffness(body, point, point.strain, 1.0)
+        stress = scale * point.strain + offset
+        matrix = elastic_stiffness(body, point, q, stress, scale, kept)
         add_stiffness(cables, point.tendons, tension, matrix)
         definite, factor = factorise(matrix)
         if not definite:
             break
         columns = np.empty((r, m + 4))
-        columns[:, 0] = weight - elastic_force(point, point.strain)
+        columns[:, 0] = weight - elastic_force(point, stress)
         columns[:, 1 : m + 1] = point.tendons.force_jacobian.T
         columns[:, m + 1 :] = body.tip.T
         solve(factor, columns)
         solved = np.ascontiguousarray(columns.T)
         y, answer, of_tip = solved[0], solved[1 : m + 1], solved[m + 1 :]
         compliance = point.tendons.jacobian @ answer.T
+        own = stretch(cables, point.tendons)
         for i in range(m):
-            compliance[i, i] += cables.axial_compliance[i]
+            compliance[i, i] += own[i]
         if len(given):
             wanted = given
         else:
@@ -127,7 +149,7 @@ def _tracked(
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
         q, tension = q + share * step, tension + share * (wanted - tension)
         point = point_at(body, q, pulling)
-        out = weight - elastic_force(point, point.strain) + tension @ point.tendons.force_jacobian
+        out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
         pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
         left = of_tip @ out + body.tip @ (answer.T @ pull)
         if size < near and (left**2).sum() < tolerance**2:
@@ -135,5 +157,5 @@ def _tracked(
             break
     if not converged:
         point = start
-    displacement = point.tendons.displacement + cables.axial_compliance * tension
+    displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     return converged, point, q, tension, displacement, compliance, answer, residual

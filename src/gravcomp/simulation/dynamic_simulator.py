@@ -15,6 +15,7 @@ from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.motion import Motion
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Shape, ShapeStatus
+from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation.simulator import Simulator
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class DynamicSimulator:
         self.solver = DynamicSolver(self.model, self.options)
         self._reduced, self._momentum = self._reduced_solver(self.statics.reduced_model)
         self._in_reduced, self._wait = False, 0
+        # Of the reduced model, while the full one computes the motion; None: not known.
+        self._memory = self._reduced.state.memory if self._reduced else None
 
     def load_reduced(self) -> "_LoadedMotion | None":
         """As `Simulator.load_reduced`, with the motion."""
@@ -127,13 +130,14 @@ class DynamicSimulator:
             sections = model.effectors.sections(model.mesh.nodes + self.solver.state.u)
             _, _, orientation = observe(sections, np.zeros((*sections.shape, 0)))
         ok = motion.converged
+        stretch = model.tendons.axial_compliance * motion.tendons.mean_share
         return dataclasses.replace(
             equilibrium,
             tip_position=sections[-1, 0],
             tip_orientation=orientation[-1],
             backbone_position=sections[:-1, 0],
             backbone_orientation=orientation[:-1],
-            cable_displacement=motion.tendons.displacement + model.tendons.axial_compliance * motion.tension,
+            cable_displacement=motion.tendons.displacement + stretch * motion.tension,
             cable_tension=motion.tension,
             residual=motion.residual,
             solve_time=time.perf_counter() - started,
@@ -157,9 +161,16 @@ class DynamicSimulator:
             q, velocity, acceleration = (
                 self._lifted(left, x) for x in (left.state.q, left.state.velocity, left.state.acceleration)
             )
-            self.solver.take_over(q, velocity, acceleration, left.state.tension)
-            self._in_reduced = False
-        return _advanced(self.solver, gravity, cables, h, count)
+            held = None
+            if left.state.memory.ratio.size:
+                assert isinstance(self.model.elements, SolidElements)  # others are not reduced
+                held = left.state.memory.at_points(self.model.elements, left.model.basis)[1]
+            self.solver.take_over(q, velocity, acceleration, left.state.tension, held)
+            self._in_reduced, self._memory = False, left.state.memory
+        motion = _advanced(self.solver, gravity, cables, h, count)
+        if self._memory is not None and self._reduced is not None and self._memory.ratio.size:
+            self._memory = self._memory.after(*self._reduced.model.projected(self.model.free(motion.u)), count * h)
+        return motion
 
     def _usable_reduced(self) -> "ReducedDynamicSolver | None":
         """Return the reduced model's solver if it may be used; if the full model was used before, at the full model's state."""
@@ -171,9 +182,8 @@ class DynamicSimulator:
             q = reduced.coordinates_of @ free(last.u)
             tip = self.model.effectors.sections(self.model.mesh.nodes + last.u)[-1, 0]
             if np.linalg.norm(reduced.tip(q) - tip) < _AGREEMENT * self.model.length:
-                self._reduced.take_over(
-                    q, self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration), last.tension
-                )
+                velocity, acceleration = self._momentum @ free(last.velocity), self._momentum @ free(last.acceleration)
+                self._reduced.take_over(q, velocity, acceleration, last.tension, self._memory)
                 self._in_reduced = True
         return self._active_reduced
 
@@ -181,6 +191,9 @@ class DynamicSimulator:
         """Go to rest at the displacements u (n, 3)."""
         self._in_reduced, self._wait = False, 0
         self.solver.place(u, tension, gravity)
+        self._memory = None
+        if self._reduced is not None:
+            self._memory = self._reduced.state.memory.relaxed(*self._reduced.model.projected(self.model.free(u)))
 
     def _lifted(self, reduced: "ReducedDynamicSolver", q: np.ndarray) -> np.ndarray:
         """Return the field (n, 3) of the reduced coordinates q (r,)."""
@@ -193,16 +206,15 @@ class DynamicSimulator:
 
         Both are None without a reduced model, and if the materials differ in damping or creep.
         """
-        laws = {(m.damping_time, m.creep_ratio, m.creep_time) for m in self.model.mesh.materials}
+        laws = {(m.damping_time, m.branches) for m in self.model.mesh.materials}
         if reduced is None or (len(laws) > 1 and self.options.damping == "kelvin_voigt"):
             return None, None
         from gravcomp.reduction.motion import ReducedDynamicSolver
 
         weighted = self.model.mass_matrix().multiply(reduced.basis)
         mass = reduced.basis.T @ weighted
-        damping_time, creep_ratio, creep_time = laws.pop()
-        creep = creep_ratio, creep_time
-        solver = ReducedDynamicSolver(reduced, mass, damping_time, self.model.length, self.options, creep=creep)
+        damping_time, branches = laws.pop()
+        solver = ReducedDynamicSolver(reduced, mass, damping_time, self.model.length, self.options, branches=branches)
         return solver, np.linalg.solve(mass, weighted.T)
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.materials.laws import LAWS
-from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ class Simulator:
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
+        self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
         self._serving = self.load_reduced() if reduced else None
 
@@ -53,7 +54,11 @@ class Simulator:
         from gravcomp.reduction.store import load
 
         reduction = load(self.model)
-        return None if reduction is None else ReducedServing(self.model, reduction.reduced_model(self.model), self.solver)
+        return (
+            None
+            if reduction is None
+            else ReducedServing(self.model, reduction.reduced_model(self.model), self.solver, self._creep)
+        )
 
     def adopt(self, serving: "ReducedServing") -> None:
         """Use `serving`, from `load_reduced`, as soon as it agrees with the full model: the shape does not jump."""
@@ -73,28 +78,41 @@ class Simulator:
         return self.solver.state.u
 
     def reset(self) -> None:
-        """Return to the straight robot."""
+        """Return to the straight robot, relaxed."""
         self.solver.reset()
+        self._creep.relax(self.solver.state.u)
         self._pace.reset()
         if self._serving:
             self._serving.reset()
 
-    def step(self, gravity: np.ndarray, displacement: np.ndarray | None = None, tension: np.ndarray | None = None) -> Shape:
+    def step(
+        self,
+        gravity: np.ndarray,
+        displacement: np.ndarray | None = None,
+        tension: np.ndarray | None = None,
+        duration: float | None = None,
+    ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
         If the equilibrium is lost, it is searched for from the straight robot, but only occasionally (see `SearchPace`). If
         none is found or searched for, the last shape is returned with the status NOT_CONVERGED.
 
         gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
-        cables are released. Raises ValueError for wrong lengths, numbers that are not finite, and negative tensions.
+        cables are released. duration: s since the last step, in which a body with creep has crept (`full_model.creep`); None:
+        the body has relaxed, as after a long time. Raises ValueError for wrong lengths, numbers that are not finite, negative
+        tensions, and a duration that is not positive.
         """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
-        shape = self._serving.step(gravity, cables) if self._serving else None
+        if duration is not None and not 0.0 < duration < math.inf:
+            raise ValueError(f"duration is {duration} s; a positive number is needed")
+        h = duration if self._creep.exists else None
+        shape = self._serving.step(gravity, cables, h) if self._serving else None
         if shape is not None:
             self._pace.found(gravity, cables)
             return shape
         before = self.solver.state
+        self.solver.viscous = None if h is None else self._creep.step(h)
         state = self.solver.track(gravity, cables)
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
@@ -108,11 +126,12 @@ class Simulator:
             self._pace.found(gravity, cables)
         else:
             self.solver.state = before
+        self._remember(self.solver.state.u, h)
         shape = self._shape(state, gravity, started)
         if not self._serving:
             return shape
         reason = self._serving.reason
-        self._serving.take_over(state, gravity, cables)
+        self._serving.take_over(state, gravity, cables, h)
         if shape.status != ShapeStatus.OK:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
@@ -131,7 +150,9 @@ class Simulator:
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
         self.solver.reset()
+        self.solver.viscous = None
         state = self.solver.solve(gravity, cables, wrench=wrench)
+        self._remember(state.u, None)
         self._pace.reset()
         if state.converged:
             self._pace.found(gravity, cables)
@@ -156,12 +177,21 @@ class Simulator:
             return gravity, CableInput(wound=_vector("displacement", displacement, count, allow_nan=True))
         return gravity, CableInput()
 
+    def _remember(self, u: np.ndarray, h: float | None) -> None:
+        """Let the body creep to the equilibrium u (n, 3) in h s; None: it is relaxed there."""
+        if not self._creep.exists:
+            return
+        if h is None:
+            self._creep.relax(u)
+        else:
+            self._creep.advance(u, h)
+
     def _shape(self, state: Equilibrium, gravity: np.ndarray, started: float) -> Shape:
         """Return the shape and response of a state of the full model; started: of the computation, by `time.perf_counter`."""
         model = self.model
         sections = model.effectors.sections(model.mesh.nodes + state.u)
         effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-        displacement = state.tendons.displacement + model.tendons.axial_compliance * state.tension
+        displacement = state.tendons.displacement + model.tendons.stretch(state.tendons) * state.tension
         response = Response(
             state.compliance,
             compliance_ea,
@@ -181,7 +211,7 @@ class Simulator:
             residual=state.residual,
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
-            message="" if state.converged else self._reason(state),
+            message=beyond_range(model, state.u) if state.converged else self._reason(state),
         )
 
     def _reason(self, state: Equilibrium) -> str:
@@ -189,18 +219,7 @@ class Simulator:
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        mesh, elements = self.model.mesh, self.model.elements
-        if isinstance(elements, CorotationalElements):
-            return f"{message}: {_LIMIT_POINT}"
-        for number, material in enumerate(mesh.materials):
-            softening, own = LAWS[material.law].softening_strain, mesh.region == number
-            least = elements.strains(state.u)[own, :, :3].min(initial=0.0)
-            if softening is not None and least < softening:
-                return (
-                    f"{message}: the body is compressed to {100 * np.sqrt(1 + 2 * least):.0f} % of its length at a point,"
-                    f" where the law '{material.law}' softens; choose another law for such loads"
-                )
-        return f"{message}: {_LIMIT_POINT}"
+        return f"{message}: {beyond_range(self.model, state.u) or _LIMIT_POINT}"
 
 
 def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) -> np.ndarray:

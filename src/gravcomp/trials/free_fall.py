@@ -49,7 +49,7 @@ def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tup
     base (3, 3): world from soft_base; duration in s.
     """
     model = build_rod(setup.nominal, setup.truth)
-    rod = MovingRod(model, build_material(model, setup.truth), build_friction(setup.truth))
+    rod = MovingRod(model, build_material(model, setup.truth), build_friction(setup.nominal, setup.truth))
     none = np.zeros(model.tendons)
     rod.rest(RodShape(*model.straight(), tension=none, displacement=none, iterations=0), base, np.zeros(3))
     # Copies: the rod updates its arrays in place.

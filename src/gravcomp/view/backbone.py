@@ -8,6 +8,10 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.description import Robot
+
+_REST_POINTS = 65
+
 
 @dataclasses.dataclass(frozen=True)
 class Backbone:
@@ -54,6 +58,17 @@ def arc_backbone(length: float, angle: float, plane: float, points: int = 33) ->
 def straight_backbone(length: float) -> Backbone:
     """Return the straight robot of `length` (m)."""
     return arc_backbone(length, 0.0, 0.0)
+
+
+def rest_backbone(robot: Robot) -> Backbone:
+    """Return the robot at rest, without load."""
+    from scipy.spatial.transform import Rotation
+
+    from gravcomp.mesh.pieces import rest_axis
+
+    station = np.linspace(0.0, 1.0, _REST_POINTS)
+    position, rotation = rest_axis(robot).frames(station * robot.length)
+    return Backbone(station, position, Rotation.from_matrix(rotation).as_quat())
 
 
 def rotations(q: np.ndarray) -> np.ndarray:

@@ -7,8 +7,9 @@ import viser
 
 from gravcomp.view import colours
 from gravcomp.view.backbone import Backbone
+from gravcomp.view.drawn_skin import add_skin
 from gravcomp.view.scale import SCALE, scaled
-from gravcomp.view.skin import add_skin, line_skin
+from gravcomp.view.skin import line_skin
 from gravcomp.view.snapshot import TargetView
 
 

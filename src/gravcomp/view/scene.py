@@ -5,14 +5,16 @@ import viser
 
 from gravcomp.description import Robot
 from gravcomp.view import colours
-from gravcomp.view.backbone import Backbone, arc_backbone, straight_backbone
+from gravcomp.view.backbone import Backbone, arc_backbone, rest_backbone
+from gravcomp.view.drawn_skin import add_skin
 from gravcomp.view.markers import TargetMarker, TruthMarker
 from gravcomp.view.mount import Mount
 from gravcomp.view.options import LumenOptions, PageOptions
 from gravcomp.view.scale import SCALE, scaled
-from gravcomp.view.skin import add_skin, cable_skin, joined, lumen_skin, revolved, wall_skins
+from gravcomp.view.skin import cable_skin, half_width, joined, revolved
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.surroundings import Surroundings
+from gravcomp.view.wall import lumen_skin, wall_skins
 from gravcomp.view.world import BaseInWorld, quaternion_wxyz
 
 GRAVITY_LENGTH = 0.045  # m, of the arrow for 9.81 m/s^2
@@ -30,12 +32,12 @@ class Scene:
         self._hidden: set[str] = set()
         self.surroundings = Surroundings(server, robot.length, options.dark)
         self._root = self._scene.add_frame("/robot", show_axes=False)
-        diameter = max((s.outer_diameter for s in robot.segments), default=0.09 * robot.length)
+        diameter = 2 * half_width(robot)
         Mount(self._scene, 2.0 * diameter, len(robot.cables))
-        straight = straight_backbone(robot.length)
-        self._add_body(straight)
-        self._truth = TruthMarker(self._scene, straight, 0.5 * diameter)
-        self.target = TargetMarker(self._scene, straight, 0.5 * diameter)
+        rest = rest_backbone(robot)
+        self._add_body(rest)
+        self._truth = TruthMarker(self._scene, rest, 0.5 * diameter)
+        self.target = TargetMarker(self._scene, rest, 0.5 * diameter)
         self._gravity = self._scene.add_arrows(
             "/robot/gravity", np.zeros((1, 2, 3)), colours.GRAVITY,
             shaft_radius=SCALE * 0.0009, head_radius=SCALE * 0.0026, head_length=SCALE * 0.007)  # fmt: skip
@@ -83,30 +85,30 @@ class Scene:
         rotation = self._world.follow(snapshot.gravity)
         self._root.wxyz = quaternion_wxyz(rotation) if self._view == WORLD else _BASE_WXYZ
 
-    def _add_body(self, straight: Backbone) -> None:
-        """Add walls, lumen and cables, and the walls at rest."""
+    def _add_body(self, rest: Backbone) -> None:
+        """Add walls, lumens and cables, and the walls at rest."""
         scene, walls = self._scene, wall_skins(self._robot)
         skins = list(walls)
         self.body: list[viser.MeshHandle] = []
         for index, skin in enumerate(walls):
             colour = colours.PROXIMAL if index % 2 == 0 else colours.DISTAL
             # Translucent, so that the colours of the cables inside are visible.
-            self.body.append(add_skin(scene, f"/robot/wall{index}", skin, straight, colour, opacity=0.6))
+            self.body.append(add_skin(scene, f"/robot/wall{index}", skin, rest, colour, opacity=0.6))
         lumen = lumen_skin(self._robot)
         self._inside: list[viser.MeshHandle] = []
         if lumen is not None:
             skins.append(lumen)
-            self._inside = [add_skin(scene, "/robot/lumen", lumen, straight, colours.LUMEN, opacity=0.35, cast_shadow=False)]
+            self._inside = [add_skin(scene, "/robot/lumen", lumen, rest, colours.LUMEN, opacity=0.35, cast_shadow=False)]
             self.body += self._inside
         self._cables: list[viser.MeshHandle] = []
         for cable in self._robot.cables:
             skins.append(cable_skin(self._robot, cable))
             colour = colours.tension_colour(0.0)
-            self._cables.append(add_skin(scene, f"/robot/cable_{cable.name}", skins[-1], straight, colour, cast_shadow=False))
+            self._cables.append(add_skin(scene, f"/robot/cable_{cable.name}", skins[-1], rest, colour, cast_shadow=False))
         self.body += self._cables
         self._body_skin, self._body_parts = joined(skins)
         self._ghosts = [
-            add_skin(scene, f"/robot/rest{i}", skin, straight, colours.GHOST, opacity=0.3, cast_shadow=False)
+            add_skin(scene, f"/robot/rest{i}", skin, rest, colours.GHOST, opacity=0.3, cast_shadow=False)
             for i, skin in enumerate(walls)
         ]
 

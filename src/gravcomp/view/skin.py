@@ -2,7 +2,7 @@
 
     vertex = p(station) + R(station) (x, y, 0)
 
-Walls, lumen and cables of a robot, and surfaces from a file, are deformed in the same way.
+Walls, lumens, disks and cables of a robot, and surfaces from a file (`wall`), are deformed in the same way.
 """
 
 import dataclasses
@@ -10,15 +10,13 @@ import functools
 import math
 
 import numpy as np
-import viser
 
 from gravcomp.description import Cable, Robot
 from gravcomp.view.backbone import Backbone
-from gravcomp.view.colours import Rgb
-from gravcomp.view.scale import scaled
 
-AROUND = 36  # vertices around the body
-FILLET = 0.0006  # m, radius of the rim of the end face
+AROUND = 40  # vertices around the body; a multiple of 8, so that rectangles have their corners
+_CABLE_POINTS = 32
+_CABLE, _FREE_CABLE = 0.13, 0.04  # radius of a cable, as part of half the width of the body
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,57 +48,48 @@ def joined(skins: list[Skin]) -> tuple[Skin, list[slice]]:
     return Skin(station, offset, np.zeros((0, 3), int)), parts
 
 
-def wall_skins(robot: Robot) -> list[Skin]:
-    """Return the outer surface: one skin per segment, or the whole surface of a body from a file."""
-    if robot.body is not None:
-        return [_body_skin(robot)]
-    skins, z = [], 0.0
-    for segment in robot.segments:
-        rings = max(8, round(segment.full_length / 0.002))
-        heights = np.linspace(z, z + segment.full_length, rings + 1)
-        radii = np.full(rings + 1, segment.outer_diameter / 2)
-        z += segment.full_length
-        if segment is robot.segments[-1]:
-            angle = np.linspace(0.0, math.pi / 2, 5)
-            heights = np.concatenate([heights[:-1], z - FILLET + FILLET * np.sin(angle), [z]])
-            inner = segment.lumen_diameter / 2
-            radii = np.concatenate([radii[:-1], radii[-1] - FILLET + FILLET * np.cos(angle), [inner]])
-        skins.append(revolved(radii, heights, robot.length))
-    return skins
+def merged(skins: list[Skin]) -> Skin:
+    """Return one skin with the vertices and faces of all."""
+    together, parts = joined(skins)
+    faces = [skin.faces + part.start for skin, part in zip(skins, parts)]
+    return Skin(together.station, together.offset, np.concatenate(faces))
 
 
-def lumen_skin(robot: Robot) -> Skin | None:
-    """Return the wall of the working channel, facing inward; None for a body from a file."""
-    if robot.body is not None:
-        return None
-    radii: list[float] = []
-    heights: list[float] = []
-    z = 0.0
-    for segment in robot.segments:
-        along = np.linspace(z, z + segment.full_length, 16)
-        heights += along.tolist()
-        radii += [segment.lumen_diameter / 2] * len(along)
-        z += segment.full_length
-    return revolved(np.array(radii)[::-1], np.array(heights)[::-1], robot.length, around=24)
-
-
-def cable_skin(robot: Robot, cable: Cable, radius: float = 0.0006, around: int = 8) -> Skin:
-    """Return a cable as a tube of `radius` (m), from its entry into the body to its fixed end."""
-    z = np.linspace(cable.start, robot.cable_end(cable), 32)
-    centre = cable_offset(cable, z)
+def cable_skin(robot: Robot, cable: Cable, radius: float | None = None, around: int = 8) -> Skin:
+    """Return a cable as a tube of `radius` (m), from its entry into the body to its fixed end; straight between disks."""
+    if radius is None:  # outside a backbone cables stand alone and are drawn thinner
+        radius = half_width(robot) * (_FREE_CABLE if any(segment.disks for segment in robot.segments) else _CABLE)
+    line = cable_line(robot, cable)
     angle = np.linspace(0.0, 2 * math.pi, around, endpoint=False)
     circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    offset = (centre[:, None, :] + circle[None, :, :]).reshape(-1, 2)
-    return Skin(np.repeat(z / robot.length, around), offset, _quads(len(z), around))
+    offset = (line.offset[:, None, :] + circle[None, :, :]).reshape(-1, 2)
+    return Skin(np.repeat(line.station, around), offset, quads(len(line.station), around))
 
 
-def cable_offset(cable: Cable, z: np.ndarray) -> np.ndarray:
-    """Return the positions (k, 2) of a cable in m, in the axes of the cross-sections at the heights z (k,)."""
-    if cable.via_points is not None:
-        via = np.array(cable.via_points)
-        return np.stack([np.interp(z, via[:, 2], via[:, 0]), np.interp(z, via[:, 2], via[:, 1])], axis=1)
-    assert cable.radius is not None and cable.angle is not None  # both are given for a cable without via points
-    return np.tile(cable.radius * np.array([math.cos(cable.angle), math.sin(cable.angle)]), (len(z), 1))
+def cable_line(robot: Robot, cable: Cable) -> Skin:
+    """Return the points of a cable, from its entry into the body to its fixed end, as a skin without faces."""
+    z = np.linspace(cable.via_points[0][2] if cable.via_points else cable.start, robot.cable_end(cable), _CABLE_POINTS)
+    z = _guided(robot, z)
+    places = np.array([robot.cable_place(cable, float(height)) for height in z])
+    return Skin(z / robot.length, places, np.zeros((0, 3), int))
+
+
+def half_width(robot: Robot) -> float:
+    """Return half the largest width (m) of the body, disks included; for a body from a file, a part of its length."""
+    widths = [max(o.half_width, o.half_height) for piece in robot.pieces for o in piece.outer]
+    widths += [segment.disks.outer_diameter / 2 for segment in robot.segments if segment.disks]
+    return max(widths, default=0.045 * robot.length)
+
+
+def _guided(robot: Robot, z: np.ndarray) -> np.ndarray:
+    """The heights (k,) without those between disks, and with those of the disks."""
+    base, low, high = 0.0, z[0], z[-1]
+    for segment in robot.segments:
+        if segment.disks:
+            disks = base + np.array([0.0, *segment.disks.heights(segment.length)])
+            z = np.concatenate([z[(z <= base) | (z >= base + segment.length)], disks[(disks >= low) & (disks <= high)]])
+        base += segment.full_length
+    return np.unique(z)
 
 
 def line_skin(radius: float, around: int = 10, rings: int = 48) -> Skin:
@@ -112,40 +101,12 @@ def revolved(radii: np.ndarray, heights: np.ndarray, length: float, around: int 
     """Return a surface of revolution from radii and heights (k,) in m; it faces outward when the heights increase."""
     angle = np.linspace(0.0, 2 * math.pi, around, endpoint=False)
     offset = radii[:, None, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)[None]
-    return Skin(np.repeat(heights / length, around), offset.reshape(-1, 2), _quads(len(radii), around))
+    return Skin(np.repeat(heights / length, around), offset.reshape(-1, 2), quads(len(radii), around))
 
 
-def add_skin(
-    scene: viser.SceneApi,
-    name: str,
-    skin: Skin,
-    backbone: Backbone,
-    colour: Rgb,
-    *,
-    opacity: float | None = None,
-    cast_shadow: bool = True,
-) -> viser.MeshHandle:
-    """Add a skin on a backbone to a scene."""
-    return scene.add_mesh_simple(
-        name, scaled(skin.on(backbone)), skin.faces, color=colour, side="front", opacity=opacity, cast_shadow=cast_shadow
-    )
-
-
-def _quads(rings: int, around: int) -> np.ndarray:
+def quads(rings: int, around: int) -> np.ndarray:
+    """Return the faces (f, 3) of rings of vertices, each joined to the next one."""
     i, j = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
     a, b = i * around + j, i * around + (j + 1) % around
     c, d = a + around, b + around
     return np.concatenate([np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)])
-
-
-def _body_skin(robot: Robot) -> Skin:
-    from gravcomp.mesh import body_mesh
-
-    mesh = body_mesh(robot)
-    corners = mesh.elements[:, :4]
-    faces = np.concatenate([corners[:, face] for face in ([0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2])])
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    surface = faces[first[count == 1]]
-    used, renumbered = np.unique(surface, return_inverse=True)
-    nodes = mesh.nodes[used]
-    return Skin(nodes[:, 2] / robot.length, nodes[:, :2], renumbered.reshape(surface.shape))

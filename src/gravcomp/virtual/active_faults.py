@@ -15,7 +15,8 @@ class ActiveFaults:
 
     def __init__(self, hardware: Hardware):
         self._cables = hardware.cables
-        self._feedback_id = {motor.cable: c610.feedback_id(motor.can_id) for motor in hardware.motors}
+        self._motors = hardware.motors
+        self._feedback_id = {cable: c610.feedback_id(motor.can_id) for motor in hardware.motors for cable in motor.ratios}
         self._faults: list[tuple[Fault, float]] = []
 
     @property
@@ -51,3 +52,7 @@ class ActiveFaults:
     def concerned(self, fault: Fault) -> np.ndarray:
         """Return (m,) bool: the cables that the fault acts on."""
         return np.array([fault.cable in ("", cable) for cable in self._cables])
+
+    def concerned_motors(self, fault: Fault) -> np.ndarray:
+        """Return (k,) bool: the motors that the fault acts on."""
+        return np.array([fault.cable == "" or fault.cable in motor.ratios for motor in self._motors])

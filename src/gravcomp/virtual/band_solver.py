@@ -39,11 +39,14 @@ def solve(band: np.ndarray, right_sides: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def newton_step(band: np.ndarray, residual: np.ndarray, gradient: np.ndarray, pull: np.ndarray, spring: np.ndarray) -> np.ndarray:
+def newton_step(
+    band: np.ndarray, residual: np.ndarray, gradient: np.ndarray, pull: np.ndarray, spring: np.ndarray, compliance: np.ndarray
+) -> np.ndarray:
     """Return the increment (6 n,) of the free cross-sections.
 
     It solves (band + pull diag(spring) gradient^T) increment = -residual. spring (m,) is dT_0 / d path in N/m, 0 for a slack
-    tendon. The tendons enter by the Sherman-Morrison-Woodbury formula. band is overwritten.
+    tendon. The tendons enter by the Sherman-Morrison-Woodbury formula. band is overwritten. compliance (m,) is filled with how
+    much the path of each tendon shortens in m for a tension of 1 N in it, in this system.
     """
     size, m = gradient.shape
     sides = np.empty((size, m + 1))
@@ -55,6 +58,9 @@ def newton_step(band: np.ndarray, residual: np.ndarray, gradient: np.ndarray, pu
     small, known = np.zeros((m, m)), np.zeros(m)
     for a in range(m):
         small[a, a] = 1.0
+        compliance[a] = 0.0
+        for k in range(size):
+            compliance[a] += gradient[k, a] * sides[k, 1 + a]
         if spring[a] == 0.0:
             continue
         for k in range(size):

@@ -15,6 +15,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Robot
+from gravcomp.virtual.lines import true_lines
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.rod import RodModel
@@ -66,10 +67,10 @@ def build_material(model: RodModel, parameters: VirtualRobotParameters) -> RodMa
     return RodMaterial(np.array(body.creep_ratio), np.array(body.creep_time), body.damping_time, slip, slip * body.slip_curvature)
 
 
-def build_friction(parameters: VirtualRobotParameters) -> TendonFriction:
+def build_friction(robot: Robot, parameters: VirtualRobotParameters) -> TendonFriction:
     """Return the friction of the tendons."""
-    tendons = parameters.tendons
-    return TendonFriction(tendons.friction, tendons.guide_angle, tendons.presliding)
+    lines = true_lines(robot, parameters.tendons)
+    return TendonFriction(lines.friction, lines.guide_angle, parameters.tendons.presliding)
 
 
 def _element_ends(robot: Robot, longest: float) -> np.ndarray:
@@ -124,4 +125,5 @@ def _tendons(robot: Robot, parameters: VirtualRobotParameters, ends: np.ndarray)
     end = np.array([element_at(robot.cable_end(cable)) for cable in robot.cables], dtype=np.int64)
     inside = np.array([robot.cable_end(cable) - cable.start for cable in robot.cables])
     offsets = np.array([offset(cable) for cable in robot.cables]).reshape(-1, 3)
-    return offsets, start, end, tendons.axial_stiffness / (tendons.free_length + inside)
+    lines = true_lines(robot, tendons)
+    return offsets, start, end, lines.stiffness / (lines.free_length + inside)

@@ -29,6 +29,7 @@ class MovingRod:
         self._wound = np.zeros(m)
         self.tension = np.zeros(m)  # N, at the capstan
         self.shortened = np.zeros(m)  # m, by how much the tendons' paths are shorter than in the straight rod
+        self._compliance = np.zeros(m)  # m/N, of the tendons' paths within one step
         self.tendon_stiffness = model.tendon_stiffness.copy()  # N/m; 0: the tendon is broken
         self._measure()
 
@@ -39,6 +40,18 @@ class MovingRod:
             station, self.model.station, self.orientation, self.position, self.strain, self.model.length, position, orientation
         )
         return position, orientation
+
+    @property
+    def spring(self) -> np.ndarray:
+        """Stiffness (m,) N/m that each capstan feels within a step: the line in series with the rod."""
+        return self.tendon_stiffness / (1.0 + self.tendon_stiffness * self._compliance)
+
+    @property
+    def contact(self) -> np.ndarray:
+        """Displacement (m,) m of each capstan at which a spring of `spring` that has the present tension becomes slack."""
+        spring = self.spring
+        taut = (self.tension > 0.0) & (spring > 0.0)
+        return np.where(taut, self._wound - self.tension / np.where(taut, spring, 1.0), self.shortened)
 
     @property
     def tension_share(self) -> np.ndarray:
@@ -65,6 +78,9 @@ class MovingRod:
         self._branch_strain[:] = self.strain
         self._slip_strain[:] = self.strain[:, 3:5]
         self.tension = shape.tension.copy()
+        self._compliance[:] = 0.0
+        taut = (self.tension > 0.0) & (self.tendon_stiffness > 0.0)
+        self._wound[taut] = self.shortened[taut] + self.tension[taut] / self.tendon_stiffness[taut]
 
     def step(
         self, dt: float, base_orientation: np.ndarray, base_position: np.ndarray, gravity: np.ndarray, wound: np.ndarray
@@ -95,6 +111,7 @@ class MovingRod:
             self._path,
             self.tension,
             self.shortened,
+            self._compliance,
             model.length,
             model.stiffness,
             model.mass,

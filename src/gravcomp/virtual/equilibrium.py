@@ -125,7 +125,7 @@ def _settle(
     for k in range(n + 1):
         for i in range(3):
             force[k, i] = mass[k] * gravity[i]
-    tension, active, shortened = np.empty(m), np.empty(m), np.empty(m)
+    tension, active, shortened, compliance = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     strains(orientation, position, length, strain)
     tendon_lengths(strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
@@ -167,7 +167,7 @@ def _settle(
                 for i in range(23):
                     factors[k, i] = band[k, i]
                 factors[k, 11] += addition * band[k, 11]
-            increment = newton_step(factors, residual, gradient, pull, active)
+            increment = newton_step(factors, residual, gradient, pull, active, compliance)
             largest, slope = 0.0, 0.0
             for k in range(n):
                 for i in range(6):

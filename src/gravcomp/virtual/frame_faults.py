@@ -93,4 +93,6 @@ def _renamed(frame: can.Message) -> can.Message:
 
 
 def _copy(frame: can.Message, identifier: int, data: bytes | bytearray) -> can.Message:
-    return can.Message(timestamp=frame.timestamp, arbitration_id=identifier, is_extended_id=False, data=bytes(data))
+    return can.Message(
+        timestamp=frame.timestamp, arbitration_id=identifier, is_extended_id=False, data=bytes(data), channel=frame.channel
+    )

@@ -4,10 +4,11 @@ Angles and torques are positive in the direction that winds the cable in. At the
 
     J dw/dt = k_t i - b w - F / N r - friction,    di/dt = (i_commanded - i) / lag
 
-with the force F of the cable, the gear ratio N and the radius r of the capstan. Coulomb friction (a constant part and a part
-proportional to the load) removes at most the existing momentum, so a rotor at rest stays at rest. The capstan has no inertia of
-its own: while the cable is taut it lies on the flank that winds in; inside the backlash it stays where it is while its drag is
-larger than the torque of the cable.
+with the gear ratio N, the radius r of the capstan and the force F there: the sum of the forces of the motor's cables, each times
+its ratio. Coulomb friction (a constant part and a part proportional to the load) removes at most the existing momentum, so a
+rotor at rest stays at rest. The capstan has no inertia of its own: while the cable is taut it lies on the flank that winds in;
+inside the backlash it stays where it is while its drag is larger than the torque of the cables. An antagonist that pulls more
+draws it to the other flank.
 
 The speed controller keeps the last current that it received; there is no timeout.
 """
@@ -22,31 +23,33 @@ from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
 from gravcomp.virtual.parameters import Motors
 
 TICK = 0.5e-3  # s
+_DRAWS = 4  # moves of a capstan in its backlash; one more than cables that become slack or taut on the way
 
 
 class MotorBank:
-    """The m motors in the order of the cables."""
+    """The k motors of m cables."""
 
     def __init__(self, parameters: Motors, hardware: Hardware, slack: np.ndarray, random: np.random.Generator):
         """slack (m,) m: length of cable beyond the straight robot's at the start. Each rotor starts at a random angle."""
-        m = len(hardware.motors)
+        k = len(hardware.motors)
         self._parameters, self._random = parameters, random
         self._ratio = hardware.drive.gear_ratio
         self._direction = np.array([motor.direction for motor in hardware.motors])
-        self._start_count = random.integers(0, COUNTS_PER_TURN, m)
-        self._slack = slack
-        self._rotor, self._speed, self._capstan = np.zeros(m), np.zeros(m), np.zeros(m)
-        self._current = np.zeros(m)
-        self.commanded = np.zeros(m)  # A, as last received, positive as the motor counts
-        self.stalled = np.zeros(m, dtype=bool)  # rotors that are blocked
+        self._start_count = random.integers(0, COUNTS_PER_TURN, k)
+        self._matrix = np.ascontiguousarray(hardware.transmission.matrix)
+        self._longer = slack - hardware.transmission.preload  # m, by which each cable is longer than its path at the start
+        self._rotor, self._speed, self._capstan = np.zeros(k), np.zeros(k), np.zeros(k)
+        self._current = np.zeros(k)
+        self.commanded = np.zeros(k)  # A, as last received, positive as the motor counts
+        self.stalled = np.zeros(k, dtype=bool)  # rotors that are blocked
 
     @property
     def wound(self) -> np.ndarray:
         """Length (m,) m of cable wound in; 0: the cable has exactly the length of its path in the straight robot."""
-        return self._capstan * self._parameters.capstan_radius - self._slack
+        return self._matrix @ self._capstan * self._parameters.capstan_radius - self._longer
 
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
-        """Advance by `ticks` of TICK s; the cable paths are `shortened` (m,) m, the cables are springs of `spring` (m,) N/m."""
+        """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack up to displacements `shortened` (m,) m."""
         p = self._parameters
         _step(
             ticks,
@@ -57,9 +60,9 @@ class MotorBank:
             self.commanded,
             self._direction,
             self.stalled,
-            shortened,
-            self._slack,
+            shortened + self._longer,
             spring,
+            self._matrix,
             p.torque_constant / self._ratio,
             p.rotor_inertia,
             p.friction_torque,
@@ -74,7 +77,7 @@ class MotorBank:
         )
 
     def jump(self, motors: np.ndarray) -> None:
-        """Shift the encoders of `motors` (m,) bool by a third of a turn, as when a magnet has slipped."""
+        """Shift the encoders of `motors` (k,) bool by a third of a turn, as when a magnet has slipped."""
         self._start_count = np.where(motors, self._start_count + COUNTS_PER_TURN // 3, self._start_count)
 
     def feedback(self) -> list[dict[str, float]]:
@@ -108,9 +111,9 @@ def _step(
     commanded: np.ndarray,
     direction: np.ndarray,
     stalled: np.ndarray,
-    shortened: np.ndarray,
-    slack: np.ndarray,
+    offset: np.ndarray,
     spring: np.ndarray,
+    matrix: np.ndarray,
     torque_constant: float,
     inertia: float,
     friction: float,
@@ -124,28 +127,54 @@ def _step(
     current_gain: float,
 ) -> None:
     half = 0.5 * backlash
-    for c in range(rotor.shape[0]):
-        command = direction[c] * min(LARGEST_CURRENT, max(-LARGEST_CURRENT, commanded[c]))
-        offset = shortened[c] + slack[c]
-        for _ in range(ticks):
+    wound = np.empty(matrix.shape[0])
+    for _ in range(ticks):
+        for i in range(matrix.shape[0]):
+            wound[i] = 0.0
+            for j in range(matrix.shape[1]):
+                wound[i] += radius * matrix[i, j] * capstan[j]
+        for c in range(rotor.shape[0]):
+            command = direction[c] * min(LARGEST_CURRENT, max(-LARGEST_CURRENT, commanded[c]))
             current[c] += current_gain * (command - current[c])
             # The back-EMF limits the current, the more the faster the rotor turns in the direction of the current.
             room = LARGEST_CURRENT * max(0.0, 1.0 - speed[c] * (1.0 if current[c] > 0.0 else -1.0) / no_load_speed)
             current[c] = min(room, max(-room, current[c]))
-            force = spring[c] * max(0.0, radius * capstan[c] - offset)
-            at_flank = rotor[c] / ratio - capstan[c] >= half - 1e-9
-            load = force * radius / ratio if at_flank else 0.0
+            torque, _ = _cable_torque(c, 0.0, wound, offset, spring, matrix, radius)
+            at_flank = (
+                rotor[c] / ratio - capstan[c] >= half - 1e-9 if torque > 0.0 else capstan[c] - rotor[c] / ratio >= half - 1e-9
+            )
+            load = torque / ratio if at_flank else 0.0
             if stalled[c]:
                 speed[c] = 0.0
             else:
                 drive = torque_constant * current[c] - viscous * speed[c] - load
                 momentum = inertia * speed[c] + TICK * drive
-                loss = TICK * (friction + load_friction * load)
+                loss = TICK * (friction + load_friction * abs(load))
                 momentum = max(0.0, momentum - loss) if momentum > 0.0 else min(0.0, momentum + loss)
                 speed[c] = momentum / inertia
                 rotor[c] += TICK * speed[c]
             output = rotor[c] / ratio
-            # Inside the backlash the cable pulls the capstan out until the drag holds it.
-            held = offset / radius + (drag / (spring[c] * radius * radius) if spring[c] > 0.0 else 1e9)
-            drawn = min(capstan[c], max(held, output - half))
-            capstan[c] = min(output + half, max(output - half, drawn))
+            # Inside the backlash the cables pull the capstan until the drag holds it.
+            before = capstan[c]
+            capstan[c] = min(output + half, max(output - half, before))
+            for _ in range(_DRAWS):
+                torque, stiffness = _cable_torque(c, capstan[c] - before, wound, offset, spring, matrix, radius)
+                excess = max(0.0, torque - drag) + min(0.0, torque + drag)
+                if excess == 0.0 or stiffness == 0.0:
+                    break
+                capstan[c] = min(output + half, max(output - half, capstan[c] - excess / stiffness))
+
+
+@njit(cache=True, error_model="numpy")
+def _cable_torque(
+    motor: int, turned: float, wound: np.ndarray, offset: np.ndarray, spring: np.ndarray, matrix: np.ndarray, radius: float
+) -> tuple[float, float]:
+    """Return the torque in N m of its cables on a capstan that has turned by `turned` rad since `wound`, and its derivative."""
+    torque, stiffness = 0.0, 0.0
+    for i in range(matrix.shape[0]):
+        arm = radius * matrix[i, motor]
+        stretch = wound[i] + arm * turned - offset[i]
+        if arm != 0.0 and stretch > 0.0:
+            torque += arm * spring[i] * stretch
+            stiffness += arm * arm * spring[i]
+    return torque, stiffness

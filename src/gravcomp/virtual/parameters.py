@@ -44,21 +44,29 @@ class Body:
 
 @dataclasses.dataclass(frozen=True)
 class Tendons:
-    """True values of the cables."""
+    """True values of the cables. What is not given is as described in `robot.cables` (see lines.py)."""
 
-    axial_stiffness: float = parameter(
-        960.0, unit="N", minimum=1.0, maximum=1e9, description="E A; nylon of 0.7 mm: 2.5 GPa x 0.385 mm^2"
+    axial_stiffness: float | None = parameter(
+        None, unit="N", minimum=1.0, maximum=1e9, description="E A; not given: as described, without material a stiff cable"
     )
-    free_length: float = parameter(200.0, edge="mm", minimum=0.0, maximum=10000.0, description="between capstan and robot")
+    free_length: float | None = parameter(
+        None, edge="mm", minimum=0.0, maximum=20000.0, description="between capstan and robot; not given: as described"
+    )
     radius_offset: float = parameter(
         0.03, edge="mm", minimum=-5.0, maximum=5.0, description="true pitch radius minus the one in robot.cables"
     )
     angle_offset: float = parameter(
         0.7, edge="deg", minimum=-180.0, maximum=180.0, description="true angle minus the one in robot.cables"
     )
-    friction: float = parameter(0.08, minimum=0.0, maximum=2.0, description="capstan friction coefficient")
-    guide_angle: float = parameter(
-        20.0, edge="deg", minimum=0.0, maximum=3600.0, description="angle by which the cable is bent between capstan and robot"
+    friction: float | None = parameter(
+        None, minimum=0.0, maximum=2.0, description="capstan friction coefficient; not given: as described, else 0.08"
+    )
+    guide_angle: float | None = parameter(
+        None,
+        edge="deg",
+        minimum=0.0,
+        maximum=3600.0,
+        description="angle by which the cable is bent between capstan and robot; not given: as described, else 20",
     )
     presliding: float = parameter(
         0.05, edge="mm", minimum=0.001, maximum=10.0, description="distance over which friction reverses"

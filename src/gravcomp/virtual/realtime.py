@@ -1,4 +1,4 @@
-"""The virtual robot in real time, on a CAN bus.
+"""The virtual robot in real time, on its CAN buses.
 
 A thread receives the frames that have arrived, steps the robot and sends its frames, once every period. After a pause of the
 machine it catches up, but not faster than a wire of 1 Mbit/s carries the frames. A lag above `_LONGEST_LAG` is skipped: frames
@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 
 from gravcomp.canbus import c610
+from gravcomp.canbus.buses import CanBuses
 from gravcomp.canbus.codec import layout
-from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.precedence import take_precedence
-from gravcomp.description.hardware import CanInterface
+from gravcomp.description.hardware import Hardware
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.truth import Truth
 
@@ -30,12 +30,12 @@ RECEIVED_FRAMES = (*c610.COMMANDS, "HeaterCommand")
 
 
 class RealtimeRobot:
-    """Runs a virtual robot on a CAN bus in a thread. Other threads must hold `lock` while they use the robot."""
+    """Runs a virtual robot on the buses of `hardware` in a thread. Other threads must hold `lock` while they use the robot."""
 
     def __init__(
         self,
         robot: VirtualRobot,
-        settings: CanInterface,
+        hardware: Hardware,
         on_truth: Callable[[Truth], None],
         truth_rate: float,
         steer: Callable[[], np.ndarray | None] = lambda: None,
@@ -45,7 +45,8 @@ class RealtimeRobot:
         `steer` returns the orientation (3, 3), world from soft_base, to turn the base to, or None. Compiles the kernels first.
         """
         self.robot, self.lock = robot, threading.Lock()
-        self.link = CanLink(settings, [layout(name).frame_id for name in RECEIVED_FRAMES])
+        self.link = CanBuses(hardware.all_buses, hardware.board_bus.name, [layout(name).frame_id for name in RECEIVED_FRAMES])
+        self._wires = len(hardware.all_buses)
         self.lost_time = 0.0
         self.error: BaseException | None = None
         self._steer = steer
@@ -105,6 +106,6 @@ class RealtimeRobot:
                 truth = self.robot.truth if count % self._truth_every == 0 else None
             if sent:
                 self.link.send(sent)
-                wire_free = max(wire_free, time.monotonic() - _BURST) + len(sent) * _FRAME_TIME
+                wire_free = max(wire_free, time.monotonic() - _BURST) + len(sent) / self._wires * _FRAME_TIME
             if truth is not None:
                 self._on_truth(truth)

@@ -1,11 +1,11 @@
-"""The whole virtual robot behind its CAN frames, as a host on the bus sees it; time advances only by `step`.
+"""The whole virtual robot behind its CAN frames, as a host on its buses sees it; time advances only by `step`.
 
     robot = VirtualRobot(parameters, description, hardware, seed=1, motion=StaticMotion(base_orientation(0.0)))
     frames_out = robot.step(0.002, frames_in)
     robot.truth.tip_position
 
 Time is counted in ticks of 0.5 ms (motors); rod, feedback and IMU follow at their own multiples. The same seed and the same
-frames at the same times give the same run, bit for bit.
+frames at the same times give the same run, bit for bit. With several buses the frames carry the name of theirs in `channel`.
 """
 
 from collections.abc import Iterable
@@ -63,7 +63,7 @@ class VirtualRobot:
         self._robot, self._hardware = robot, hardware
         slack = parameters.tendons.slack + parameters.tendons.slack_spread * start.standard_normal(len(robot.cables))
         self._model = build_rod(robot, parameters)
-        self._rod = MovingRod(self._model, build_material(self._model, parameters), build_friction(parameters))
+        self._rod = MovingRod(self._model, build_material(self._model, parameters), build_friction(robot, parameters))
         self._motors = MotorBank(parameters.motors, hardware, slack, motors)
         self._board = VirtualBoard(parameters.board, board)
         self._base = MovingBase(
@@ -78,6 +78,10 @@ class VirtualRobot:
         self._faults = ActiveFaults(hardware)
         self._tick = 0
         self._elapsed = 0.0
+        self._bus_index = {bus.name: index for index, bus in enumerate(hardware.all_buses)}
+        self._bus_names = [bus.name or None for bus in hardware.all_buses]
+        self._bus_of_motor = [hardware.bus_index(motor) for motor in hardware.motors]
+        self._board_bus = self._bus_index[hardware.board_bus.name]
         self._feedback_ticks = round(1.0 / parameters.motors.feedback_rate / TICK)
         self.refused = 0  # frames that could not be decoded
         self.unresolved = 0  # steps of the rod that did not converge
@@ -110,7 +114,7 @@ class VirtualRobot:
         if fault.kind == "board_restart":
             self._board.restart()
         elif fault.kind == "encoder_jump":
-            self._motors.jump(self._faults.concerned(fault))
+            self._motors.jump(self._faults.concerned_motors(fault))
         else:
             self._faults.add(fault, self.time)
             self._apply_faults()
@@ -133,8 +137,11 @@ class VirtualRobot:
         end = self._tick + ticks
         sent: list[can.Message] = []
         while self._tick < end:
+            # The rod answers once a step. In between, a capstan feels line and rod in series: a stiff line alone would
+            # resist every turn as if the rod stood still.
+            contact, spring = self._rod.contact, self._rod.spring
             due = min(end, *(self._tick - self._tick % period + period for period in (_ROD_TICKS, self._feedback_ticks)))
-            self._motors.step(due - self._tick, self._rod.shortened, self._rod.tendon_stiffness)
+            self._motors.step(due - self._tick, contact, spring)
             self._tick = due
             if self._faults.end(self.time):
                 self._apply_faults()
@@ -184,9 +191,9 @@ class VirtualRobot:
         except FrameError:
             self.refused += 1
             return
-        currents = c610.currents_of(name, values)
+        bus, currents = self._bus_index.get(str(frame.channel), self._board_bus), c610.currents_of(name, values)
         for index, motor in enumerate(self._hardware.motors):
-            if motor.can_id in currents:
+            if motor.can_id in currents and self._bus_of_motor[index] == bus:
                 self._motors.commanded[index] = currents[motor.can_id]
         if name == "HeaterCommand":
             self._board.command_heater(values.duty)
@@ -198,13 +205,17 @@ class VirtualRobot:
             orientation, position = self._base.advance(self.time)
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
         if self._tick % self._feedback_ticks == 0:
-            for motor, values in zip(self._hardware.motors, self._motors.feedback()):
+            for motor, bus, values in zip(self._hardware.motors, self._bus_of_motor, self._motors.feedback()):
                 sent.append(c610.feedback(motor.can_id, **values))
+                sent[-1].channel = self._bus_names[bus]
+        board_frames = len(sent)
         if self._tick % _SAMPLE_TICKS == 0:
             rate, force = self._base.imu(self.time)
             sent += self._board.sample(rate, force, self._base.recorded)
         if self._tick % _STATUS_TICKS == 0:
             sent.append(self._board.status())
+        for frame in sent[board_frames:]:
+            frame.channel = self._bus_names[self._board_bus]
         for frame in sent:
             frame.timestamp = self.time
         return sent
@@ -217,7 +228,7 @@ class VirtualRobot:
         self._rod.tendon_stiffness[:] = self._model.tendon_stiffness
         for fault in faults:
             if fault.kind == "stall":
-                self._motors.stalled |= self._faults.concerned(fault)
+                self._motors.stalled |= self._faults.concerned_motors(fault)
             elif fault.kind == "cable_break":
                 self._rod.tendon_stiffness[self._faults.concerned(fault)] = 0.0
         self._board.imu_fault = next((k for k in ("silent", "invalid", "saturated", "stuck") if f"imu_{k}" in kinds), None)

@@ -19,10 +19,10 @@ from numba import njit
 
 @dataclass(frozen=True)
 class TendonFriction:
-    """Friction of all tendons."""
+    """Friction of m tendons."""
 
-    coefficient: float  # mu
-    guide_angle: float  # rad, Theta_guide: angle that the cable turns through between capstan and robot
+    coefficient: np.ndarray  # (m,) mu
+    guide_angle: np.ndarray  # (m,) rad, Theta_guide: angle that the cable turns through between capstan and robot
     presliding: float  # m, delta
 
 
@@ -33,21 +33,21 @@ def tension_shares(
     sliding: np.ndarray,
     tendon_start: np.ndarray,
     tendon_end: np.ndarray,
-    mu: float,
-    guide_angle: float,
+    mu: np.ndarray,
+    guide_angle: np.ndarray,
 ) -> np.ndarray:
     """Return the share (m, n) of the tension at the capstan that arrives in each element.
 
-    strain (n, 6), length (n,); sliding (m, n + 1) holds z of the guide, then of the elements.
+    strain (n, 6), length (n,); sliding (m, n + 1) holds z of the guide, then of the elements; mu and guide_angle (m,).
     """
     n, m = length.shape[0], tendon_end.shape[0]
     share = np.ones((m, n))
     for c in range(m):
-        exponent = sliding[c, 0] * guide_angle
+        exponent = sliding[c, 0] * guide_angle[c]
         for e in range(tendon_start[c], tendon_end[c]):
             half = 0.5 * length[e] * math.sqrt(strain[e, 3] ** 2 + strain[e, 4] ** 2) * sliding[c, e + 1]
             exponent += half
-            share[c, e] = math.exp(-mu * exponent)
+            share[c, e] = math.exp(-mu[c] * exponent)
             exponent += half
     return share
 

@@ -7,6 +7,11 @@ Comput. Nonlinear Dyn. 5, 2010) in the fixed frame, so the inertial forces of a 
 
 The internal forces are those of forces.py with the material of material.py and the tendons' friction of tendon_friction.py. The
 share of the tension that arrives in each element is that at the beginning of the step.
+
+The tension T of each tendon is an unknown of Newton's method in addition to the shape, with T = max(0, k s) for the stretch s,
+and the geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and
+its geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency
+and robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
 """
 
 import numpy as np
@@ -24,7 +29,7 @@ _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
 _ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
 _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
-MOST_ITERATIONS = 8
+MOST_ITERATIONS = 12
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _FORCE_TOLERANCE = 1e-7  # N and N m; one cross-section weighs 3e-3 N
@@ -50,6 +55,7 @@ def time_step(
     path: np.ndarray,
     tension: np.ndarray,
     shortened: np.ndarray,
+    compliance: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
     mass: np.ndarray,
@@ -64,15 +70,16 @@ def time_step(
     damping_time: float,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
-    mu: float,
-    guide_angle: float,
+    mu: np.ndarray,
+    guide_angle: np.ndarray,
     presliding: float,
 ) -> tuple[bool, int]:
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step, and the caller sets the rest of the state.
+    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the
+    iteration did not converge. If the state is not possible, pose and material keep their values from before the step, and the
+    caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_end.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
@@ -89,6 +96,7 @@ def time_step(
     copy_pose(base_orientation, base_position, orientation[0], position[0])
 
     path_before = path.copy()
+    pulled, law = tension.copy(), np.empty(m)  # T, and k s where the tendon is taut
     direction, active, work = np.zeros((m, n, 3)), np.empty(m), np.empty((3, 3))
     gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
     new_strain = np.empty((n, 6))
@@ -101,10 +109,14 @@ def time_step(
             advance(orientation[k], position[k], turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(new_strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
+        slack = 0.0  # largest stretch of a taut tendon that has become too short
         for c in range(m):
             stretch = wound[c] + np.sum(path[c]) - tendon_rest[c]
-            active[c] = spring[c] if stretch > 0.0 else 0.0
-            tension[c] = active[c] * stretch
+            active[c] = spring[c] if stretch > 0.0 or pulled[c] > 0.0 else 0.0
+            law[c] = active[c] * stretch
+            slack = max(slack, -law[c])
+            pulled[c] = max(0.0, pulled[c]) if active[c] > 0.0 else 0.0
+            tension[c] = max(0.0, law[c])
         residual = assemble(
             orientation,
             length,
@@ -119,7 +131,7 @@ def time_step(
             tendon_end,
             direction,
             path,
-            tension,
+            pulled,
             share,
             force,
             gradient,
@@ -128,14 +140,17 @@ def time_step(
         )
         worst = 0.0
         for k in range(1, n + 1):
+            for i in range(6):
+                for c in range(m):
+                    residual[k, i] += pull[6 * (k - 1) + i, c] * (law[c] - pulled[c])
             _add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], inertia[k])
             for i in range(6):
                 worst = max(worst, abs(residual[k, i]))
                 band[6 * (k - 1) + i, 11] += beta * (mass[k] if i < 3 else inertia[k, i - 3])
-        if worst < _FORCE_TOLERANCE:
+        if worst < _FORCE_TOLERANCE and slack < _FORCE_TOLERANCE:
             iterations = iteration
             break
-        increment = newton_step(band, residual, gradient, pull, active)
+        increment = newton_step(band, residual, gradient, pull, active, compliance)
         for k in range(1, n + 1):
             for i in range(6):
                 change = increment[6 * (k - 1) + i]
@@ -144,6 +159,10 @@ def time_step(
                 velocity_rate[k, i] += beta * change
         if not np.isfinite(increment).all():
             break
+        for c in range(m):
+            pulled[c] = law[c]
+            for k in range(6 * n):
+                pulled[c] += active[c] * gradient[k, c] * increment[k]
     for k in range(1, n + 1):
         _orthonormalise(orientation[k], work)
         for i in range(6):

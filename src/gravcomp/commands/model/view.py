@@ -1,4 +1,4 @@
-"""`gravcomp model view ROBOT`: draw the straight and the deformed robot."""
+"""`gravcomp model view ROBOT`: draw the robot at rest and deformed, or with its sections as it is described."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -16,6 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subcommand's arguments."""
     add_load_arguments(parser)
     parser.add_argument(
+        "--rest", action="store_true", help="draw the body at rest with its sections, lumens, disks and cables; nothing is solved"
+    )
+    parser.add_argument(
         "--out", default="robot.png", metavar="FILE", help="image to write: .png, .svg or .pdf (default: robot.png)"
     )
 
@@ -25,6 +28,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.environment.packages import provide_extra
 
     provide_extra("reports")
+    if args.rest:
+        return _draw_described(args)
     import matplotlib
     import numpy as np
 
@@ -52,6 +57,19 @@ def run(args: argparse.Namespace) -> int:
     figure.savefig(args.out, dpi=150)
     figures = {"file": args.out, "tip_position_mm": 1e3 * shape.tip_position, "residual_n": shape.residual}
     output.result(figures, f"{args.out}: tip at {tip} mm, residual {shape.residual:.1e} N")
+    return 0
+
+
+def _draw_described(args: argparse.Namespace) -> int:
+    """Draw the robot at rest."""
+    from gravcomp.description import load_robot_file
+    from gravcomp.report.body_picture import draw_body
+
+    robot = load_robot_file(args.robot).robot
+    draw_body(robot, args.out)
+    output.result(
+        {"file": args.out, "length_mm": 1e3 * robot.length}, f"{args.out}: {robot.name}, {robot.length * 1e3:g} mm long"
+    )
     return 0
 
 

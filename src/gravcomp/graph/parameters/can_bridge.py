@@ -13,7 +13,11 @@ class CanBridgeParameters:
     interface: str = parameter(
         "", description="python-can interface; empty: hardware.can.interface of the robot file", read_only=True
     )
-    channel: str = parameter("", description="CAN channel; empty: hardware.can.channel of the robot file", read_only=True)
+    channel: str = parameter(
+        "",
+        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
+        read_only=True,
+    )
     control_rate: float = parameter(
         250.0, unit="Hz", minimum=200, maximum=1000, description="rate of the position loops", read_only=True
     )

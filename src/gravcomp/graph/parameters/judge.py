@@ -46,4 +46,8 @@ class JudgeParameters:
     interface: str = parameter(
         "", read_only=True, description="python-can interface; empty: hardware.can.interface of the robot file"
     )
-    channel: str = parameter("", read_only=True, description="CAN channel; empty: hardware.can.channel of the robot file")
+    channel: str = parameter(
+        "",
+        read_only=True,
+        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
+    )

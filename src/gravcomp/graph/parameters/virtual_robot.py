@@ -14,7 +14,11 @@ class VirtualRobotNodeParameters:
     interface: str = parameter(
         "", description="python-can interface; empty: hardware.can.interface of the robot file", read_only=True
     )
-    channel: str = parameter("", description="CAN channel; empty: hardware.can.channel of the robot file", read_only=True)
+    channel: str = parameter(
+        "",
+        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
+        read_only=True,
+    )
     seed: int = parameter(
         -1, minimum=-1, maximum=2**31 - 1, description="seed of all random numbers; -1: the one of the robot file", read_only=True
     )

@@ -1,0 +1,92 @@
+"""The loads under which the error of a mesh is measured: the robot's own weight, and a cable that bends it up to its limits.
+
+The bending load is a tension of one cable of the weightless robot. It ends where the first of these is reached: the limit of
+the tension, the limit of the cable's displacement, a right angle between the tip and its direction at rest, or a part of the
+last tension that has an equilibrium, as near a limit point a shape has no bounded error.
+"""
+
+import dataclasses
+import logging
+
+import numpy as np
+
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.statics import StaticSolver
+
+_GRAVITY = 9.81
+_TURN = np.pi / 2
+# The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
+_SAFE, _PARTS = 0.7, 8
+# The steps in which the bend is followed.
+_STEPS = 8
+# The tension grows by this factor from step to step, from this part of its limit.
+_FACTOR, _FIRST = 1.35, 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class MeshLoad:
+    """A load: name; gravity (3,) in m/s^2; tension (m,) in N."""
+
+    name: str
+    gravity: np.ndarray
+    tension: np.ndarray
+
+
+def mesh_loads(model: RobotModel) -> list[MeshLoad]:
+    """Return the loads of a robot: its weight across its axis, in two directions where it is not round, and the bend."""
+    robot, none = model.robot, np.zeros(len(model.robot.cables))
+    loads = [MeshLoad("horizontal", np.array([-_GRAVITY, 0.0, 0.0]), none)]
+    if robot.body is not None or any(not segment.outline(0.0).round for segment in robot.segments):
+        loads.append(MeshLoad("horizontal, turned by 90 degrees", np.array([0.0, -_GRAVITY, 0.0]), none))
+    tension = _bending_tension(model)
+    if tension is not None:
+        loads.append(MeshLoad("bent", np.zeros(3), tension))
+    return loads
+
+
+def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
+    """Return the tips (l, 3) in m under the loads; NaN where no equilibrium is found."""
+    solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
+    for index, load in enumerate(loads):
+        solver.reset()
+        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:] if load.tension.any() else (1.0,):
+            state = solver.track(part * load.gravity, CableInput(tension=part * load.tension), iterations=15)
+        if not state.converged:
+            solver.reset()
+            state = solver.solve(load.gravity, CableInput(tension=load.tension), _PARTS)
+        if state.converged:
+            tips[index] = model.effectors.sections(model.mesh.nodes + state.u)[-1, 0]
+    return tips
+
+
+def _bending_tension(model: RobotModel) -> np.ndarray | None:
+    """Tensions (m,) that bend the robot by the cable that ends last; None where there is no cable or it does not move."""
+    robot = model.robot
+    if not robot.cables:
+        return None
+    index = int(np.argmax([robot.cable_end(cable) for cable in robot.cables]))
+    unit, solver = np.eye(len(robot.cables))[index], StaticSolver(model)
+    limit, tension, best = robot.limits.tension_max, _FIRST * robot.limits.tension_max, 0.0
+    while True:
+        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), iterations=15)
+        if not state.converged:
+            logging.getLogger(__name__).info("no equilibrium at a tension of %.3g N", tension)
+            best *= _SAFE
+            break
+        if state.tendons.displacement[index] > robot.limits.displacement_max:
+            break
+        best = tension
+        if tension >= limit or _turned(model, state.u) > _TURN:
+            break
+        tension = min(limit, _FACTOR * tension)
+    return best * unit if best else None
+
+
+def _turned(model: RobotModel, u: np.ndarray) -> float:
+    """Angle (rad) between the directions of the tip at displacements u (n, 3) and at rest."""
+    (_, one, two), (_, rest_one, rest_two) = (
+        model.effectors.sections(nodes)[-1] for nodes in (model.mesh.nodes + u, model.mesh.nodes)
+    )
+    d, rest = np.cross(one, two), np.cross(rest_one, rest_two)
+    return float(np.arccos(np.clip(d @ rest / np.linalg.norm(d) / np.linalg.norm(rest), -1.0, 1.0)))

@@ -1,0 +1,100 @@
+"""Gmsh, an optional package of gravcomp's environment: importing, installing and running it."""
+
+import contextlib
+import ctypes
+import importlib
+import os
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from gravcomp.environment import system_packages
+from gravcomp.environment.errors import SetupError
+from gravcomp.environment.packages import provide_extra
+from gravcomp.mesh_files.errors import MeshError
+
+SYSTEM_PACKAGES = ("libglu1-mesa", "libgl1", "libopengl0", "libxcursor1", "libxft2", "libxinerama1", "libxfixes3")
+"""Debian packages with the system libraries that Gmsh's wheel is linked to."""
+INSTALL_LINE = "./gravcomp mesh install"
+
+
+class GmshMissing(MeshError):
+    """Gmsh is not installed, or cannot be loaded; the text names the line that installs it."""
+
+
+def install_gmsh() -> str:
+    """Install Gmsh into the running environment, with its system libraries as root or after a yes; return its version.
+
+    Does nothing where it works already. Raises SetupError.
+    """
+    provide_extra("mesher")
+    importlib.invalidate_caches()
+    problem = _problem()
+    if isinstance(problem, OSError):
+        system_packages.install(list(SYSTEM_PACKAGES), f"system libraries of Gmsh ({problem})")
+        problem = _problem()
+    if problem is not None:
+        raise SetupError(f"Gmsh cannot be loaded: {problem}")
+    return str(_imported().__version__)
+
+
+@contextlib.contextmanager
+def gmsh_session(name: str, failure: str) -> Iterator[Any]:
+    """Give the module gmsh with an empty model; what Gmsh raises becomes a MeshError with `name` and `failure`.
+
+    Raises MeshError if Gmsh is missing; at a terminal it is installed after a yes.
+    """
+    gmsh = _provided(name)
+    with _silent():
+        gmsh.initialize(interruptible=False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            yield gmsh
+        except MeshError:
+            raise
+        except Exception as error:  # Gmsh raises plain Exception
+            raise MeshError(f"{name}: Gmsh {failure}: {error}") from error
+        finally:
+            gmsh.finalize()
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Keep what Gmsh's libraries print, whatever their options say, away from stdout, where commands print their result."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        ctypes.CDLL(None).fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _provided(name: str) -> Any:
+    problem = _problem()
+    if problem is None:
+        return _imported()
+    question = f"{name} is filled by Gmsh, which is not installed (100 MB, GPL). Install it into gravcomp's environment? [y/N] "
+    if sys.stdin and sys.stdin.isatty() and system_packages.confirmed(question):
+        try:
+            install_gmsh()
+            return _imported()
+        except SetupError as error:
+            raise GmshMissing(f"{name}: Gmsh could not be installed: {error}") from error
+    missing = "is not installed" if isinstance(problem, ImportError) else f"lacks system libraries ({problem})"
+    raise GmshMissing(f"{name}: Gmsh, which fills surfaces and reads STEP files, {missing}; run: {INSTALL_LINE}")
+
+
+def _problem() -> "ImportError | OSError | None":
+    try:
+        _imported()
+    except (ImportError, OSError) as error:
+        return error
+    return None
+
+
+def _imported() -> Any:
+    return importlib.import_module("gmsh")

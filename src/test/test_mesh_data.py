@@ -1,0 +1,56 @@
+"""Meshes that other projects publish: a finger, a trunk and a tentacle, neither at the origin nor along z."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Cable, Material, MeshBody, Robot
+from gravcomp.mesh_files import Placement, placed_body
+from gravcomp.simulation import Simulator
+
+FOLDER = Path(os.environ.get("GRAVCOMP_DATA") or Path(__file__).parents[3] / "shared" / "data") / "mesh"
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no meshes in {FOLDER} (GRAVCOMP_DATA names the folder above it)")
+
+
+def placed(name: str):
+    return placed_body(FOLDER / name, Placement(axis="auto"))
+
+
+def test_the_finger_is_fixed_at_its_flat_end():
+    body = placed("finger.vtk")
+    assert body.length == pytest.approx(0.10336635, rel=1e-6)
+    assert body.notes[1].startswith("axis: -x of the file")
+    base = body.nodes[body.nodes[:, 2] < 1e-9]
+    assert np.ptp(base, axis=0) == pytest.approx([5e-3, 15e-3, 0.0], abs=1e-8)
+
+
+def test_the_trunk_is_where_its_file_has_it():
+    found, given = placed("trunk.vtk"), placed_body(FOLDER / "trunk.vtk", Placement(length=0.195))
+    assert found.nodes == pytest.approx(given.nodes, abs=1e-9)
+
+
+def test_the_tentacle_has_a_bent_axis_that_runs_inside_it():
+    body = placed("Tentacle.stl")
+    points, _ = body.axis.frames(np.linspace(0.02, 0.98, 60) * body.length)
+    a, b, c = (body.nodes[body.cells[:, i]][None] - points[:, None] for i in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=2) for x in (a, b, c))
+    triple = np.einsum("pki,pki->pk", a, np.cross(b, c))
+    ab, bc, ca = (np.einsum("pki,pki->pk", x, y) for x, y in ((a, b), (b, c), (c, a)))
+    # The solid angle of a closed surface is 4 pi from inside (Van Oosterom, Strackee 1983).
+    angle = 2.0 * np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb).sum(axis=1)
+    inside = np.abs(angle / (4.0 * np.pi) - 1.0) < 1e-6
+    assert inside.mean() > 0.9  # it has notches, which the smooth axis may touch
+    assert body.axis.bent and 0.16 < body.length < 0.20
+
+
+def test_the_finger_hangs_from_its_base():
+    material = Material(law="neo_hookean", youngs_modulus=0.6e6, density=1080.0)
+    body = MeshBody(str(FOLDER / "finger.vtk"), axis="auto", element_size=20e-3, material=material)
+    robot = Robot("body", body=body, cables=(Cable("c", via_points=((0.0, 0.0, 0.01), (0.0, 0.0, 0.05))),))
+    simulator = Simulator(robot, reduced=False)
+    rest = simulator.solve(np.zeros(3))
+    assert rest.status == 0 and rest.tip_position == pytest.approx([0.0, 0.0, robot.length], abs=1e-9 * robot.length)
+    hanging = simulator.solve(np.array([-1.0, 0.0, 0.0]))
+    assert hanging.status == 0 and hanging.tip_position[0] < -0.05 * robot.length
