@@ -9,7 +9,7 @@ from ros2_line import Ros2
 from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
