@@ -219,5 +219,5 @@ def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
 
 def _with(robot: Robot, elements: Elements, direction: str, number: int) -> Elements:
     """The elements with another number in a direction, and the grading that suits it."""
-    changed = dataclasses.replace(elements, **{direction: number})
+    changed = Elements(**(dataclasses.asdict(elements) | {direction: number}))
     return changed if any(segment.disks for segment in robot.segments) else with_grading(robot, changed)
