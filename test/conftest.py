@@ -143,7 +143,7 @@ def made(folder):
     """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
 
     @functools.cache
-    def run(words: tuple[str, ...]) -> tuple[int, str]:
+    def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
         done = subprocess.run(
             [*words, "--brief"],
             cwd=folder,
@@ -151,12 +151,13 @@ def made(folder):
             text=True,
             timeout=1500,
             start_new_session=True,
-            preexec_fn=_give_way,
+            preexec_fn=_give_way if low else None,
         )
         return done.returncode, done.stderr + done.stdout
 
-    def made(line: str) -> tuple[int, str]:
-        return run(tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md")))
+    def made(line: str, apart: dict) -> tuple[int, str]:
+        words = (word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
+        return run(tuple(words), bool(apart))
 
     return made
 
