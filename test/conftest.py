@@ -140,7 +140,10 @@ def recording():
 
 @pytest.fixture(scope="module")
 def made(folder):
-    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
+    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once.
+
+    low: with lower priority.
+    """
 
     @functools.cache
     def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
@@ -155,9 +158,9 @@ def made(folder):
         )
         return done.returncode, done.stderr + done.stdout
 
-    def made(line: str, apart: dict) -> tuple[int, str]:
+    def made(line: str, low: bool) -> tuple[int, str]:
         words = (word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
-        return run(tuple(words), bool(apart))
+        return run(tuple(words), low)
 
     return made
 

@@ -22,6 +22,6 @@ pytestmark = pytest.mark.timeout(1600)
 )
 def test_performance_is_measured(made, apart, line, about):
     """Without --brief they take from minutes to half an hour. `test_figures_table` checks what --write does with a document."""
-    code, output = made(line, apart)
+    code, output = made(line, low=bool(apart))
     # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output
