@@ -26,6 +26,13 @@ def ros2(graph):
     ros2.close()
 
 
+def test_the_status_says_whether_the_target_can_be_held(graph, ros2):
+    """The answer comes some seconds after the start, from a process of low priority."""
+    statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
+    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "no answer comes")
+    assert statuses[-1].holdable == 1 and "the cables hold the tip" in statuses[-1].hold_message
+
+
 @pytest.mark.parametrize(("angle", "plane"), [(4.5, 0.0), (5.5, 1.0)])
 def test_the_robot_recovers_from_a_target_without_equilibrium(graph, ros2, angle, plane):
     """The robot moves to where the model's equilibria end, and recovers. `bench engine` measures the longest step."""

@@ -1,8 +1,9 @@
 """Routes of a robot's cables through its body at rest, or through its disks.
 
 A force on one point or along one line of a solid sinks into it without limit as the mesh is refined. So a cable of a segment
-presses on a ring in the wall around it, as a channel of finite width does, and is fixed to the whole section at its end, as to a
-plate: its force is spread over the section as a rod's stress is.
+moves with whole sections, as in the theory of rods: it lies at p + x f_1 + y f_2 with the functionals of `mesh.sections`, which
+spread its force over the section as a rod's stress is. A cable given by via points, and one in a body from a file, is attached
+to the points of the body.
 """
 
 import dataclasses
@@ -18,10 +19,6 @@ from gravcomp.mesh.sections import section_functionals
 # How far outside its element a point may lie in a mesh from a file, in local coordinates: facets cut a little off a round
 # body. For segments the description has been checked: the cable runs inside the walls that the facets approximate.
 _TOLERANCE = 0.1
-# A cable presses on a ring of so many points, whose radius is this part of the distance to the nearest surface.
-_RING, _PRESSED = 6, 0.8
-# Points on an outline at which the distance is measured, and distance (m) within which two heights are the same.
-_SURFACE, _SAME = 180, 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,22 +51,18 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
     """The route of one cable; guided (d,): the heights of the disks."""
     points, at_disk = _via_points(robot, cable, mesh.stations, guided)
     smooth = _smooth(points[:, 2], mesh.stations, at_disk, 1e-6 * robot.length)
+    at_section = at_disk
     if cable.via_points is not None or robot.body is not None:
         smooth[:] = False
-        at_section = at_disk
     else:
-        at_section = at_disk | (np.arange(len(points)) == len(points) - 1)
+        at_section = np.ones(len(points), dtype=bool)
     parts = []
     if at_section.any():
         sections = section_functionals(mesh, points[at_section, 2]).reshape(-1, 3, len(mesh.nodes))
         parts.append(holes(points[at_section, :2], sections))
     if not at_section.all():
         try:
-            inside = (
-                _in_channel(robot, mesh, points[~at_section])
-                if cable.via_points is None
-                else embed(mesh, mesh.axis.points(points[~at_section]))
-            )
+            inside = embed(mesh, mesh.axis.points(points[~at_section]))
         except MeshError as error:
             raise MeshError(f"cable '{cable.name}' leaves the body: {error}") from error
         worst = int(np.argmax(inside.outside))
@@ -78,31 +71,6 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
             raise MeshError(f"cable '{cable.name}' leaves the body at ({x:.3g}, {y:.3g}, {z:.3g}) mm; it must run inside")
         parts.append(inside)
     return Route(parts[0] if len(parts) == 1 else _merged(parts, at_section), smooth)
-
-
-def _in_channel(robot: Robot, mesh: Mesh, points: np.ndarray) -> Embedding:
-    """Attach each of the points (p, 3) to a ring around it, over which a cable presses on the wall."""
-    radius = np.array([_PRESSED * _clearance(robot, *point) for point in points])
-    turn = 2 * np.pi * np.arange(_RING) / _RING
-    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(_RING)])
-    found = embed(mesh, mesh.axis.points((points[:, None] + radius[:, None, None] * ring).reshape(-1, 3)))
-    nodes = found.nodes.reshape(len(points), -1)
-    weights = found.weights.reshape(len(points), -1) / _RING
-    return Embedding(nodes, weights, found.outside.reshape(len(points), -1).max(axis=1))
-
-
-def _clearance(robot: Robot, x: float, y: float, s: float) -> float:
-    """Distance (m) of the point (x, y) from the nearest surface of the section at the arc length s (m)."""
-    base, distances = 0.0, []
-    turn = np.linspace(0.0, 2 * np.pi, _SURFACE, endpoint=False)
-    for segment in robot.segments:
-        top = base + segment.full_length
-        if base - _SAME <= s <= top + _SAME:
-            part = min(max((s - base) / segment.length, 0.0), 1.0)
-            for outline in (segment.outline(part), *segment.lumen_outlines(part)):
-                distances.append(np.hypot(*(outline.boundary(turn) - (x, y)).T).min())
-        base = top
-    return float(min(distances, default=0.0))
 
 
 def _smooth(s: np.ndarray, stations: np.ndarray, at_disk: np.ndarray, slack: float) -> np.ndarray:

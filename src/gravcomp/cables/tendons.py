@@ -189,6 +189,10 @@ def _add_stiffness(
     entry = 0
     for k in range(len(cable)):
         factor = tension[cable[k]] * share[k] / length[k]
+        if factor == 0.0:
+            size = first[k + 1] - first[k]
+            entry += 9 * (size * (size + 1) // 2)
+            continue
         for i in range(3):
             for j in range(3):
                 block[i, j] = factor * ((1.0 if i == j else 0.0) - tangent[k, i] * tangent[k, j])

@@ -17,11 +17,11 @@ from gravcomp.full_model.statics import StaticSolver
 _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
-_SAFE, _PARTS = 0.7, 8
-# The steps in which the bend is followed.
-_STEPS = 8
-# The tension grows by this factor from step to step, from this part of its limit.
-_FACTOR, _FIRST = 1.35, 0.01
+_SAFE = 0.7
+# A load is followed in steps of its parts: the first one, the largest and the smallest; Newton's iterations of each.
+_STEP, _LARGEST, _SMALLEST, _ITERATIONS = 0.125, 0.25, 1.0 / 256.0, 10
+# The tension grows by this factor from step to step, from this part of its limit; by the small one where that is too much.
+_FACTOR, _SMALL_FACTOR, _FIRST = 1.35, 1.08, 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,14 +50,23 @@ def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
     solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
     for index, load in enumerate(loads):
         solver.reset()
-        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:] if load.tension.any() else (1.0,):
-            state = solver.track(part * load.gravity, CableInput(tension=part * load.tension), iterations=15)
-        if not state.converged:
-            solver.reset()
-            state = solver.solve(load.gravity, CableInput(tension=load.tension), _PARTS)
-        if state.converged:
-            tips[index] = model.effectors.sections(model.mesh.nodes + state.u)[-1, 0]
+        if _follow(solver, load):
+            tips[index] = model.effectors.sections(model.mesh.nodes + solver.state.u)[-1, 0]
     return tips
+
+
+def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
+    """Follow the equilibrium of the straight robot up to the load; returns whether there is one."""
+    done, step = 0.0, _STEP
+    while done < 1.0:
+        before, part = solver.state, min(1.0, done + step)
+        if solver.track(part * load.gravity, CableInput(tension=part * load.tension), _ITERATIONS).converged:
+            done, step = part, min(1.5 * step, _LARGEST)
+            continue
+        solver.state, step = before, step / 2.0
+        if step < _SMALLEST:
+            return False
+    return True
 
 
 def _bending_tension(model: RobotModel) -> np.ndarray | None:
@@ -67,19 +76,25 @@ def _bending_tension(model: RobotModel) -> np.ndarray | None:
         return None
     index = int(np.argmax([robot.cable_end(cable) for cable in robot.cables]))
     unit, solver = np.eye(len(robot.cables))[index], StaticSolver(model)
-    limit, tension, best = robot.limits.tension_max, _FIRST * robot.limits.tension_max, 0.0
+    limit, factor = robot.limits.tension_max, _FACTOR
+    tension, best = _FIRST * limit, 0.0
     while True:
-        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), iterations=15)
+        before = solver.state
+        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), _ITERATIONS)
         if not state.converged:
-            logging.getLogger(__name__).info("no equilibrium at a tension of %.3g N", tension)
-            best *= _SAFE
-            break
+            if factor == _SMALL_FACTOR:
+                logging.getLogger(__name__).info("no equilibrium at a tension of %.3g N", tension)
+                best *= _SAFE
+                break
+            solver.state, factor = before, _SMALL_FACTOR
+            tension = factor * best if best else 0.1 * tension
+            continue
         if state.tendons.displacement[index] > robot.limits.displacement_max:
             break
         best = tension
         if tension >= limit or _turned(model, state.u) > _TURN:
             break
-        tension = min(limit, _FACTOR * tension)
+        tension = min(limit, factor * tension)
     return best * unit if best else None
 
 
