@@ -1,9 +1,19 @@
-"""Set up every test process: one thread for linear algebra, and a ROS domain of its own.
+"""Set up every test process: one thread for linear algebra, a ROS domain of its own, and the order of the tests.
 
 With its own domain, a test does not hear the nodes of a test that runs at the same time.
+
+Marks of the tests that start a graph of nodes, which is slow where others take its processors:
+
+    graph    it waits for events: another such test may run next to it
+    rates    it asserts rates or delays: no other graph runs meanwhile
+
+All tests with the mark `rates` run in one process, one after the other. They begin first; next to them run tests without a graph,
+those that take longest first. A test of the commands in test/ without a mark starts no graph that goes on.
 """
 
+import fcntl
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -12,12 +22,22 @@ import pytest
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+_COMMANDS = Path(__file__).parent / "test"
+_SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
+_LOCK = "GRAVCOMP_TEST_LOCK"  # environment variable with the file that the processes of a run lock
+
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Reserve the domain for the processes that this one starts; a domain that the user has set stays."""
-    if config.pluginmanager.has_plugin("dsession"):
-        return  # the controlling process of pytest-xdist runs no test
+    """Declare the marks, and reserve the domain for the processes that this one starts; a domain that the user has set stays."""
+    config.addinivalue_line("markers", "graph: starts nodes; may run next to another graph")
+    config.addinivalue_line("markers", "rates: asserts rates or delays of a graph; no other graph runs meanwhile")
+    if config.pluginmanager.has_plugin("dsession"):  # the controlling process of pytest-xdist, which runs no test
+        handle, name = tempfile.mkstemp(prefix="gravcomp-tests-")
+        os.close(handle)
+        os.environ[_LOCK] = name
+        config.add_cleanup(Path(name).unlink)
+        return
     from gravcomp.launcher.domain import private_domain
 
     os.environ.update(private_domain())
@@ -32,13 +52,46 @@ def _own_priority():
         os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
+def _mark(item: pytest.Item) -> str:
+    """Return 'rates', 'graph' or ''; a mark of the test goes before that of its module."""
+    return next((mark.name for mark in item.iter_markers() if mark.name in _SHARING), "")
+
+
+def _group(item: pytest.Item) -> str:
+    """Return the name of the tests that run in one process, one after the other: those of a module, which share its fixtures."""
+    mark = _mark(item)
+    return mark if mark == "rates" else f"{item.path.stem}-{mark}".strip("-")
+
+
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Run the tests of the graph one after the other, next to the others: two graphs on two cores miss their rates."""
-    graph = item.path.parent == Path(__file__).parent / "test"
-    item.add_marker(pytest.mark.xdist_group("graph" if graph else item.path.stem))
+    """Tell pytest-xdist which tests belong together."""
+    item.add_marker(pytest.mark.xdist_group(_group(item)))
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests of the graph, which take longest; otherwise keep the order of pytest-randomly."""
-    items.sort(key=lambda item: item.path.parent != Path(__file__).parent / "test")
+    """Put what takes longest first, so that no process is idle at the end; otherwise keep the order of pytest-randomly.
+
+    Rates; commands without a graph, which run next to them; other graphs; unit tests.
+    """
+
+    def rank(item: pytest.Item) -> int:
+        return {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2}[_mark(item)]
+
+    items.sort(key=rank)
+
+
+_held: list[int] = []  # descriptor of the lock while a group runs that needs it
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None):
+    """Wait until the graphs of the other processes allow this one, from a group's first test to the end of its fixtures."""
+    if not _held and _mark(item) and _LOCK in os.environ:
+        _held.append(os.open(os.environ[_LOCK], os.O_RDONLY | os.O_CLOEXEC))
+        fcntl.flock(_held[0], _SHARING[_mark(item)])
+    try:
+        return (yield)
+    finally:
+        if _held and (nextitem is None or _group(nextitem) != _group(item)):
+            os.close(_held.pop())

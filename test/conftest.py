@@ -1,6 +1,5 @@
 """Fixtures of the tests that run the product as a user does: by its commands, as processes."""
 
-import contextlib
 import functools
 import json
 import os
@@ -13,6 +12,8 @@ from pathlib import Path
 import pytest
 from documents import documented
 from shell import mirror
+
+from gravcomp.environment.give_way import give_way
 
 ROOT = Path(__file__).resolve().parents[1]
 WRITTEN_BY_LINES = ("src/README.md", "src/doc/figures.md")
@@ -32,7 +33,15 @@ class Answer:
 
 
 @pytest.fixture
-def gravcomp():
+def apart(request):
+    """Return options of subprocess: a lower priority for the commands of tests that start no graph, which can run next to one."""
+    if any(request.node.get_closest_marker(name) for name in ("graph", "rates")):
+        return {}
+    return {"start_new_session": True, "preexec_fn": _give_way}
+
+
+@pytest.fixture
+def gravcomp(apart):
     """Run `./gravcomp ...` to its end."""
 
     def call(*arguments: str, timeout: float = 240.0, **environment: str) -> Answer:
@@ -42,6 +51,7 @@ def gravcomp():
             text=True,
             timeout=timeout,
             env={**os.environ, **environment},
+            **apart,
         )
         return Answer(done.returncode, done.stdout, done.stderr)
 
@@ -98,7 +108,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def type_in(folder):
+def type_in(folder, apart):
     """Return a function that types a documented line followed by `shorter`, and returns exit code and output."""
 
     def run(line: str, shorter: str = "", timeout: float = 600.0, **given: object) -> tuple[int, str]:
@@ -110,6 +120,7 @@ def type_in(folder):
             stderr=subprocess.STDOUT,
             text=True,
             timeout=timeout,
+            **apart,
         )
         return done.returncode, done.stdout
 
@@ -129,10 +140,13 @@ def recording():
 
 @pytest.fixture(scope="module")
 def made(folder):
-    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
+    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once.
+
+    low: with lower priority.
+    """
 
     @functools.cache
-    def run(words: tuple[str, ...]) -> tuple[int, str]:
+    def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
         done = subprocess.run(
             [*words, "--brief"],
             cwd=folder,
@@ -140,18 +154,16 @@ def made(folder):
             text=True,
             timeout=1500,
             start_new_session=True,
-            preexec_fn=_give_way,
+            preexec_fn=_give_way if low else None,
         )
         return done.returncode, done.stderr + done.stdout
 
-    def made(line: str) -> tuple[int, str]:
-        return run(tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md")))
+    def made(line: str, low: bool) -> tuple[int, str]:
+        words = (word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
+        return run(tuple(words), low)
 
     return made
 
 
 def _give_way() -> None:
-    """Lower the priority of this session: what computes for minutes must not slow the graph of a test next to it."""
-    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w") as autogroup:
-        autogroup.write("10")
-    os.nice(10)
+    give_way(10)

@@ -47,6 +47,7 @@ def test_a_robot_file_with_a_mistake_is_refused(gravcomp, tmp_path, change, word
     refused(gravcomp("demo", "--headless", "--robot", changed_robot(tmp_path, change)), *words)
 
 
+@pytest.mark.graph
 def test_a_channel_that_does_not_exist_is_refused(gravcomp):
     refused(gravcomp("up", "--interface", "socketcan", "--channel", "nocan7"), "nocan7", "can_bridge")
     refused(gravcomp("up", "--interface", "carrier_pigeon", "--channel", "1"), "carrier_pigeon", "can_bridge")

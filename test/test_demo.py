@@ -11,19 +11,41 @@ from documents import documented
 
 from gravcomp.view.browser import find_chromium
 
+pytestmark = pytest.mark.graph
+
 LOOP = ["can_bridge", "imu_estimator", "fem_simulator", "inverse_controller", "virtual_robot"]
 
 
-def marked(mark: str) -> list[str]:
-    """Return the command lines of the processes that have the mark in their environment."""
-    found = []
+PATIENCE = 120.0  # s
+
+
+def processes(mark: str) -> dict[int, str]:
+    """Return ids and command lines of the processes that have the mark in their environment."""
+    found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             if mark.encode() in (folder / "environ").read_bytes():
-                found.append((folder / "cmdline").read_bytes().replace(b"\0", b" ").decode())
+                found[int(folder.name)] = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode()
         except OSError:
             continue
-    return [line for line in found if line]
+    return {pid: line for pid, line in found.items() if line}
+
+
+def marked(mark: str) -> list[str]:
+    return list(processes(mark).values())
+
+
+def pids(words: str, mark: str) -> list[int]:
+    return [pid for pid, line in processes(mark).items() if words in line]
+
+
+def until(condition, what: str):
+    """Return the first true value of the condition."""
+    end = time.monotonic() + PATIENCE
+    while not (found := condition()):
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
+    return found
 
 
 def check_compensation(figures: dict) -> None:
@@ -36,6 +58,7 @@ def check_compensation(figures: dict) -> None:
     assert figures["delay_ms"]["median"] > 0.0
 
 
+@pytest.mark.rates
 def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     mark = f"GRAVCOMP_TEST={os.getpid()}-scenario"
     answer = gravcomp(*documented("./gravcomp demo --headless --duration 30 --json")[1:], GRAVCOMP_TEST=mark.split("=")[1])
@@ -46,6 +69,7 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     assert marked(mark) == []
 
 
+@pytest.mark.rates
 def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
     answer = gravcomp(*documented("./gravcomp demo --imu FILE", FILE=trial[0])[1:], "--json")
@@ -75,14 +99,18 @@ def test_pictures_of_the_page_show_each_moment(gravcomp, tmp_path):
         assert (np.abs(middle[a] - middle[b]).max(axis=2) > 40).mean() > 0.003
 
 
-@pytest.mark.parametrize("delay", [0.3, 2.5, 9.0])
-def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, delay, monkeypatch):
-    mark = f"{os.getpid()}-ctrl-c-{delay}"
+@pytest.mark.parametrize(
+    "moment", ["", "gravcomp.launcher.node_host", "lib/gravcomp_fem/viewer", "lib/gravcomp_hw/virtual_robot"]
+)
+def test_ctrl_c_at_any_moment_leaves_no_process(gravcomp_process, moment, monkeypatch):
+    """At once, while the nodes' host imports, while the nodes start, and in the run, which begins with the virtual robot."""
+    mark = f"{os.getpid()}-ctrl-c-{moment}"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
     process = gravcomp_process(*documented("./gravcomp demo")[1:])
-    time.sleep(delay)
+    until(lambda: any(moment in line for line in marked(f"GRAVCOMP_TEST={mark}")), moment)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
-    process.wait(timeout=20.0)
+    process.wait(timeout=PATIENCE)
     assert process.returncode == 130
     assert marked(f"GRAVCOMP_TEST={mark}") == []
 
@@ -91,36 +119,19 @@ def test_the_nodes_of_a_killed_launcher_end(gravcomp_process, monkeypatch):
     mark = f"{os.getpid()}-kill"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
     process = gravcomp_process("demo", "--headless", "--duration", "120")
-    deadline = time.monotonic() + 60.0
-    while len(marked(f"GRAVCOMP_TEST={mark}")) <= 4 and time.monotonic() < deadline:
-        time.sleep(0.2)
-    assert len(marked(f"GRAVCOMP_TEST={mark}")) > 4
+    until(lambda: len(marked(f"GRAVCOMP_TEST={mark}")) > 4, "the start of the nodes")
     process.kill()
     process.wait()
-    deadline = time.monotonic() + 25.0
-    while marked(f"GRAVCOMP_TEST={mark}") and time.monotonic() < deadline:
-        time.sleep(0.2)
-    assert marked(f"GRAVCOMP_TEST={mark}") == []
+    until(lambda: marked(f"GRAVCOMP_TEST={mark}") == [], "the nodes' end")
 
 
 def test_a_node_that_dies_ends_the_run_and_is_named(gravcomp_process, monkeypatch):
     mark = f"{os.getpid()}-node"
     monkeypatch.setenv("GRAVCOMP_TEST", mark)
     process = gravcomp_process("demo", "--headless", "--duration", "120")
-    victim = None
-    deadline = time.monotonic() + 60.0
-    while victim is None and time.monotonic() < deadline:
-        time.sleep(0.2)
-        for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                own = f"GRAVCOMP_TEST={mark}".encode() in (folder / "environ").read_bytes()
-                if own and b"lib/gravcomp_fem/fem_simulator" in (folder / "cmdline").read_bytes():
-                    victim = int(folder.name)
-            except OSError:
-                continue
-    time.sleep(1.0)
-    os.kill(victim, signal.SIGKILL)
-    _, error = process.communicate(timeout=30.0)
+    victims = until(lambda: pids("lib/gravcomp_fem/fem_simulator", f"GRAVCOMP_TEST={mark}"), "the start of the simulator")
+    os.kill(victims[0], signal.SIGKILL)
+    _, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert re.search(r"fem_simulator was ended by SIGKILL", error)
     assert marked(f"GRAVCOMP_TEST={mark}") == []

@@ -11,9 +11,10 @@ rclpy = pytest.importorskip("rclpy", reason="it looks at the running graph: ./gr
 from gravcomp.graph.nodes import NODES, node
 from gravcomp.launcher import Graph
 from gravcomp.launcher.domain import reserve_domain
+from gravcomp.launcher.host_client import NodeHost
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.rates, pytest.mark.timeout(600)]
 
 # With a namespace, because nothing must depend on an empty one.
 NAMESPACE = "/left"
@@ -33,7 +34,7 @@ def robot(tmp_path_factory):
     motion = {"motion": "topic", "truth_rate": 50.0, "feedback_rate": 250}
     graph = RobotGraph("article", "udp_multicast", private_channel(), NAMESPACE, {"virtual_robot": motion})
     specs = [*graph.loop(), graph.node("gravcomp_hw", "virtual_robot")]
-    with Graph(specs, tmp_path_factory.mktemp("logs"), {"ROS_DOMAIN_ID": DOMAIN}) as processes:
+    with Graph(specs, tmp_path_factory.mktemp("logs"), {"ROS_DOMAIN_ID": DOMAIN}, NodeHost()) as processes:
         processes.start()
         yield graph, processes
 

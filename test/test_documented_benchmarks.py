@@ -13,15 +13,15 @@ pytestmark = pytest.mark.timeout(1600)
         ("./gravcomp bench engine --write src/README.md", "closed-loop"),
         ("./gravcomp bench estimator", "CPU time of a sample"),
         ("./gravcomp bench estimator --write src/doc/figures.md", "CPU time of a sample"),
-        ("./gravcomp bench graph", "two robots"),
-        ("./gravcomp bench graph --write src/doc/figures.md", "two robots"),
-        ("./gravcomp bench page --write src/doc/figures.md", "page"),
-        ("./gravcomp bench faults --write src/doc/figures.md", "hostile frames"),
-        ("./gravcomp bench soak --write src/doc/figures.md", "lost"),
+        pytest.param("./gravcomp bench graph", "two robots", marks=pytest.mark.graph),
+        pytest.param("./gravcomp bench graph --write src/doc/figures.md", "two robots", marks=pytest.mark.graph),
+        pytest.param("./gravcomp bench page --write src/doc/figures.md", "page", marks=pytest.mark.graph),
+        pytest.param("./gravcomp bench faults --write src/doc/figures.md", "hostile frames", marks=pytest.mark.graph),
+        pytest.param("./gravcomp bench soak --write src/doc/figures.md", "lost", marks=pytest.mark.graph),
     ],
 )
-def test_performance_is_measured(made, line, about):
+def test_performance_is_measured(made, apart, line, about):
     """Without --brief they take from minutes to half an hour. `test_figures_table` checks what --write does with a document."""
-    code, output = made(line)
+    code, output = made(line, low=bool(apart))
     # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output

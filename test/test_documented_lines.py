@@ -38,6 +38,7 @@ MODEL_LINES = (
     "./gravcomp model solve article --gravity -9.81 0 0 --target 0 0 100",
     "./gravcomp model view article --tension 0 0 0 0.3 0 0 --out bent.png",
     "./gravcomp model info src/examples/own_robot.yaml",
+    "./gravcomp model info src/examples/own_robot.yaml --picture sphere.png",
     "./gravcomp model build src/examples/own_robot.yaml",
 )
 
@@ -46,7 +47,8 @@ MODEL_LINES = (
 def test_a_model_is_described_solved_drawn_and_built(type_in, folder, line):
     code, output = type_in(line)
     assert code == 0, output
-    assert "--out" not in line or (folder / "bent.png").read_bytes().startswith(b"\x89PNG")
+    for option, picture in (("--out", "bent.png"), ("--picture", "sphere.png")):
+        assert option not in line or (folder / picture).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("line", ["./gravcomp doctor", "./gravcomp doctor --robot src/examples/own_robot.yaml"])
@@ -54,6 +56,12 @@ def test_the_doctor_examines_the_machine(type_in, line):
     code, output = type_in(line)
     # 1: this machine lacks something that is needed; that is a valid result.
     assert code in (0, 1) and "Python" in output
+
+
+def test_the_meshers_are_installed(type_in):
+    code, output = type_in("./gravcomp mesh install")
+    # 3: without root, the line that installs Gmsh's system libraries is printed.
+    assert (code == 0 and "Gmsh" in output) or (code == 3 and "apt-get install" in output), output
 
 
 def test_the_source_is_checked(type_in):

@@ -16,7 +16,7 @@ from shell import START, Shell
 
 from gravcomp.launcher.domain import reserve_domain
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(900)]
 
 APART = reserve_domain()
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
@@ -28,13 +28,13 @@ def test_an_own_robot_is_demonstrated(type_in):
 
 
 @pytest.fixture
-def apart(monkeypatch):
+def own_domain(monkeypatch):
     """A ROS domain without other nodes."""
     monkeypatch.setenv("ROS_DOMAIN_ID", APART)
 
 
 @pytest.mark.parametrize("line", ["./gravcomp replay my_bag --speed 2 --viewer", "./gravcomp replay BAG --speed 4 --viewer"])
-def test_a_bag_is_replayed(type_in, folder, apart, line):
+def test_a_bag_is_replayed(type_in, folder, own_domain, line):
     if not (folder / "my_bag").exists():
         shutil.copytree(RECORDED, folder / "my_bag")
     code, output = type_in(line, BAG="my_bag")
@@ -53,7 +53,7 @@ def test_a_bag_is_replayed(type_in, folder, apart, line):
         "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",
     ],
 )
-def test_a_node_runs_until_ctrl_c(folder, apart, monkeypatch, line):
+def test_a_node_runs_until_ctrl_c(folder, own_domain, monkeypatch, line):
     documented(line)
     if not (folder / "my_bag").exists():
         shutil.copytree(RECORDED, folder / "my_bag")
@@ -65,7 +65,7 @@ def test_a_node_runs_until_ctrl_c(folder, apart, monkeypatch, line):
     assert code == 0 and "Traceback" not in output, output
 
 
-def test_two_robots_run_side_by_side(folder, apart, type_in):
+def test_two_robots_run_side_by_side(folder, own_domain, type_in):
     lines = ("./gravcomp up --virtual --namespace /left --viewer", "./gravcomp up --virtual --namespace /right --viewer")
     shells = [Shell(documented(line), folder, dict(os.environ)) for line in lines]
     try:

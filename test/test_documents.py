@@ -220,7 +220,7 @@ GLOSSARY = "src/doc/glossary.md"
 # Frames and words of ROS, and the name of the shipped robot.
 OTHER_NAMES = {"soft_base", "soft_tip", "soft_rest", "imu_link", "__ns", "stamp", "article"}
 # Keys with a default that no shipped robot file gives.
-DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time", "c01_ratio", "c20_ratio", "c30_ratio"}
+DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time", "prony", "fibres", "c01_ratio", "c20_ratio", "c30_ratio"}
 
 
 def glossary_names() -> list[str]:

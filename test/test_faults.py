@@ -12,6 +12,8 @@ from gravcomp.bench.hostile_frames import send_hostile_frames
 from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp.motors.state import State
 
+pytestmark = pytest.mark.rates
+
 
 @pytest.fixture(scope="module")
 def campaign():

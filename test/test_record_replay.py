@@ -37,6 +37,7 @@ def test_the_recorded_bag_is_whole():
     assert len(read_recording(RECORDED)) == 600
 
 
+@pytest.mark.graph
 @pytest.mark.timeout(800)
 def test_a_replayed_bag_gives_the_offline_gravity_bit_for_bit_at_any_speed(gravcomp, tmp_path):
     again = []
@@ -58,6 +59,7 @@ def test_a_replayed_bag_gives_the_offline_gravity_bit_for_bit_at_any_speed(gravc
     assert np.degrees(max(angles)) < 0.5
 
 
+@pytest.mark.graph
 @pytest.mark.timeout(800)
 def test_a_recorder_that_is_killed_leaves_a_bag_that_can_be_replayed(gravcomp, gravcomp_process, tmp_path):
     bag = tmp_path / "killed"

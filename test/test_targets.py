@@ -9,7 +9,7 @@ from ros2_line import Ros2
 from gravcomp.launcher.virtual_graph import RunningGraph
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +24,13 @@ def ros2(graph):
     ros2 = Ros2()
     yield ros2
     ros2.close()
+
+
+def test_the_status_says_whether_the_target_can_be_held(graph, ros2):
+    """The answer comes some seconds after the start, from a process of low priority."""
+    statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
+    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "no answer comes")
+    assert statuses[-1].holdable == 1 and "the cables hold the tip" in statuses[-1].hold_message
 
 
 @pytest.mark.parametrize(("angle", "plane"), [(4.5, 0.0), (5.5, 1.0)])

@@ -18,6 +18,7 @@ rclpy = pytest.importorskip(
 PATIENCE = 240.0
 
 pytestmark = [
+    pytest.mark.graph,
     pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine: apt-get install chromium"),
     pytest.mark.timeout(900),
 ]
@@ -70,12 +71,13 @@ class Robot:
 def address(tmp_path_factory):
     """The page of a viewer with simulator and controller, in the ROS domain of this process."""
     from gravcomp.launcher import Graph
+    from gravcomp.launcher.host_client import NodeHost
     from gravcomp.launcher.robot_graph import RobotGraph
 
     graph = RobotGraph("article")
     viewer = graph.node("gravcomp_fem", "viewer", port=8800, rate=10.0, graphics="light")
     specs = [graph.node("gravcomp_fem", "fem_simulator"), graph.node("gravcomp_fem", "inverse_controller"), viewer]
-    with Graph(specs, tmp_path_factory.mktemp("logs")) as processes:
+    with Graph(specs, tmp_path_factory.mktemp("logs"), host=NodeHost()) as processes:
         processes.start()
         log = processes.processes[viewer.name].log
         processes.wait(lambda: "the page is at" in log.read_text(), PATIENCE, "the viewer's start")

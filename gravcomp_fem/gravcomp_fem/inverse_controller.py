@@ -1,6 +1,7 @@
 """Node inverse_controller: computes the cable displacements that bring the model to its target.
 
-It solves one quadratic programme per deformation.
+It solves one quadratic programme per deformation. At start a process of low priority finds out whether the cables can hold the
+target against the gravity that acts then; the status contains its answer as soon as it is known.
 """
 
 import math
@@ -8,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.time import Time
@@ -17,6 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from gravcomp.description.hardware import parse_hardware
 from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
+from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Target, TargetError, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
@@ -26,6 +29,7 @@ from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 # The status is for the user, not for the loop. A change of the code is published immediately.
 _STATUS_PERIOD = 0.1  # s
 _REFUSAL_SHOWN = 5.0  # s
+_UNKNOWN, _HELD, _NOT_HELD = 0, 1, 2  # ControllerStatus.holdable
 _INACTIVE = "the node is not active: activate it first"
 _LEVELS = {
     ControllerCode.INACTIVE: OK,
@@ -64,6 +68,9 @@ class InverseController(ManagedNode):
         self._published_code, self._published_at = None, 0.0
         self._refusal, self._refused_at = "", -math.inf
         self._last_arrival = self.get_clock().now()
+        self._holdable, self._hold_message = _UNKNOWN, ""
+        self._question: HoldProcess | None = None
+        self._asked = not self.parameters.check_hold
         self._inputs = [
             self.create_subscription(Deformation, "robot/deformation", self._on_deformation, SENSOR),
             self.create_subscription(PoseStamped, "target", self._on_pose_target, COMMAND),
@@ -77,6 +84,8 @@ class InverseController(ManagedNode):
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
         self.destroy_timer(self._watch)
+        if self._question is not None:
+            self._question.stop()
         self._refused_at = -math.inf
         self._publish_code(ControllerCode.INACTIVE, "not active")
 
@@ -127,6 +136,7 @@ class InverseController(ManagedNode):
                 ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", message.header
             )
             return
+        self._check_hold(message)
         interval = self._interval(message)
         if self._relaxing:
             command = self._problem.relax(response, interval=interval)
@@ -155,6 +165,23 @@ class InverseController(ManagedNode):
         interval = 0.01 if self._last_stamp is None else stamp - self._last_stamp
         self._last_stamp = stamp
         return interval if interval > 0.0 else 0.01
+
+    def _check_hold(self, message: Deformation) -> None:
+        """Ask once whether the target can be held against the gravity of a deformation, and take the answer when it is there."""
+        if not self._asked and self._target is not None and self._target.tip_position_weight > 0.0:
+            gravity = np.array([message.gravity.x, message.gravity.y, message.gravity.z])
+            self._asked = True
+            if np.linalg.norm(gravity) > 0.0:
+                self._question = HoldProcess(self.robot_file.source, gravity, self._target)
+        if self._question is None or self._question.running:
+            return
+        verdict = self._question.poll()
+        self._question = None
+        if verdict is None:
+            return
+        self._holdable, self._hold_message = (_HELD if verdict.held else _NOT_HELD), verdict.sentence
+        log = self.get_logger()
+        (log.info if verdict.held else log.warning)(f"in the direction of gravity at start {verdict.sentence}")
 
     def _check_stream(self) -> None:
         silence = (self.get_clock().now() - self._last_arrival).nanoseconds * 1e-9
@@ -227,6 +254,8 @@ class InverseController(ManagedNode):
                 axial=float(command.axial),
                 tilt=float(command.tilt),
                 solve_time=float(command.solve_time),
+                holdable=self._holdable,
+                hold_message=self._hold_message,
             )
         )
 
@@ -240,7 +269,7 @@ class InverseController(ManagedNode):
 
     def _publish_code(self, code: ControllerCode, sentence: str, header: Header | None = None) -> None:
         code, sentence = self._with_refusal(code, sentence)
-        status = ControllerStatus(code=int(code), message=sentence)
+        status = ControllerStatus(code=int(code), message=sentence, holdable=self._holdable, hold_message=self._hold_message)
         status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
         self._published_code = None
         self._status.publish(status)

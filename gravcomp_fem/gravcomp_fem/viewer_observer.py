@@ -31,6 +31,7 @@ _MOTOR_STATES = {
 _STALE = 1.0  # s
 # A stamp that differs more from this clock comes from another clock: that of a replay or of another machine.
 _CLOCK_TOLERANCE = 10.0  # s
+_NOT_HOLDABLE = 2  # ControllerStatus.holdable
 
 
 class GraphObserver:
@@ -78,7 +79,7 @@ class GraphObserver:
                 motors_tension=np.array(m.tension), motors_state=_MOTOR_STATES.get(m.state, "?"), motors_message=m.message
             )
         if status:
-            shown.update(status=status.message.message, status_level=_LEVELS.get(status.message.code, "warn"))
+            shown.update(status=_status_text(status.message), status_level=_LEVELS.get(status.message.code, "warn"))
         return Snapshot(
             time=time.monotonic(),
             truth=backbone_of_poses(truth.message) if truth else None,
@@ -140,3 +141,10 @@ class GraphObserver:
                 self._target = TargetView(target.tip_position, bent if shape.message.bend else None)
         except TargetError:
             return  # the controller refuses it and reports it
+
+
+def _status_text(status: ControllerStatus) -> str:
+    """Return the sentence of the controller; if the target cannot be held, with the reason."""
+    if status.holdable != _NOT_HOLDABLE or status.code not in (ControllerStatus.AT_LIMIT, ControllerStatus.UNREACHABLE):
+        return status.message
+    return f"{status.message}; at start {status.hold_message}"

@@ -77,6 +77,8 @@ class TopicBag:
             axial=0.0,
             tilt=0.0,
             solve_time=0.0,
+            holdable=0,
+            hold_message="",
         )
 
     def bend(self, topic: str, time: float, angle: float, plane: float) -> None:

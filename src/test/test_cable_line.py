@@ -12,10 +12,12 @@ from gravcomp.calibration.apply import calibrated_robot, write_calibrated
 from gravcomp.calibration.fit import cable_compliance
 from gravcomp.calibration.statics import StaticParameters
 from gravcomp.canbus.codec import encode
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
-from gravcomp.description import CableLine, Elements, load_robot_file, shipped_robots
+from gravcomp.description import Cable, CableLine, Elements, Material, Payload, Robot, Segment, load_robot_file, shipped_robots
 from gravcomp.description.cable_line import CABLE_MATERIALS
-from gravcomp.description.hardware import parse_hardware
+from gravcomp.description.hardware import Hardware, Motor, parse_hardware
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.reduction.reduced_cables import ReducedCables, stretch, tendons_at
 from gravcomp.simulation import RobotModel, Simulator
@@ -231,6 +233,33 @@ def test_stiff_lines_do_not_slow_the_virtual_robot_down():
     moved = np.ptp(np.array(tips[0])[:, 0])
     assert moved > 0.05
     assert np.abs(np.array(tips[0]) - np.array(tips[1])).max() < 0.05 * moved
+
+
+def held(model, virtual):
+    """Return the lateral residual in m of a robot with one description in the model and another one in the virtual robot."""
+    setup = Setup.of(load_robot_file("article"))
+    truth = dataclasses.replace(
+        setup.truth,
+        body=dataclasses.replace(setup.truth.body, youngs_modulus=2.9e6),
+        tendons=dataclasses.replace(Tendons(), radius_offset=0.0, angle_offset=0.0),
+    )
+    motors = tuple(Motor(cable.name, i + 1) for i, cable in enumerate(model.cables))
+    setup = dataclasses.replace(setup, robot=model, nominal=virtual, truth=truth, hardware=Hardware(motors=motors))
+    loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)), heating=False)
+    loop.hold(straight_target(model.length))
+    loop.run(3.0)
+    return np.linalg.norm(loop.trace.between(loop.time - 0.3).tip_position[:, :2], axis=1).mean()
+
+
+def test_the_loop_holds_a_stiff_robot_on_soft_lines_if_they_are_described():
+    """Stiffness and load are such that the lines stretch by four times the displacement that straightens the robot."""
+    segment = Segment("s", 0.1, 9e-3, 3e-3, material=Material(youngs_modulus=3e6, poissons_ratio=0.45, density=1145.0))
+    cables = tuple(Cable(f"c{i}", math.radians(120 * i), 3e-3, segment="s") for i in range(3))
+    silent = Robot("stiff", segments=(segment,), cables=cables, elements=Elements(along=6), payload=Payload(5e-3))
+    described = dataclasses.replace(silent, cable_defaults=CableLine(material="nylon", diameter=0.3e-3, free_length=0.2))
+    before, after = held(silent, described), held(described, described)
+    assert before > 5e-3
+    assert after < 0.15 * before
 
 
 def test_a_calibration_replaces_the_described_line(tmp_path):

@@ -28,7 +28,7 @@ def setup():
 
 @pytest.fixture(scope="module")
 def windows(setup):
-    return known_windows(setup)
+    return known_windows(setup, ((0.0, 0.0), (-45.0, 45.0)))
 
 
 def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
@@ -58,8 +58,8 @@ def first_cable(windows):
 
 @pytest.fixture(scope="module")
 def measured(setup, windows):
-    """Resting tips under 39 states of the cables, and one free fall."""
-    fall = free_fall((setup, 20.0, 0.0, 1.5, 0))
+    """Resting tips under 26 states of the cables, and one free fall."""
+    fall = free_fall((setup, 20.0, 0.0, 0.8, 0))
     return joined([fall, *standing(windows, first=1)])
 
 

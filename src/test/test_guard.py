@@ -22,14 +22,14 @@ from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT, GuardSettings
 # A process in place of the bridge: sends heartbeats until it is ended.
 BRIDGE = """
 import sys, time
-from gravcomp.description.hardware import CanInterface, Hardware, Motor
+from gravcomp.description.hardware import CanInterface, Hardware, Motor, Watchdog
 from gravcomp.motors.guard_client import GuardClient
 from gravcomp.motors.state import RotorRecord
-can = CanInterface(channel=sys.argv[1])
+can, watchdog = CanInterface(channel=sys.argv[1]), Watchdog(zero_timeout=float(sys.argv[3]))
 def record():
     now = time.monotonic()
     return {1: RotorRecord(10_000, 5, float(sys.argv[2]), now), 5: RotorRecord(20, 6, 0.0, now)}
-guard = GuardClient.connect(Hardware(motors=(Motor("a", 1), Motor("b", 5)), can=can), record())
+guard = GuardClient.connect(Hardware(motors=(Motor("a", 1), Motor("b", 5)), can=can, watchdog=watchdog), record())
 print("ready", flush=True)
 while guard.beat(record()):
     time.sleep(0.01)
@@ -62,7 +62,7 @@ def bridge(hardware, bus):
 
 def start_bridge(hardware, rpm=0, **options):
     """Start it with motor 1 turning at `rpm`."""
-    command = [sys.executable, "-c", BRIDGE, hardware.can.channel, str(rpm)]
+    command = [sys.executable, "-c", BRIDGE, hardware.can.channel, str(rpm), str(hardware.watchdog.zero_timeout)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
     assert process.stdout.readline() == "ready\n"
     return process
@@ -121,11 +121,26 @@ def turn_on(hardware, rpm):
     return count
 
 
-def test_the_next_bridge_gets_the_turns_that_the_guard_counted(bridge, hardware):
+def wait_for_rounds(bus):
+    """Wait until the guard has read what has been sent: in each of its rounds it sends zeros, then reads."""
+    begin, later, deadline = time.time(), 0, time.monotonic() + 60.0
+    while later < 6:  # two frames a round
+        later += sum(frame.timestamp > begin for frame in bus.receive(0.02))
+        assert time.monotonic() < deadline
+
+
+def patient(hardware):
+    """Return the hardware with a watchdog that a busy machine does not exceed."""
+    return dataclasses.replace(hardware, watchdog=dataclasses.replace(hardware.watchdog, zero_timeout=10.0))
+
+
+def test_the_next_bridge_gets_the_turns_that_the_guard_counted(hardware, bus):
+    hardware = patient(hardware)
+    bridge = start_bridge(hardware)
     bridge.kill()
     bridge.wait()
     count = turn_on(hardware, 20)  # slow: a pause of the machine leaves the turns certain
-    time.sleep(0.05)
+    wait_for_rounds(bus)
     client = GuardClient.connect(hardware)
     kept = {can_id: (rotor.count, rotor.zero, rotor.certain) for can_id, rotor in client.record.items()}
     assert kept == {1: (count, 5, True), 5: (20, 6, True)}
@@ -134,11 +149,13 @@ def test_the_next_bridge_gets_the_turns_that_the_guard_counted(bridge, hardware)
 
 def test_turns_that_could_not_be_counted_are_uncertain_for_the_next_bridge(hardware, bus):
     """A rotor turns at full speed when the bridge dies, and its feedback is missing for 0.1 s."""
+    hardware = patient(hardware)
     process = start_bridge(hardware, rpm=2750)
     process.kill()
     process.wait()
     time.sleep(0.1)
     turn_on(hardware, 2750)
+    wait_for_rounds(bus)
     client = GuardClient.connect(hardware)
     assert not client.record[1].certain and client.record[5].certain
     client.close()

@@ -147,6 +147,25 @@ def test_repeated_nodes_are_merged(tmp_path):
     assert len(body.nodes) == len(nodes) and any("repeated nodes were merged" in note for note in body.notes)
 
 
+def test_elements_that_do_not_fit_together_are_named(tmp_path):
+    """One element has a node in the middle of a side, which its neighbour lacks."""
+    nodes, cells = cone()
+    sides = np.sort(cells[:, 1:], axis=1)
+    inner = next(k for k in range(len(cells)) if (np.isin(cells, sides[k]).sum(axis=1) >= 3).sum() == 2)
+    a, b, c, d = cells[inner]
+    middle = len(nodes)
+    split = [(a, b, c, middle), (a, c, d, middle), (a, d, b, middle)]
+    body = placed(
+        write(
+            tmp_path / "hanging.vtk",
+            np.vstack([nodes, nodes[[b, c, d]].mean(axis=0)]),
+            np.vstack([np.delete(cells, inner, 0), split]),
+        )
+    )
+    assert any("4 faces of elements touch a neighbour" in note for note in body.notes)
+    assert not any("cracks" in note for note in placed(write(tmp_path / "whole.vtk", nodes, cells)).notes)
+
+
 def test_flaws_of_surfaces_are_mended_and_said(tmp_path):
     nodes, faces = surface()
     flawed = np.delete(faces, 20, axis=0)  # a small hole

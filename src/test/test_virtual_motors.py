@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from virtual_article import article
 
+from gravcomp.description.hardware import Hardware, Motor
 from gravcomp.virtual.motors import TICK, MotorBank
 from gravcomp.virtual.parameters import Motors
 
@@ -120,3 +121,29 @@ def test_a_stalled_rotor_does_not_turn_and_an_encoder_jumps():
     before = motors.feedback()[2]["angle"]
     motors.jump(np.arange(6) == 2)
     assert (motors.feedback()[2]["angle"] - before) % 8192 == 8192 // 3
+
+
+def test_a_motor_of_two_antagonists_pulls_one_at_a_time_and_carries_their_difference():
+    hardware = Hardware(motors=(Motor("a", 1, pair="b", preload=1e-3),))
+    motors = MotorBank(dataclasses.replace(Motors(), load_friction=0.0), hardware, np.zeros(2), np.random.default_rng(1))
+    spring = np.full(2, 3000.0)
+    for sign in (1.0, -1.0):
+        motors.commanded[:] = 0.2 * sign
+        motors.step(round(2.0 / TICK), np.zeros(2), spring)
+        pulled, other = motors.wound if sign > 0 else motors.wound[::-1]
+        force = spring[0] * (max(0.0, pulled) - max(0.0, other))
+        torque = Motors().torque_constant * 0.2
+        friction = Motors().friction_torque * hardware.drive.gear_ratio
+        assert force * Motors().capstan_radius == pytest.approx(torque, abs=1.1 * friction)
+        assert pulled + other == pytest.approx(2e-3, abs=1e-12)
+
+
+def test_a_differential_adds_the_turns_of_its_motors():
+    both = ({"b": 1.0}, {"b": -1.0})
+    hardware = Hardware(motors=tuple(Motor("a", i + 1, also=also, differential=True) for i, also in enumerate(both)))
+    motors = MotorBank(Motors(), hardware, np.full(2, 10.0), np.random.default_rng(1))
+    motors.commanded[:] = [0.5, 0.2]
+    motors.step(round(0.2 / TICK), np.zeros(2), np.full(2, 3000.0))
+    first, second = motors._capstan * Motors().capstan_radius
+    assert first > second > 0.0
+    assert motors.wound + 10.0 == pytest.approx([first + second, first - second])

@@ -19,17 +19,26 @@ _STOPS = 10
 _MESSAGE_SHARE = 0.05  # of the hostile frames and messages
 
 
-def run(progress: Callable[[str], None], *, kills: int = 20, frames: int = 1_000_000, seed: int = 1, every: int = 1) -> dict:
+def run(
+    progress: Callable[[str], None],
+    *,
+    kills: int = 20,
+    frames: int = 1_000_000,
+    seed: int = 1,
+    every: int = 1,
+    stops: int = _STOPS,
+) -> dict:
     """Run the campaign and return its figures; the names of the keys give their units.
 
-    kills: of each process; frames: hostile frames and messages; every: only every `every`-th fault.
+    kills: of each process; frames: hostile frames and messages; every: only every `every`-th fault; stops: calls of
+    ~/stop.
     """
     with RunningGraph({"virtual_robot": {"motion": "tremor"}}) as graph:  # keeps the motors working
         progress("starting the graph")
         graph.wait_for_commands()
         campaign = Campaign(graph, seed)
         try:
-            safe, unanswered, stuck = _faults(campaign, CASES[::every], progress)
+            safe, unanswered, stuck = _faults(campaign, CASES[::every], stops, progress)
             recovery, kill_safe, late = _kills(campaign, kills, progress)
             hostile = _hostile(campaign, frames, progress)
             if not campaign.make_active():
@@ -62,7 +71,9 @@ def run(progress: Callable[[str], None], *, kills: int = 20, frames: int = 1_000
     }
 
 
-def _faults(campaign: Campaign, cases: tuple[Case, ...], progress: Callable[[str], None]) -> tuple[dict, list, list]:
+def _faults(
+    campaign: Campaign, cases: tuple[Case, ...], stop_count: int, progress: Callable[[str], None]
+) -> tuple[dict, list, list]:
     """Return ms to the response by fault, the faults without one, and those after which commands were not followed again."""
     safe: dict[str, float | None] = {}
     unanswered, stuck = [], []
@@ -85,7 +96,7 @@ def _faults(campaign: Campaign, cases: tuple[Case, ...], progress: Callable[[str
         if not campaign.make_active():
             stuck.append(case.name)
     progress("stop")
-    stops = [_stop(campaign) for _ in range(_STOPS)]
+    stops = [_stop(campaign) for _ in range(stop_count)]
     if None in stops:
         unanswered.append("stop")
     safe["stop"] = max((round(t, 1) for t in stops if t is not None), default=None)

@@ -18,15 +18,16 @@ _WARM_UP, _LISTEN, _COST = 5.0, 10.0, 15.0  # s
 _LIGHT = {"virtual_robot": {"feedback_rate": 125}}  # as in the demo
 
 
-def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST) -> dict:
+def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float = _COST, warm_up: float = _WARM_UP) -> dict:
     """Return `delay_ms` {median, p99, samples}, `bridge_cpu`, `cpu` and `memory_mb` by process, and `two_robots_hz`.
 
     CPU loads are shares of a core; `two_robots_hz`: followed commands per second of each of two robots that run at the same time.
+    listen, cost: durations (s) of the measurements; warm_up: time (s) before them.
     """
     with RunningGraph() as graph:
         progress("starting the graph")
         graph.wait_for_commands()
-        time.sleep(_WARM_UP)
+        time.sleep(warm_up)
         progress(f"CPU load over {cost:.0f} s")
         shares = _shares(graph, cost)
         progress(f"delays over {listen:.0f} s")
@@ -36,7 +37,7 @@ def run(progress: Callable[[str], None], *, listen: float = _LISTEN, cost: float
     if len(delays) == 0:
         raise TimeoutError("no command was traced on the bus while listening")
     progress("two robots")
-    rates = _two_robots(listen)
+    rates = _two_robots(listen, warm_up)
     return {
         "robot": "virtual robot",
         "delay_ms": {
@@ -69,13 +70,13 @@ def _delays(graph: RunningGraph, duration: float) -> list[float]:
     return delays_of(frames)
 
 
-def _two_robots(duration: float) -> list[float]:
+def _two_robots(duration: float, warm_up: float) -> list[float]:
     """Return the followed commands per second of two robots at the same time, each with its own namespace and bus."""
     with RunningGraph(_LIGHT) as left, RunningGraph(_LIGHT) as right:
         graphs = (left, right)
         for graph in graphs:
             graph.wait_for_commands()
-        time.sleep(_WARM_UP)
+        time.sleep(warm_up)
         links = [CanLink(graph.can, [codec.layout("CommandTrace").frame_id]) for graph in graphs]
         for link in links:
             link.open()

@@ -15,16 +15,16 @@ from gravcomp.view.browser import Browser, find_chromium
 from gravcomp.view.graphics import chosen
 
 _LIGHT = {"virtual_robot": {"feedback_rate": 125, "motion": "tremor", "truth_rate": 50.0}}  # as in the demo
-_SETTLE = 5.0  # s
+_FIRST_TRACE = 60.0  # s, longest wait for the first command on the bus
 _FRAMES = "window.gravcompFrames = 0; (function count() { window.gravcompFrames++; requestAnimationFrame(count) })()"
 
 
-def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
+def run(progress: Callable[[str], None], *, listen: float = 20.0, settle: float = 5.0) -> dict:
     """Return the figures of the page.
 
     `drawn_s`: from the start of all nodes until an open browser has drawn the page; `updates_hz`: updates sent to the page;
     `animation_hz`: frames drawn by the browser; `delay_ms` of the loop, median and p99: `without` a viewer, `served` without an
-    open page, `looked_at` with one.
+    open page, `looked_at` with one. listen: duration (s) of each measurement; settle: time (s) before it.
     """
     if find_chromium() is None:
         return {"page": "no Chromium on this machine: apt-get install chromium"}
@@ -32,7 +32,7 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
     with RunningGraph(_LIGHT) as graph:
         progress("the loop without a viewer")
         graph.wait_for_commands()
-        delays["without"] = _delays(graph, listen)
+        delays["without"] = _delays(graph, settle, listen)
     with Browser() as browser:
         begin = time.monotonic()
         with RunningGraph(_LIGHT, viewer=True) as graph:
@@ -42,16 +42,16 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
             drawn = time.monotonic() - begin
             progress("the page open")
             graph.wait_for_commands()
-            time.sleep(_SETTLE)
+            time.sleep(settle)
             browser.page.evaluate(_FRAMES)
             received, frames, since = browser.received, browser.page.evaluate("window.gravcompFrames"), time.monotonic()
-            delays["looked_at"] = _delays(graph, listen)
+            delays["looked_at"] = _delays(graph, settle, listen)
             frames = browser.page.evaluate("window.gravcompFrames") - frames
             elapsed = time.monotonic() - since
             updates = (browser.received - received) / elapsed
             progress("the page not open")
             browser.page.goto("about:blank")
-            delays["served"] = _delays(graph, listen)
+            delays["served"] = _delays(graph, settle, listen)
             graph.check()
     return {
         "robot": "virtual robot",
@@ -64,10 +64,13 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0) -> dict:
     }
 
 
-def _delays(graph: RunningGraph, duration: float) -> dict[str, float]:
-    time.sleep(_SETTLE)
+def _delays(graph: RunningGraph, settle: float, duration: float) -> dict[str, float]:
+    time.sleep(settle)
     listener = DelayListener(graph.can)
     listener.start()
+    end = time.monotonic() + _FIRST_TRACE
+    while not listener.delays and time.monotonic() < end:
+        time.sleep(0.1)
     time.sleep(duration)
     listener.stop()
     in_ms = 1e3 * np.array(listener.delays)

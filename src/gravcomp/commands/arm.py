@@ -79,6 +79,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             if args.viewer:
                 show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
+            builder.start()
             figures = _follow(processes, result)
     output.result(figures, _summary(figures))
     return 0

@@ -45,10 +45,10 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
-    "estimator": {"every": 5},
-    "graph": {"listen": 4.0, "cost": 4.0},
-    "page": {"listen": 5.0},
-    "faults": {"kills": 1, "frames": 10_000, "every": 6},
+    "estimator": {"every": 13},
+    "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
+    "page": {"listen": 3.0, "settle": 1.0},
+    "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
     "start": {},
     "soak": {"minutes": 0.2},
 }

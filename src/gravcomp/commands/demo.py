@@ -108,7 +108,11 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
             # The last one, because its motion begins with its activation.
             processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
+            processes.wait(processes.were_active, _START_TIMEOUT, "the activation of the virtual robot")
+            builder.start()
             state = _follow(processes, result_file, args, pictures)
+            if pictures:
+                processes.stop_except("viewer")  # it looks back; the others would take the processors that draw the pictures
             problem = pictures.take(address) if pictures else ""
             figures = {
                 **state["figures"],

@@ -11,7 +11,7 @@ from gravcomp.launcher.robot_graph import check_robot_file
 def prepare(robot: str, virtual: bool) -> ModelBuilder:
     """Check the robot's file and compile what its nodes run, where that is not done yet. Raises ConfigError.
 
-    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager. Within its context a process of
+    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager. From its `start` on a process of
     low priority builds the model if it is missing, and the nodes use it as soon as it is stored.
     """
     check_robot_file(robot)

@@ -91,6 +91,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         processes.start()
         if viewer:
             show_page(processes, args.no_open)
+        builder.start()
         _follow(processes, replay.name, recording.duration, args.speed)
         time.sleep(_SETTLE)
     figures = {

@@ -35,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
     root = Path(os.environ["GRAVCOMP_ROOT"])
     for extra in ("development", "reports"):
         provide_extra(extra, root)
+    _provide_meshers()
     if not args.fast:
         _provide_browser()
     folders = [f for f in FOLDERS if (root / f).is_dir() and not (args.fast and f == "test")]
@@ -72,6 +73,17 @@ def _counts(report: Path) -> dict[str, int]:
         for name in total:
             total[name] += int(suite.get(name, 0))
     return total
+
+
+def _provide_meshers() -> None:
+    """Install the meshers; without the system libraries of Gmsh the tests that need it are skipped."""
+    from gravcomp.environment.errors import SetupError
+    from gravcomp.mesh_files.gmsh_library import install_gmsh
+
+    try:
+        install_gmsh()
+    except SetupError as error:
+        output.note(f"Skipped: tests of surfaces that are filled: {error}")
 
 
 def _provide_browser() -> None:

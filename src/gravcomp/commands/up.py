@@ -70,6 +70,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         bus = f" Bus: {interface} {channel}." if interface or channel else ""
         output.note(f"Started: {names}.{bus} Their output: {processes.logs}. Ctrl-C ends them.")
         processes.wait(processes.were_active, float("inf"), "the activation of all nodes")
+        builder.start()
         figures = {
             "nodes": list(processes.processes),
             "active_after_s": round(time.monotonic() - begin, 1),

@@ -96,12 +96,12 @@ def run(context: Context) -> Result:
 
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
-    inclinations = [*INCLINATIONS, *INCLINATIONS[-2::-1]]
+    inclinations = INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
     stops = [
-        (base_orientation(np.radians(i)), (HOLD / 10 if brief else HOLD) + (_START if k == 0 else 0.0))
+        (base_orientation(np.radians(i)), (HOLD / 20 if brief else HOLD) + (_START if k == 0 else 0.0))
         for k, i in enumerate(inclinations)
     ]
-    motion = WaypointMotion(stops, RATE * (5 if brief else 1))
+    motion = WaypointMotion(stops, RATE * (10 if brief else 1))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
     loop.run(_START)

@@ -21,7 +21,7 @@ TITLE = "Latency, and prediction of gravity"
 DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
 ARTICLE_DELAY = 3.0  # s
 _START, _DURATION = 3.0, 12.0  # s
-_WARM_UP, _LISTEN = 5.0, 15.0  # s
+_WARM_UP, _LISTEN, _BRIEF_LISTEN = 5.0, 15.0, 4.0  # s
 _LONGEST_HORIZON = 0.5  # s, limit of the estimator
 
 
@@ -130,15 +130,16 @@ def _graph_delays(context: Context) -> tuple[list[float], str]:
     from gravcomp.evaluation.bus_delay import DelayListener
     from gravcomp.launcher.virtual_graph import RunningGraph
 
+    listen = _BRIEF_LISTEN if context.brief else _LISTEN
     context.progress("starting the running graph")
     try:
         with RunningGraph() as graph:
             graph.wait_for_commands()
-            context.progress(f"latency of the running graph over {_WARM_UP + _LISTEN:.0f} s")
+            context.progress(f"latency of the running graph over {_WARM_UP + listen:.0f} s")
             time.sleep(_WARM_UP)
             listener = DelayListener(graph.can)
             listener.start()
-            time.sleep(_LISTEN)
+            time.sleep(listen)
             listener.stop()
             graph.check()
     except (LaunchError, NodeDied, TimeoutError, ImportError, OSError) as error:

@@ -18,15 +18,17 @@ TITLE = "Real to simulation: free fall"
 
 INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
-_DURATION, _REST = 4.0, 1.0  # s: of a fall, and of its last part, which counts as rest
+_DURATION, _BRIEF_DURATION = 4.0, 1.2  # s, of a fall
+_REST = 1.0  # s: the last part of a fall, which counts as rest
 _SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after the start of the fall at which shapes are drawn
 
 
 def run(context: Context) -> Result:
     """Run the experiment."""
     setup = context.setup
-    duration = 2.0 if context.brief else _DURATION
-    inclinations = INCLINATIONS[2:4] if context.brief else INCLINATIONS
+    duration = _BRIEF_DURATION if context.brief else _DURATION
+    inclinations = INCLINATIONS[3:4] if context.brief else INCLINATIONS
+    shown = tuple(t for t in _SHOWN if t < duration)
     poses = [(i, 0.0) for i in inclinations] + list(_FITTED_POSES[: 1 if context.brief else 2])
     jobs = [(setup, i, roll, duration, trial) for trial, (i, roll) in enumerate(poses)]
     falls = context.map(free_fall, jobs, "free fall of the virtual robot")
@@ -74,10 +76,14 @@ def run(context: Context) -> Result:
             Plot(
                 "Shapes",
                 _shapes(
-                    [(i, _fall_shapes(setup, fit.robot, i, fall)) for i, fall in zip(inclinations, evaluated) if i != 90.0],
+                    [
+                        (i, _fall_shapes(setup, fit.robot, i, fall, shown))
+                        for i, fall in zip(inclinations, evaluated)
+                        if i != 90.0
+                    ],
                     setup.robot.length,
                 ),
-                f"Side view, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in _SHOWN)} ms after the start of the fall."
+                f"Side view, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in shown)} ms after the start of the fall."
                 " Grey: rest shape without gravity, vermilion: virtual robot, blue: axis of the calibrated model.",
             ),
             Table(
@@ -126,13 +132,15 @@ def _errors(course: Measured, tip: np.ndarray, direction: np.ndarray) -> tuple[n
     return np.linalg.norm(tip - course.tip_position, axis=1), angle_between(direction, course.tip_direction)
 
 
-def _fall_shapes(setup: Setup, robot: Robot, inclination: float, fall: Measured) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at the drawn times."""
+def _fall_shapes(
+    setup: Setup, robot: Robot, inclination: float, fall: Measured, times: tuple[float, ...]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at `times` (s)."""
     base = base_orientation(np.radians(inclination))
-    samples = [round(t / SAMPLE) for t in _SHOWN]
+    samples = [round(t / SAMPLE) for t in times]
     course = fall.rows(np.arange(samples[-1] + 1))
     modelled = dict(enumerate(predict_shapes(robot, course)))
-    true = dict(enumerate(falling_rod(setup, base, _SHOWN[-1])))
+    true = dict(enumerate(falling_rod(setup, base, times[-1])))
     found = []
     for k in samples:
         shape = modelled[k]

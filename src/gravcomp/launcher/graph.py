@@ -90,6 +90,10 @@ class Graph:
                 raise TimeoutError(f"{what} did not happen within {timeout:.0f} s; the nodes' output is in {self.logs}")
             time.sleep(0.05)
 
+    def stop_except(self, executable: str) -> None:
+        """End all nodes in parallel, but not those of this executable."""
+        stop_together([process for process in self.processes.values() if process.spec.executable != executable])
+
     def stop(self) -> None:
         """End all nodes in parallel, and the processes that they started."""
         stop_together(list(self.processes.values()))

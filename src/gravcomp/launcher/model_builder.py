@@ -11,10 +11,10 @@ MARK = "GRAVCOMP_MODEL_BUILDER"
 
 
 class ModelBuilder:
-    """Builds the reduced model of `robot` (a shipped name or a path) in a process of low priority, while its context lasts.
+    """Builds the reduced model of `robot` (a shipped name or a path) in a process of low priority, from `start` on.
 
-    A build that is interrupted goes on at the next start (`gravcomp.training.background`). `environment`: variables for the nodes
-    of the graph.
+    The process ends with the context. A build that is interrupted goes on at the next start (`gravcomp.training.background`).
+    `environment`: variables for the nodes of the graph.
     """
 
     def __init__(self, robot: str):
@@ -23,8 +23,11 @@ class ModelBuilder:
         self.environment = {MARK: "1"}
 
     def __enter__(self) -> "ModelBuilder":
-        self._process = start_builder(self._robot)
         return self
+
+    def start(self) -> None:
+        """Start the process. Call it when the nodes have started: their imports and its own would wait for each other."""
+        self._process = start_builder(self._robot)
 
     def __exit__(self, *_: object) -> None:
         if self._process is not None:

@@ -11,10 +11,14 @@ storage here, above all for several right-hand sides.
 """
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -120,6 +124,27 @@ class BlockMatrix:
                 result[below] += self._coupling[i] @ x[seen]
                 result[seen] += self._coupling[i].T @ x[below]
         return result
+
+    def sparse(self) -> "csr_array":
+        """Return the whole matrix, both triangles, for many products. Only valid before `factor`."""
+        from scipy.sparse import coo_array, csr_array
+
+        start, rows, columns, values = self.pattern.start, [], [], []
+
+        def add(block: np.ndarray, row: int, column: int) -> None:
+            i, k = np.nonzero(block)
+            rows.append(i + row)
+            columns.append(k + column)
+            values.append(block[i, k])
+
+        for i, block in enumerate(self._diagonal):
+            add(np.tril(block) + np.tril(block, -1).T, start[i], start[i])
+            if i < len(self._coupling):
+                below = self._coupling[i]
+                add(below, start[i + 1], start[i + 1] - below.shape[1])
+                add(below.T, start[i + 1] - below.shape[1], start[i + 1])
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return csr_array(coo_array(entries, shape=(self.pattern.n, self.pattern.n)))
 
 
 class BlockCholesky:

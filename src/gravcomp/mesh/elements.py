@@ -5,7 +5,8 @@ integration of hex20 has 2 x 2 x 2 points (Zienkiewicz, Taylor, Too 1971): thin 
 spread from one element to the next.
 
 To add an element: its name in `KINDS`, and a branch in each function here that asks for its kind. `tube` makes every kind of
-hexahedron; other elements need a mesher, or their name in meshio (`volume_file`). `test/test_mechanics.py` checks every kind.
+hexahedron; other elements need a mesher, or their name in meshio (`mesh_files/formats.py`). `test/test_mechanics.py` checks
+every kind.
 """
 
 import dataclasses

@@ -13,8 +13,8 @@ from gravcomp.mesh.mesh import Mesh, MeshError
 _A, _B = 0.445948490915965, 0.091576213509771
 _POINTS = np.array([np.roll((1 - 2 * x, x, x), i) for x in (_A, _B) for i in range(3)])
 _WEIGHTS = np.array([0.223381589678011] * 3 + [0.109951743655322] * 3)
-# A node this near to the plane, of the length, is taken as beside it: sections through nodes have no special cases.
-_BESIDE = 1e-13
+# A node this near to the plane, of the length, is taken as off it: sections through nodes have no special cases.
+_OFF = 1e-13
 # The corner of a tetrahedron in local coordinates.
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 Points = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -33,8 +33,8 @@ def on_plane(mesh: Mesh, height: float) -> Points:
         position, rotation = (value[0] for value in mesh.axis.frames(np.array([height])))
         above = (mesh.nodes[mesh.elements[near, :4]] - position) @ rotation[:, 2]
     # At the base the body lies above the plane, everywhere else also below it.
-    beside = _BESIDE * mesh.length
-    above = np.where(np.abs(above) < beside, -beside if height < 0.5 * mesh.length else beside, above)
+    off_plane = _OFF * mesh.length
+    above = np.where(np.abs(above) < off_plane, -off_plane if height < 0.5 * mesh.length else off_plane, above)
     elements, places = _triangles(near, above)
     local = np.einsum("qc,kci->kqi", _POINTS, places).reshape(-1, 3)
     nodes = np.repeat(mesh.elements[elements], len(_POINTS), axis=0)

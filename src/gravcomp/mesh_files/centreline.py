@@ -28,6 +28,10 @@ def fitted_axis(nodes: np.ndarray, triangles: np.ndarray, name: str) -> tuple[Re
     thickness = float(np.sqrt(4.0 * np.einsum("ki,ki->", np.cross(a, b), c) / 6.0 / (np.pi * top)))
     direction = nodes[np.argmax(np.linalg.norm(nodes, axis=1))]
     length = float(np.linalg.norm(direction))
+    upright = _section_places(STRAIGHT, direction, top)
+    middles = np.array([plane_section(nodes, triangles, place, normal, _REACH * thickness)[1] for place, normal in upright])
+    if np.hypot(middles[:, 0], middles[:, 1]).max() < _ASIDE * thickness and np.hypot(*direction[:2]) < _REACH * thickness:
+        return STRAIGHT, top
     # The first sections lie across the line from the base to the farthest point.
     axis, curvature = None, np.zeros((_PIECES, 2))
     for _ in range(_ROUNDS):

@@ -37,12 +37,12 @@ def fill_holes(nodes: np.ndarray, faces: np.ndarray, path: Path, notes: list[str
     left = []
     for index, (rim, cap) in enumerate(zip(rims, caps)):
         normal, height = cap
-        beside = [
+        coplanar = [
             other for other in range(len(rims))
             if other != index and size[other] > _SMALL * diagonal and abs(caps[other][0] @ normal) > 0.99
             and abs((middle[other] - middle[index]) @ normal) < _FLAT * max(size[index], size[other])
         ]  # fmt: skip
-        small, flat = size[index] <= _SMALL * diagonal, height <= _FLAT * size[index] and not beside
+        small, flat = size[index] <= _SMALL * diagonal, height <= _FLAT * size[index] and not coplanar
         fan = np.column_stack([np.full(len(rim), len(nodes)), np.roll(rim, -1), rim])
         if not (small or flat) or not _star_shaped(nodes[rim], middle[index], normal):
             left.append(index)

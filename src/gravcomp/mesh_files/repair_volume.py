@@ -21,6 +21,8 @@ _MIRRORED = {
 _HEX_PARTS = np.array([(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)])
 # An element with a smaller share of the volume of the median element has collapsed.
 _COLLAPSED = 1e-6
+# Elements around a face among which its neighbour is sought.
+_NEIGHBOURS = 24
 
 
 def repaired_volume(mesh: RawMesh, name: str) -> RawMesh:
@@ -56,6 +58,8 @@ def repaired_volume(mesh: RawMesh, name: str) -> RawMesh:
         cells[inverted] = cells[inverted][:, _MIRRORED[mesh.kind]]
     _refuse_overlap(nodes, cells, name)
     require_one_body(nodes, cells, _bodies(cells), "elements", name)
+    if covered := _covered_faces(nodes, cells):
+        notes.append(f"{covered} faces of elements touch a neighbour without sharing its nodes: the body has cracks there")
     kind = mesh.kind
     if kind == "hex8":
         kind, nodes, cells = "hex20", *_raised_hexahedra(nodes, cells)
@@ -118,6 +122,23 @@ def _refuse_overlap(nodes: np.ndarray, cells: np.ndarray, name: str) -> None:
             f"{name}: the mesh is folded: at {int((count > 1).sum())} faces the elements of both sides overlap, first at"
             f" ({x:.4g}, {y:.4g}, {z:.4g}) units; mesh the body again"
         )
+
+
+def _covered_faces(nodes: np.ndarray, cells: np.ndarray) -> int:
+    """How many free triangles have another element just outside of them: neighbours whose faces do not match."""
+    from scipy.spatial import cKDTree
+
+    parts = np.array([(0, 1, 2, 3)]) if cells.shape[1] in (4, 10) else _HEX_PARTS
+    corners = nodes[cells[:, parts].reshape(-1, 4)]
+    inverse = np.linalg.inv((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+    faces = nodes[boundary_triangles(cells)]
+    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    size = np.sqrt(np.linalg.norm(normal, axis=1))
+    outside = faces.mean(axis=1) + 1e-3 * normal / np.maximum(size, 1e-300)[:, None]
+    _, near = cKDTree(corners.mean(axis=1)).query(outside, k=min(_NEIGHBOURS, len(corners)))
+    local = np.einsum("fnij,fnj->fni", inverse[near], outside[:, None] - corners[near, 0])
+    within = (local.min(axis=2) > -1e-6) & (local.sum(axis=2) < 1.0 + 1e-6)
+    return int(within.any(axis=1).sum())
 
 
 def _bodies(cells: np.ndarray) -> list[np.ndarray]:

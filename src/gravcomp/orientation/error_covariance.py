@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.filterpy_import import kalman_filter_class
 
 _UNITY = {size: np.eye(size) for size in (3, 6)}  # of the measurements: velocity, and velocity with bias
 
@@ -23,9 +24,7 @@ class ErrorCovariance:
     """Covariance (9, 9) of the error state; `matrix` may be read after each call."""
 
     def __init__(self) -> None:
-        from filterpy.kalman import KalmanFilter  # here: the import takes a second, because scipy.stats comes with it
-
-        self._kalman = KalmanFilter(dim_x=9, dim_z=3)
+        self._kalman = kalman_filter_class()(dim_x=9, dim_z=3)  # imported here: what only reads orientations does without it
         self._kalman.inv = _inverse
         self._transition = np.eye(9)
         self._process = np.zeros((9, 9))

@@ -169,7 +169,7 @@ class DynamicSimulator:
             self._in_reduced, self._memory = False, left.state.memory
         motion = _advanced(self.solver, gravity, cables, h, count)
         if self._memory is not None and self._reduced is not None and self._memory.ratio.size:
-            self._memory = self._memory.after(*self._reduced.model.projected(self.model.free(motion.u)), count * h)
+            self._memory = self._memory.after(*self._reduced.model.projected(self.model.free(self.solver.state.u)), count * h)
         return motion
 
     def _usable_reduced(self) -> "ReducedDynamicSolver | None":

@@ -12,9 +12,9 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
+from gravcomp.full_model.linear_response import observed
 from gravcomp.full_model.model import RobotModel
-from gravcomp.full_model.observation import observe
-from gravcomp.full_model.shape import Response, Shape, ShapeStatus
+from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.simulation.search_pace import SearchPace
@@ -188,20 +188,11 @@ class Simulator:
 
     def _shape(self, state: Equilibrium, gravity: np.ndarray, started: float) -> Shape:
         """Return the shape and response of a state of the full model; started: of the computation, by `time.perf_counter`."""
-        model = self.model
-        sections = model.effectors.sections(model.mesh.nodes + state.u)
-        effector, compliance_ea, orientation = observe(sections, model.effectors.section_changes(state.answer))
-        displacement = state.tendons.displacement + model.tendons.stretch(state.tendons) * state.tension
-        response = Response(
-            state.compliance,
-            compliance_ea,
-            displacement - state.compliance @ state.tension,
-            effector - compliance_ea @ state.tension,
-        )
+        sections, orientation, _, displacement, response = observed(self.model, state)
         return Shape(
             tip_position=sections[-1, 0],
             tip_orientation=orientation[-1],
-            backbone_station=model.effectors.station,
+            backbone_station=self.model.effectors.station,
             backbone_position=sections[:-1, 0],
             backbone_orientation=orientation[:-1],
             cable_displacement=displacement,
@@ -211,7 +202,7 @@ class Simulator:
             residual=state.residual,
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
-            message=beyond_range(model, state.u) if state.converged else self._reason(state),
+            message=beyond_range(self.model, state.u) if state.converged else self._reason(state),
         )
 
     def _reason(self, state: Equilibrium) -> str:

@@ -4,18 +4,16 @@ One process for each cache entry builds it; others wait for its lock and then fi
 samples that it has computed, and the next one goes on from there.
 """
 
-import os
 import sys
 
 from gravcomp.config import ConfigError
+from gravcomp.environment.give_way import give_way
 from gravcomp.mesh import MeshError
-
-_PRIORITY = 19
 
 
 def main(arguments: list[str]) -> int:
     """Build the reduced model unless it exists. Returns 0, also for a robot that cannot be reduced."""
-    os.nice(_PRIORITY)
+    give_way()
     (robot,) = arguments
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.model import RobotModel

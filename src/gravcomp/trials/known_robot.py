@@ -21,6 +21,7 @@ DAMPING_TIME = 25e-3  # s
 OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
 # m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (0.6e-3, 1.8e-3)
+_POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
 _NOISE = 0.1e-3  # m: standard deviation of one image; ten are averaged
 
 
@@ -43,7 +44,9 @@ class Recovered:
 def recover(context: Context) -> list[Recovered]:
     """Fit modulus, offsets and elasticity to tips at rest, modulus and damping to free falls. Returns true and fitted values."""
     moduli = MODULI[:1] if context.brief else MODULI
-    fits = context.map(_fit_known, [(context.setup, modulus) for modulus in moduli], "fitting robots with known parameters")
+    poses = _POSES[:1] if context.brief else _POSES
+    jobs = [(context.setup, modulus, poses) for modulus in moduli]
+    fits = context.map(_fit_known, jobs, "fitting robots with known parameters")
     found = []
     for modulus, fit in zip(moduli, fits):
         estimate = fit.estimates[0]
@@ -53,8 +56,9 @@ def recover(context: Context) -> list[Recovered]:
         if cable is not None:
             found.append(Recovered(estimate.name, "mm", 1e3 * OFFSETS[cable], estimate.value, estimate.interval))
     setup = known_setup(context.setup, moduli[0])
+    inclinations, duration = ((0.0,), 0.5) if context.brief else ((0.0, 30.0), 1.5)
     falls = context.map(
-        free_fall, [(setup, i, 0.0, 1.5, trial) for trial, i in enumerate((0.0, 30.0))], "free falls of the known robot"
+        free_fall, [(setup, i, 0.0, duration, trial) for trial, i in enumerate(inclinations)], "free falls of the known robot"
     )
     motion = fit_motion(
         context.setup.robot,
@@ -83,11 +87,11 @@ def known_setup(setup: Setup, modulus: float) -> Setup:
     return dataclasses.replace(setup, truth=dataclasses.replace(truth, body=body, tendons=tendons))
 
 
-def known_windows(setup: Setup) -> StillWindows:
-    """Return tips at rest of the known robot: released, and with each cable pulled in, in several poses."""
+def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES) -> StillWindows:
+    """Return tips at rest of the known robot: released, and with each cable pulled in, in each pose (inclination, roll, deg)."""
     rod, random = build_rod(setup.nominal, setup.truth), np.random.default_rng(setup.seed)
     count, rows = rod.tendons, []
-    for inclination, roll in ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0)):
+    for inclination, roll in poses:
         gravity = base_orientation(np.radians(inclination), np.radians(roll)).T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
         pulls = [np.full(count, np.nan)] + [
             np.where(np.arange(count) == c, pull, np.nan) for c in range(count) for pull in _PULLS
@@ -100,6 +104,6 @@ def known_windows(setup: Setup) -> StillWindows:
     return StillWindows(*(np.array(column) for column in zip(*rows)))
 
 
-def _fit_known(job: tuple[Setup, float]) -> StaticFit:
-    setup, modulus = job
-    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus)))
+def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...]]) -> StaticFit:
+    setup, modulus, poses = job
+    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses))

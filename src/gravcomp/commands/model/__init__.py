@@ -7,7 +7,7 @@ from gravcomp.commands.parsers import add_subcommand
 
 SUBCOMMANDS = {
     "build": "build the reduced model, which the simulator then uses",
-    "info": "print mass, lengths, natural frequencies, reach, and the mesh with its error",
+    "info": "print mass, lengths, natural frequencies, whether the cables can hold the robot, reach, and the mesh with its error",
     "solve": "print the shape under gravity for given tensions, displacements or a target",
     "view": "draw the deformed robot",
 }

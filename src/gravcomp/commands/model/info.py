@@ -1,14 +1,17 @@
-"""`gravcomp model info ROBOT`: mass, lengths, natural frequencies and reach of a robot's model, and the error of its mesh."""
+"""`gravcomp model info ROBOT`: mass, lengths, natural frequencies, whether its cables can hold it, reach, error of its mesh."""
 
 import argparse
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.model import hold
+from gravcomp.commands.model.reach import reach
+from gravcomp.commands.model.reach import text as reach_text
 
 if TYPE_CHECKING:
     from gravcomp.description import Robot
-    from gravcomp.simulation import RobotModel, Shape, Simulator
+    from gravcomp.simulation import RobotModel, Shape
 
 _GRAVITY = 9.81
 
@@ -18,22 +21,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "robot", nargs="?", default="article", metavar="ROBOT", help="robot file or shipped robot (default: article)"
     )
+    hold.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the subcommand. Returns 0. Raises ConfigError, MeshError."""
+    """Run the subcommand. Returns 0. Raises ConfigError, MeshError, ValueError."""
     import numpy as np
 
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.modes import natural_frequencies
+    from gravcomp.holdability.text import lines
     from gravcomp.mesh.quality import mesh_quality
     from gravcomp.simulation import Simulator
 
+    if args.picture and args.no_hold:
+        raise ValueError("--picture draws whether the robot can be held, which --no-hold leaves out; give one of them")
     file = load_robot_file(args.robot)
     simulator = Simulator(file.robot, reduced=False)
     robot, model = simulator.robot, simulator.model
     quality = mesh_quality(model.mesh)
-    sag = simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
     figures = {
         "robot": robot.name,
         "file": file.source,
@@ -41,14 +47,22 @@ def run(args: argparse.Namespace) -> int:
         "mass_g": 1e3 * model.mass,
         "payload_g": 1e3 * robot.payload.mass,
         "cables": _cables(model),
+    }
+    answer = hold.answer(args, model)
+    if answer is not None and args.picture:
+        hold.draw(answer, robot.name, args.picture)
+    sag = simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
+    figures |= {
         "natural_frequency_hz": natural_frequencies(model).tolist(),
-        "horizontal_tip_mm": (1e3 * sag.tip_position).tolist(),
-        "reach": _reach(simulator),
+        "horizontal_tip_mm": (1e3 * sag.tip_position).tolist() if sag.is_equilibrium else None,
+        "horizontal_message": sag.message,
+        "hold": None if answer is None else hold.figures(answer, model),
+        "reach": reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
     }
     if robot.body is not None:
         figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
-    output.result(figures, _text(figures))
+    output.result(figures, _text(figures, [] if answer is None else lines(robot, answer)))
     return 0
 
 
@@ -84,40 +98,6 @@ def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
     return sentences
 
 
-def _reach(simulator: "Simulator") -> list[dict[str, Any]]:
-    """Return how far each cable alone moves the weightless robot: with growing tension, up to the limits or a half turn."""
-    import numpy as np
-
-    from gravcomp.full_model.cable_input import CableInput
-
-    robot, reach = simulator.robot, []
-    for index, name in enumerate(robot.cable_names):
-        simulator.reset()
-        best: dict[str, Any] = {"cable": name, "tension_n": 0.0, "displacement_mm": 0.0, "lateral_mm": 0.0, "tilt_deg": 0.0}
-        for tension in np.linspace(0.0, robot.limits.tension_max, 41)[1:]:
-            tensions = np.zeros(len(robot.cables))
-            tensions[index] = tension
-            # The reach ends where tracking ends; the load step is not divided further.
-            if not simulator.solver.track(np.zeros(3), CableInput(tension=tensions), iterations=10).converged:
-                break
-            shape = simulator.step(np.zeros(3), tension=tensions)
-            if shape.message and "law_range_left_at_n" not in best:
-                best["law_range_left_at_n"], best["law_range"] = float(tension), shape.message
-            tilt = float(np.degrees(np.arccos(np.clip(shape.tip_direction[2], -1.0, 1.0))))
-            beyond = shape.cable_displacement[index] > robot.limits.displacement_max
-            if beyond or tilt < best["tilt_deg"]:
-                break
-            lateral = 1e3 * float(np.hypot(*shape.tip_position[:2]))
-            best |= {
-                "tension_n": float(tension),
-                "displacement_mm": 1e3 * float(shape.cable_displacement[index]),
-                "lateral_mm": max(lateral, best["lateral_mm"]),
-                "tilt_deg": tilt,
-            }
-        reach.append(best)
-    return reach
-
-
 def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, Any]:
     """Return the estimated error of a chosen mesh, or how far the horizontal tip moves when the described one is refined.
 
@@ -141,6 +121,8 @@ def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, A
         }
     finer = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along)
     change = Simulator(dataclasses.replace(robot, elements=finer), reduced=False).solve(np.array([-_GRAVITY, 0.0, 0.0]))
+    if not (change.is_equilibrium and sag.is_equilibrium):
+        return {"tip_change_when_refined_mm": None, "refinement": "not known: no equilibrium of the released robot was found"}
     error = float(np.linalg.norm(change.tip_position - sag.tip_position))
     good = error < 2e-3 * robot.length
     return {
@@ -151,23 +133,20 @@ def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, A
     }
 
 
-def _text(figures: dict[str, Any]) -> str:
-    mesh = figures["mesh"]
+def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
+    mesh, tip = figures["mesh"], figures["horizontal_tip_mm"]
     lines = [
         f"{figures['robot']} ({figures['file']})",
         f"  length {figures['length_mm']:.1f} mm, mass {figures['mass_g']:.2f} g (payload {figures['payload_g']:.2f} g)",
         "  cables " + ", ".join(f"{name} {cable['length_mm']:.1f} mm" for name, cable in figures["cables"].items()),
         *_lines(figures["cables"]),
         "  natural frequencies " + ", ".join(f"{f:.2f}" for f in figures["natural_frequency_hz"]) + " Hz",
-        "  tip when horizontal, cables released: " + ", ".join(f"{x:.2f}" for x in figures["horizontal_tip_mm"]) + " mm",
-        "  reach of each cable alone, without gravity:",
+        "  tip when horizontal, cables released: "
+        + (figures["horizontal_message"] if tip is None else ", ".join(f"{x:.2f}" for x in tip) + " mm"),
     ]
-    lines += [
-        f"    {r['cable']}: {r['lateral_mm']:.1f} mm lateral, tip tilted by {r['tilt_deg']:.0f} deg,"
-        f" at {r['tension_n']:.2f} N and {r['displacement_mm']:.1f} mm"
-        for r in figures["reach"]
-    ]
-    lines += [f"    warning: at {r['law_range_left_at_n']:.2f} N {r['law_range']}" for r in figures["reach"] if "law_range" in r]
+    lines += [f"  {line}" for line in hold_lines]
+    if figures["reach"]:
+        lines += reach_text(figures["reach"])
     lines.append(
         f"  mesh: {mesh['elements']} {mesh['kind']}, {mesh['nodes']} nodes, {mesh['unknowns']} unknowns;"
         f" worst Jacobian ratio {mesh['jacobian_ratio']:.2f}, worst aspect ratio {mesh['aspect_ratio']:.1f}"
@@ -178,7 +157,7 @@ def _text(figures: dict[str, Any]) -> str:
             f"  elements chosen: {{{numbers}}}; with twice as many each way the tip, horizontal or bent to its limit, moves by"
             f" about {mesh['estimated_error_pct']:.2g} % of the length: {mesh['refinement']}"
         )
-    elif "tip_change_when_refined_mm" in mesh:
+    elif mesh.get("tip_change_when_refined_mm") is not None:
         lines.append(
             f"  with twice the elements along and around the horizontal tip moves by"
             f" {mesh['tip_change_when_refined_mm']:.3f} mm: {mesh['refinement']}"

@@ -22,6 +22,11 @@ class InverseControllerParameters:
     stale_after: float = parameter(
         200.0, edge="ms", minimum=20.0, maximum=10000.0, description="without robot/deformation for this time no command is sent"
     )
+    check_hold: bool = parameter(
+        True,
+        description="find out at start, in a process of low priority, whether the cables can hold the target",
+        read_only=True,
+    )
     frame: str = parameter("soft_base", description="frame in which targets must be given", read_only=True)
     inverse: InverseOptions = parameter(
         default_factory=InverseOptions, description="weights and tolerances of the inverse problem"

@@ -1,0 +1,192 @@
+"""Can a robot be held: against closed forms, against the closed loop of model and controller, and what `model info` prints."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from gravcomp.commands.__main__ import main
+from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
+from gravcomp.full_model.model import RobotModel
+from gravcomp.holdability import Binding, HoldOptions, holdability
+from gravcomp.holdability.background import answer as background_answer
+from gravcomp.holdability.directions import angles, sphere
+from gravcomp.holdability.search import HoldSearch
+from gravcomp.inverse import InverseController, straight_target
+from gravcomp.simulation import Simulator
+
+_GRAVITY = 9.80665
+_MODULUS, _DENSITY, _DIAMETER, _LENGTH, _RADIUS = 1.5e6, 1100.0, 10e-3, 0.12, 3.5e-3
+_AREA, _INERTIA = np.pi * _DIAMETER**2 / 4, np.pi * _DIAMETER**4 / 64
+_SIDE = np.array([[-1.0, 0.0, 0.0]])  # cable c0 at 0 deg holds alone
+
+
+def arm(tension_max=5.0, modulus=_MODULUS, radius=_RADIUS, law="svk", angles_deg=(0, 120, 240), **limits):
+    """A solid rod with cables along its whole length, in a coarse mesh."""
+    material = Material(youngs_modulus=modulus, poissons_ratio=0.4, density=_DENSITY, law=law)
+    segment = Segment("s", length=_LENGTH, outer_diameter=_DIAMETER, material=material)
+    cables = tuple(Cable(f"c{k}", angle=np.radians(a), radius=radius, segment="s") for k, a in enumerate(angles_deg))
+    return Robot(
+        "arm",
+        segments=(segment,),
+        cables=cables,
+        elements=Elements(around=8, along=4),
+        limits=Limits(tension_max=tension_max, **limits),
+    )
+
+
+@pytest.fixture(scope="module")
+def search():
+    return HoldSearch(RobotModel(arm()))
+
+
+def test_the_tension_is_that_of_the_beam(search):
+    """M L^2 / 2 E I = w L^4 / 8 E I with M = T r; the rod sags little, but its cable is shortened and its tip turns."""
+    found = search.answer(_SIDE[0])
+    wanted = _DENSITY * _AREA * _GRAVITY * _LENGTH**2 / 4 / _RADIUS
+    assert found.held and found.binding == Binding.NOTHING
+    linear, _ = search.linear.tension(_GRAVITY * _SIDE[0])
+    assert linear.max() == pytest.approx(wanted, rel=0.01)
+    assert found.tension == pytest.approx(wanted, rel=0.06)
+    assert found.lateral < search.tolerance and found.demand == pytest.approx(found.tension / 5.0)
+
+
+def test_an_upright_rod_buckles_at_its_critical_length(search):
+    """Greenhill: a clamped rod buckles under its own weight at w L^3 = 7.837 E I."""
+    points = search.path.follow(np.array([0.0, 0.0, -_GRAVITY]), search.wide, np.zeros(3), most=10.0)
+    critical = 7.837 * _MODULUS * _INERTIA / (_DENSITY * _AREA * _GRAVITY * _LENGTH**3)
+    last = points[-1]
+    # The eigenvalue goes to zero linearly in the load.
+    assert last.share + last.eigenvalues.free / (1.0 - last.eigenvalues.free) * last.share == pytest.approx(critical, rel=0.03)
+    assert points[0].eigenvalues.free == pytest.approx(1.0, rel=1e-6)
+
+
+def test_a_tension_limit_binds_and_what_would_do_is_computed():
+    free = holdability(arm(), directions=_SIDE, with_needed=False).directions[0]
+    limit = 0.6 * free.tension
+    found = holdability(arm(tension_max=limit), directions=_SIDE)
+    (direction,) = found.directions
+    assert not found.held and direction.binding == Binding.TENSION and direction.cable == "c0"
+    assert direction.share == pytest.approx(0.6, abs=0.03)
+    assert found.needed.tension == pytest.approx(free.tension, rel=0.01)
+    # Between the tip of the released robot and that of the held one; the rest is about the share of gravity that is not held.
+    assert 0.2 * found.released < direction.lateral < 0.6 * found.released
+    assert found.needed.radius_factor == pytest.approx(1.0 / 0.6, rel=0.1) and not found.needed.radius_fits
+    assert found.needed.widest_factor == pytest.approx(0.5 * _DIAMETER / _RADIUS, rel=0.01)
+
+
+def test_a_radius_that_fits_is_confirmed():
+    free = holdability(arm(radius=2e-3), directions=_SIDE, with_needed=False).directions[0]
+    limited = arm(radius=2e-3, tension_max=0.8 * free.tension)
+    needed = holdability(limited, directions=_SIDE).needed
+    assert needed.radius_fits and 1.2 < needed.radius_factor < 1.35
+    wider = tuple(dataclasses.replace(cable, radius=2e-3 * needed.radius_factor) for cable in limited.cables)
+    assert holdability(dataclasses.replace(limited, cables=wider), directions=_SIDE, with_needed=False).held
+
+
+def test_a_displacement_limit_binds():
+    free = holdability(arm(), directions=_SIDE, with_needed=False).directions[0]
+    found = holdability(arm(displacement_max=0.5 * free.displacement), directions=_SIDE)
+    assert found.directions[0].binding == Binding.DISPLACEMENT and found.directions[0].share == pytest.approx(0.5, abs=0.1)
+    assert found.needed.displacement == pytest.approx(free.displacement, rel=0.05)
+
+
+def test_two_cables_cannot_hold_against_gravity_across_their_plane():
+    found = holdability(arm(angles_deg=(0, 180)), directions=np.array([[0.0, 1.0, 0.0]]))
+    assert found.directions[0].binding == Binding.CABLES and found.directions[0].share < 0.2
+    assert found.needed is None
+
+
+def test_a_robot_that_is_too_soft_buckles_upright_and_says_so():
+    found = holdability(arm(modulus=0.15 * _MODULUS), directions=np.array([[0.0, 0.0, -1.0]]))
+    critical = 7.837 * 0.15 * _MODULUS * _INERTIA / (_DENSITY * _AREA * _GRAVITY * _LENGTH**3)
+    assert critical < 1.0 and found.directions[0].binding == Binding.BUCKLING
+    assert found.buckling == pytest.approx(critical, abs=0.04) and found.directions[0].lateral is None
+
+
+@pytest.mark.parametrize("share", [0.6, 1.5])
+def test_the_answer_is_that_of_the_closed_loop_of_model_and_controller(share):
+    """With a limit above what is needed the loop reaches the target, and below it ends at the error that was predicted."""
+    limit = share * holdability(arm(), directions=_SIDE, with_needed=False).directions[0].tension
+    robot = arm(tension_max=limit)
+    found = holdability(robot, directions=_SIDE, with_needed=False).directions[0]
+    simulator, gravity = Simulator(robot, reduced=False), _GRAVITY * _SIDE[0]
+    controller, shape = InverseController(robot), simulator.solve(gravity)
+    for _ in range(60):
+        command = controller.step(
+            shape.response, straight_target(_LENGTH), backbone_station=shape.backbone_station, tension=shape.cable_tension,
+            interval=0.1,
+        )  # fmt: skip
+        shape = simulator.step(gravity, command.displacement)
+    lateral = np.hypot(*shape.tip_position[:2])
+    assert found.held == (lateral < 0.005 * _LENGTH)
+    assert lateral == pytest.approx(found.lateral, abs=2e-3 * _LENGTH)
+    if not found.held:
+        assert shape.cable_tension.max() == pytest.approx(limit, rel=0.02)
+
+
+def test_the_answer_does_not_depend_on_the_order(search):
+    first, second = sphere(4)[2], sphere(4)[3]
+    before = search.answer(first)
+    search.answer(second)
+    assert all(np.array_equal(a, b) for a, b in zip(dataclasses.astuple(search.answer(first)), dataclasses.astuple(before)))
+
+
+def test_the_sphere_has_its_poles_and_its_equator():
+    points = sphere(12)
+    inclination = np.degrees([angles(point)[0] for point in points]).round(6)
+    assert len(points) == 46 and (inclination == 90.0).sum() == 12
+    assert inclination.min() == 0.0 and inclination.max() == 180.0
+    assert np.allclose(np.linalg.norm(points, axis=1), 1.0)
+
+
+def test_a_robot_without_cables_is_refused():
+    with pytest.raises(ValueError, match="has no cables"):
+        holdability(dataclasses.replace(arm(), cables=()), options=HoldOptions(equator=4))
+
+
+FILE = """
+robot:
+  name: rod
+  segments:
+    - {name: s, length_mm: 120, outer_diameter_mm: 10, material: {youngs_modulus_mpa: 1.5, poissons_ratio: 0.4, density: 1100}}
+  elements: {around: 8, along: 4}
+  cables:
+    - {name: a, angle_deg: 0, radius_mm: 3.5, segment: s}
+    - {name: b, angle_deg: 120, radius_mm: 3.5, segment: s}
+    - {name: c, angle_deg: 240, radius_mm: 3.5, segment: s}
+  limits: {tension_max: LIMIT}
+"""
+
+
+def test_info_prints_and_draws_the_answer(tmp_path, capsys):
+    file, picture = tmp_path / "rod.yaml", tmp_path / "sphere.png"
+    file.write_text(FILE.replace("LIMIT", "0.5"))
+    assert main(["model", "info", str(file), "--directions", "4", "--picture", str(picture), "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    hold = figures["hold"]
+    assert hold["held"] is False and 0.0 < hold["held_share"] < 1.0 and "tension limit of 0.5 N" in hold["sentence"]
+    assert hold["worst"]["binding"] == "tension" and hold["needed"]["tension_n"] > 0.5
+    assert len(hold["directions"]) == len(sphere(4)) + 1
+    assert {"inclination_deg", "azimuth_deg", "demand", "lateral_mm", "eigenvalue"} <= set(hold["directions"][0])
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_info_leaves_it_out_on_demand(tmp_path, capsys):
+    file = tmp_path / "rod.yaml"
+    file.write_text(FILE.replace("LIMIT", "0.5"))
+    assert main(["model", "info", str(file), "--no-hold", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["hold"] is None
+    assert main(["model", "info", str(file), "--no-hold", "--picture", "x.png"]) == 2
+    assert "--no-hold" in capsys.readouterr().err
+    assert main(["model", "info", str(file), "--directions", "3"]) == 2
+    assert "allowed: 4 to 180" in capsys.readouterr().err
+
+
+def test_a_loop_asks_a_process_of_its_own(tmp_path):
+    file = tmp_path / "rod.yaml"
+    file.write_text(FILE.replace("LIMIT", "0.5"))
+    question = {"robot": str(file), "gravity": [-9.81, 0.0, 0.0], "tip": [0.0, 0.0, 0.12], "direction": [0.0, 0.0, 1.0]}
+    verdict = background_answer(question)
+    assert not verdict.held and "tension limit" in verdict.sentence
