@@ -43,7 +43,7 @@ def run(progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str]
 
 
 def _all_files(progress: Progress) -> list[str]:
-    """Return the shipped robots, and the robot files beside the measurements of others."""
+    """Return the shipped robots, and the robot files next to the measurements of others."""
     folder = default_folder().parent / "robots"
     others = sorted(folder.glob("*.yaml"))
     if not others:
