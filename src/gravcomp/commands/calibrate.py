@@ -18,13 +18,11 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from gravcomp.calibration.measured import Measured
+    from gravcomp.calibration.standstill import Standstill
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.description import RobotFile
     from gravcomp.report.result import Result
     from gravcomp.sweep import Sweep
-
-_MOVING = 3e-3  # m within half a second: a trial that moves this far shows the damping
-_LONGEST = 4.0  # s of such a trial are used to fit the damping
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,11 +69,14 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError, still_windows
     from gravcomp.calibration.motion import fit_motion
-    from gravcomp.calibration.report import calibration_result
+    from gravcomp.calibration.report import calibration_result, origin_of
+    from gravcomp.calibration.standstill import Standstill
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.commands.model.build import prepare_model
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
+    from gravcomp.full_model.modes import first_period
+    from gravcomp.mesh import MeshError
     from gravcomp.report.page import write_report
     from gravcomp.sweep import Sweep
 
@@ -97,9 +98,10 @@ def run(args: argparse.Namespace) -> int:
 
         try:
             measured = _measured(args, setup, sweep, show)
+            still = Standstill.of(setup.robot, first_period(setup.robot))
             statics = fit_statics(
                 setup.robot,
-                still_windows(measured),
+                still_windows(measured, still),
                 offsets=not args.no_offsets,
                 compliance=not args.no_compliance,
                 winding=not args.no_winding,
@@ -107,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
             )
             robot = calibrated_robot(setup.robot, statics.parameters)
             hardware = calibrated_hardware(setup.hardware, statics.parameters)
-            courses = [] if args.no_damping else _moving(measured, statics.parameters)
+            courses = [] if args.no_damping else _moving(measured, statics.parameters, still)
             motion = None
             if courses:
                 motion = fit_motion(
@@ -115,9 +117,10 @@ def run(args: argparse.Namespace) -> int:
                 )
                 if motion.damping_seen:
                     robot = motion.robot
-        except (MeasurementError, RuntimeError) as error:
+        except (MeasurementError, MeshError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
-    write_calibrated(file.source, target, robot, hardware, setup.seed if args.data == "virtual" else None)
+    about = origin_of(file.source, measured, statics)
+    write_calibrated(file.source, target, robot, hardware, setup.seed if args.data == "virtual" else None, about)
     result = calibration_result(measured.source, str(target), statics, motion, courses, setup.robot.materials[0].damping_time)
     if not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
@@ -178,7 +181,7 @@ def _measured(args: argparse.Namespace, setup: "Setup", sweep: "Sweep", show: "C
     return measure(Context(setup, sweep, show))
 
 
-def _moving(measured: "Measured", parameters: Any) -> "list[Measured]":
+def _moving(measured: "Measured", parameters: Any, still: "Standstill") -> "list[Measured]":
     """Return the first seconds of the trials with fast motion, with the fitted offsets and winding ratio applied."""
     import dataclasses
 
@@ -186,11 +189,11 @@ def _moving(measured: "Measured", parameters: Any) -> "list[Measured]":
 
     found = []
     for trial in measured.trials():
-        trial = trial.rows(trial.time <= trial.time[0] + _LONGEST)
-        period = max(np.median(np.diff(trial.time)), 1e-6) if len(trial.time) > 2 else 1.0
-        reach = max(1, round(0.5 / period))
+        trial = trial.rows(trial.time <= trial.time[0] + still.motion)
+        reach = still.samples(trial.time)
         moved = np.linalg.norm(trial.tip_position[reach:] - trial.tip_position[:-reach], axis=1).max(initial=0.0)
-        if moved > _MOVING and period < 0.1:
+        dense = len(trial.time) > 2 and np.median(np.diff(trial.time)) < 0.2 * still.time
+        if moved > still.moving and dense:
             found.append(dataclasses.replace(trial, displacement=parameters.winding * trial.displacement + parameters.offset))
     return found
 

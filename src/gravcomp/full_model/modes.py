@@ -1,8 +1,12 @@
 """Vibration modes of the straight robot, K phi = omega^2 M phi, by shift-invert Lanczos iteration (SciPy's `eigsh`)."""
 
+import dataclasses
+
 import numpy as np
 
+from gravcomp.description import Robot
 from gravcomp.full_model.model import RobotModel
+from gravcomp.mesh.tube import coarse_elements
 
 
 def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
@@ -25,3 +29,13 @@ def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
         return_eigenvectors=False,
     )
     return np.sort(np.sqrt(np.maximum(values, 0.0))) / (2.0 * np.pi)
+
+
+def first_period(robot: Robot) -> float:
+    """Return the period in s of the slowest motion of the straight robot, from a coarse mesh: right within a few per cent.
+
+    Raises MeshError for a body that cannot be meshed.
+    """
+    if robot.body is None:
+        robot = dataclasses.replace(robot, elements=coarse_elements(robot))
+    return float(1.0 / natural_frequencies(RobotModel(robot), 1)[0])
