@@ -75,7 +75,12 @@ def test_a_known_robot_is_recovered_within_two_per_cent(setup, windows):
 
 def test_without_taut_cables_only_the_modulus_is_fitted_with_a_warning(setup, windows):
     released = np.isnan(windows.displacement).all(axis=1)
-    windows = StillWindows(windows.gravity[released], np.full((released.sum(), 6), -0.01), windows.tip_position[released])
+    windows = StillWindows(
+        windows.gravity[released],
+        np.full((released.sum(), 6), -0.01),
+        windows.tip_position[released],
+        windows.tip_direction[released],
+    )
     fit = fit_statics(setup.robot, windows)
     assert [e.name for e in fit.estimates] == ["Young's modulus of proximal", "Young's modulus of distal"]
     assert any("no cable is ever taut" in warning for warning in fit.warnings)

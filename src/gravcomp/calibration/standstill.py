@@ -23,7 +23,7 @@ class StandstillOptions:
         0.03, minimum=1e-4, maximum=1.0, description="a tip that moves this far in a window shows the damping, over the length"
     )
     motion_periods: float = parameter(
-        14.0, minimum=1.0, maximum=1000.0, description="length of a motion that is fitted, in periods"
+        14.0, minimum=1.0, maximum=1000.0, description="length of a motion that is fitted, in first periods"
     )
 
 
