@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gravcomp.calibration.motion import MotionFit
 from gravcomp.calibration.pose_prediction import moved
 from gravcomp.calibration.poses import PoseParameters
 from gravcomp.calibration.statics import StaticParameters, with_moduli
@@ -31,6 +32,12 @@ def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: f
         robot = robot.with_material(damping_time=damping_time)
     moduli = np.broadcast_to(parameters.youngs_modulus, len(robot.materials))
     return dataclasses.replace(with_moduli(robot, moduli), cables=cables)
+
+
+def with_behaviour(robot: Robot, motion: MotionFit) -> Robot:
+    """Return the robot with the damping time and the creep that were fitted to its motion."""
+    found = motion.robot.materials[0]
+    return robot.with_material(damping_time=found.damping_time, creep_ratio=found.creep_ratio, creep_time=found.creep_time)
 
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:

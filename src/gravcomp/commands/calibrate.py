@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     from gravcomp.report.result import Result
     from gravcomp.sweep import Sweep
 
+_COURSES = 2  # that the damping is fitted to
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
+        "Fit Young's modulus of each segment, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
         " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
         " measured/tip (geometry_msgs/PoseStamped in soft_base). With --mapping, DATA is a table of poses at rest with any"
@@ -65,18 +67,18 @@ def run(args: argparse.Namespace) -> int:
     """Fit and write. Returns 0: the robot file is written. Raises ConfigError."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
+    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, with_behaviour, write_calibrated
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError, still_windows
     from gravcomp.calibration.motion import fit_motion
     from gravcomp.calibration.report import calibration_result, origin_of
     from gravcomp.calibration.standstill import Standstill
     from gravcomp.closed_loop.setup import Setup
-    from gravcomp.commands.model.build import prepare_model
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.modes import first_period
     from gravcomp.mesh import MeshError
+    from gravcomp.mesh.tube import with_coarse_elements
     from gravcomp.report.page import write_report
     from gravcomp.sweep import Sweep
 
@@ -86,7 +88,6 @@ def run(args: argparse.Namespace) -> int:
     setup = Setup.of(file, seed_of(args))
     if args.data == "virtual":
         output.note(setup.true_robot.summary())
-    prepare_model(args.robot)
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
     started = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -113,10 +114,15 @@ def run(args: argparse.Namespace) -> int:
             motion = None
             if courses:
                 motion = fit_motion(
-                    robot, courses, modulus=False, creep=args.creep, mapper=sweep.map, progress=lambda s: show(f"damping: {s}")
+                    with_coarse_elements(robot),
+                    courses,
+                    modulus=False,
+                    creep=args.creep,
+                    mapper=sweep.map,
+                    progress=lambda s: show(f"damping: {s}"),
                 )
                 if motion.damping_seen:
-                    robot = motion.robot
+                    robot = with_behaviour(robot, motion)
         except (MeasurementError, MeshError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
     about = origin_of(file.source, measured, statics)
@@ -182,7 +188,7 @@ def _measured(args: argparse.Namespace, setup: "Setup", sweep: "Sweep", show: "C
 
 
 def _moving(measured: "Measured", parameters: Any, still: "Standstill") -> "list[Measured]":
-    """Return the first seconds of the trials with fast motion, with the fitted offsets and winding ratio applied."""
+    """Return the beginnings of the trials with the fastest motion, with the fitted offsets and winding ratio applied."""
     import dataclasses
 
     import numpy as np
@@ -194,8 +200,10 @@ def _moving(measured: "Measured", parameters: Any, still: "Standstill") -> "list
         moved = np.linalg.norm(trial.tip_position[reach:] - trial.tip_position[:-reach], axis=1).max(initial=0.0)
         dense = len(trial.time) > 2 and np.median(np.diff(trial.time)) < 0.2 * still.time
         if moved > still.moving and dense:
-            found.append(dataclasses.replace(trial, displacement=parameters.winding * trial.displacement + parameters.offset))
-    return found
+            course = dataclasses.replace(trial, displacement=parameters.winding * trial.displacement + parameters.offset)
+            found.append((moved, course))
+    found.sort(key=lambda entry: -entry[0])
+    return [course for _, course in found[:_COURSES]]
 
 
 def _readable(result: "Result", target: Path, page: Path) -> "RenderableType":

@@ -1,12 +1,10 @@
 """Vibration modes of the straight robot, K phi = omega^2 M phi, by shift-invert Lanczos iteration (SciPy's `eigsh`)."""
 
-import dataclasses
-
 import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.full_model.model import RobotModel
-from gravcomp.mesh.tube import coarse_elements
+from gravcomp.mesh.tube import with_coarse_elements
 
 
 def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
@@ -36,6 +34,4 @@ def first_period(robot: Robot) -> float:
 
     Raises MeshError for a body that cannot be meshed.
     """
-    if robot.body is None:
-        robot = dataclasses.replace(robot, elements=coarse_elements(robot))
-    return float(1.0 / natural_frequencies(RobotModel(robot), 1)[0])
+    return float(1.0 / natural_frequencies(RobotModel(with_coarse_elements(robot)), 1)[0])

@@ -20,6 +20,7 @@ from gravcomp.closed_loop.trace import Trace
 from gravcomp.config import parameter
 from gravcomp.full_model.modes import first_period
 from gravcomp.inverse import bend_target, straight_target
+from gravcomp.mesh.tube import with_coarse_elements
 from gravcomp.trials.context import Context
 from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.motion import StaticMotion, base_orientation
@@ -91,6 +92,8 @@ def calibration_trial(job: tuple[Setup, tuple[float, float], int, float, float])
     job: (setup, (inclination, roll) in deg, number of the trial, time in s released, time of each held state over that).
     """
     setup, (inclination, roll), trial, duration, held = job
+    # The controller only has to bring the robot into different states: a coarse mesh does, and needs no reduced model.
+    setup = setup.with_model(with_coarse_elements(setup.robot))
     # Without pretension: with all cables taut, a common offset cannot be distinguished from a change of modulus and elasticity.
     inverse = dataclasses.replace(setup.controller.inverse, pretension=0.0)
     setup = dataclasses.replace(setup, controller=dataclasses.replace(setup.controller, inverse=inverse))
