@@ -36,8 +36,8 @@ def windows(setup):
 def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
     """A trial of 0.6 s a window, sampled at 20 Hz."""
     trials = []
-    for number, (gravity, command, tip) in enumerate(
-        zip(windows.gravity, windows.displacement, windows.tip_position), start=first
+    for number, window in enumerate(
+        zip(windows.gravity, windows.displacement, windows.tip_position, windows.tip_direction), start=first
     ):
         rows = 13
         trials.append(
@@ -45,7 +45,7 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
                 "here",
                 np.full(rows, number),
                 0.05 * np.arange(rows),
-                *(np.tile(value, (rows, 1)) for value in (gravity, command, tip, [0.0, 0.0, 1.0])),
+                *(np.tile(value, (rows, 1)) for value in window),
             )
         )
     return trials
@@ -55,7 +55,7 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
 def first_cable(windows):
     """The windows of one pose in which no cable but the first is taut."""
     rows = [k for k, command in enumerate(windows.displacement[:13]) if np.isnan(command[1:]).all()]
-    return StillWindows(windows.gravity[rows], windows.displacement[rows], windows.tip_position[rows])
+    return StillWindows(*(column[rows] for column in vars(windows).values()))
 
 
 @pytest.fixture(scope="module")
@@ -158,11 +158,16 @@ def write_bag(path: Path, measured: Measured) -> None:
     with TopicBag(path) as bag:
         start = 0.0
         for trial in measured.trials():
-            for time, gravity, wound, tip in zip(
-                start + trial.time - trial.time[0], trial.gravity, trial.displacement, trial.tip_position
+            for time, gravity, wound, tip, (x, y, z) in zip(
+                start + trial.time - trial.time[0],
+                trial.gravity,
+                trial.displacement,
+                trial.tip_position,
+                trial.tip_direction,
             ):
                 bag.vector("/gravity", time, gravity)
                 bag.vector("/truth/gravity", time, gravity)
                 bag.state("/cable/state", time, np.nan_to_num(wound, nan=LOOSE))
-                bag.pose("/measured/tip", time, tip)
+                half = np.array([-y, x, 0.0, 1.0 + z])  # of the shortest turn of the z axis to the direction
+                bag.pose("/measured/tip", time, tip, half / np.linalg.norm(half))
             start += trial.time[-1] - trial.time[0] + 2.0

@@ -24,6 +24,8 @@ from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 
+_AT_BOUND = 0.01  # of a logarithm
+
 
 @dataclass(frozen=True)
 class TipNoise:
@@ -112,6 +114,12 @@ def fit_statics(
         estimate(robot, unknown, initial, parameters, quantile * own, own, reason)
         for unknown, own, reason in zip(unknowns, deviation, reasons)
     )
+    for unknown, entry in zip(unknowns, x):
+        if unknown.kind == "modulus" and min(entry - unknown.lowest(initial), unknown.highest() - entry) < _AT_BOUND:
+            raise MeasurementError(
+                "no modulus describes these data: the best one is at the bound of its range. Are they of another robot, in"
+                " other units, in another frame than soft_base, or mirrored?"
+            )
     rms_before, rms_after = (_rms(found.tip[:, :3] - windows.tip_position) for found in (before, after))
     if problem.misfit(x) > problem.misfit(np.zeros(len(x))):
         raise MeasurementError(

@@ -67,7 +67,8 @@ def still_windows(measured: Measured, still: Standstill) -> StillWindows:
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
     gravity, displacement, tip, direction = (np.array(column) for column in zip(*found))
-    if measured.tip_direction is None:
+    if measured.tip_direction is None or np.ptp(measured.tip_direction, axis=0).max() == 0.0:
+        # A tracker of positions alone publishes one and the same orientation.
         return StillWindows(gravity, displacement, tip)
     return StillWindows(gravity, displacement, tip, direction / np.linalg.norm(direction, axis=1, keepdims=True))
 

@@ -30,7 +30,8 @@ _COURSES = 2  # that the damping is fitted to
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Fit Young's modulus of each segment, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
+        "Fit Young's modulus of each segment, damping, cable offsets, cable elasticity and the capstan radius to"
+        " measured tip positions; with"
         " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
         " measured/tip (geometry_msgs/PoseStamped in soft_base). With --mapping, DATA is a table of poses at rest with any"
