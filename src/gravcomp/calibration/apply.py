@@ -79,8 +79,12 @@ def write_calibrated(
         raise ConfigError(f"{target}: is the robot file that was calibrated, and is not overwritten; give --write another name")
     document = _document(source)
     entries = document["robot"]["segments"] if robot.body is None else [document["robot"]["body"]]
+    shared: set[int] = set()
     for entry, calibrated in zip(entries, robot.materials):
         material = entry.setdefault("material", {})
+        if id(material) in shared:  # by a YAML alias: each segment gets values of its own
+            material = entry["material"] = type(material)(material)
+        shared.add(id(material))
         material["youngs_modulus_mpa"] = round(calibrated.youngs_modulus * 1e-6, 5)
         material["damping_time_ms"] = round(calibrated.damping_time * 1e3, 3)
         if calibrated.creep_ratio:
