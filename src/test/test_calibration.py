@@ -84,7 +84,10 @@ def test_without_taut_cables_only_the_modulus_is_fitted_with_a_warning(setup, wi
     fit = fit_statics(setup.robot, windows)
     assert [e.name for e in fit.estimates] == ["Young's modulus of proximal", "Young's modulus of distal"]
     assert any("no cable is ever taut" in warning for warning in fit.warnings)
-    assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)
+    proximal, distal = fit.estimates
+    assert proximal.value == pytest.approx(0.6, rel=0.02)
+    # Three tips say less of the end, which bends little under its own weight, and the interval says so.
+    assert abs(distal.value - 0.6) <= distal.interval < 0.06
 
 
 def test_an_upright_robot_does_not_show_its_modulus(robot):

@@ -103,8 +103,8 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
             # A released cable is slack.
             displacement = np.where(np.isnan(command), -0.03, command + OFFSETS)
             shape = equilibrium(rod, gravity, displacement=displacement)
-            images = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
-            tip, direction = Tracker().seen(setup.nominal.length, *images, random)
+            tips, directions = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
+            tip, direction = Tracker().seen(setup.nominal.length, tips, directions, random)
             rows.append((gravity, command, tip.mean(axis=0), direction.mean(axis=0)))
     return StillWindows(*(np.array(column) for column in zip(*rows)))
 
