@@ -198,17 +198,18 @@ def test_modules_exist(name):
 
 
 def exists(dotted: str) -> bool:
-    """Return whether `dotted` is a module, a name in a module, or an attribute of such a name."""
+    """Return whether `dotted` is a module, a name in a module, or an attribute or field of such a name."""
     try:
         if importlib.util.find_spec(dotted):
             return True
     except ModuleNotFoundError:
         pass
+    owner, _, name = dotted.rpartition(".")
     try:
-        pkgutil.resolve_name(dotted)
+        found = pkgutil.resolve_name(owner)
     except (ImportError, AttributeError):
         return False
-    return True
+    return hasattr(found, name) or name in getattr(found, "__dataclass_fields__", ())  # a field without default
 
 
 def keys_of(section: object) -> set[str]:
