@@ -49,6 +49,11 @@ class SolidElements:
         self._position = scatter_positions(mesh.elements, pattern)
         self._elastic = ViscousStrain(np.zeros(len(self.weights)), np.zeros((*self.weights.shape, 6)))
 
+    def scale_stiffness(self, factor: np.ndarray) -> None:
+        """Multiply the modulus of every element by `factor` (k,), that of its fibres as well."""
+        self.constants.values[:, :2] *= factor[:, None]  # the laws' own constants are ratios
+        self.fibres *= np.sqrt(factor)[:, None, None, None]
+
     def internal_force(self, u: np.ndarray, viscous: ViscousStrain | None = None) -> np.ndarray:
         """Return internal forces (n, 3) in N at displacements `u` (n, 3), with damping and creep if a viscous strain is given."""
         force = np.zeros_like(u)
