@@ -111,13 +111,15 @@ def _choose(robot: Robot) -> MeshChoice:
     here = _start(robot)
     tips = _Tips(robot, here)
     while True:
-        changes: dict[str, np.ndarray] = {}  # of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction
+        # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
+        changes: dict[str, np.ndarray] = {}
         gains: dict[str, float] = {}
         for direction in _ORDER:
             finer = _finer(robot, here, direction)
             if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
                 continue
-            changes[direction] = tips.change(here, finer) * _to_twice(getattr(here, direction), getattr(finer, direction), direction)
+            twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
+            changes[direction] = twice * tips.change(here, finer)
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break

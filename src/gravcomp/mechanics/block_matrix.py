@@ -85,7 +85,7 @@ class Layout(NamedTuple):
 
 @njit(cache=True)
 def entry_position(row: int, column: int, layout: Layout) -> int:
-    """Return the position of an entry in the flat storage, that of its mirror image above the diagonal; -1 outside the pattern."""
+    """Return the position of an entry, or of its mirror image, in the flat storage; -1 outside the pattern."""
     if row < column:
         row, column = column, row
     high, low = layout.level[row], layout.level[column]
