@@ -21,7 +21,7 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
-from gravcomp.full_model.flat_elements import with_grading
+from gravcomp.full_model.flat_elements import deep_cells, with_grading
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.pieces import pieces_of
 from gravcomp.mesh.refusal import well_shaped
@@ -126,7 +126,7 @@ def _choose(robot: Robot) -> MeshChoice:
         error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
-        here = _finer(robot, here, max(gains, key=lambda direction: gains[direction]))
+        here = _not_deep(robot, _finer(robot, here, max(gains, key=lambda direction: gains[direction])))
 
 
 def _to_twice(number: int, finer: int, direction: str) -> float:
@@ -203,7 +203,14 @@ def _start(robot: Robot) -> Elements:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
-    return shaped if disks else with_grading(robot, shaped)
+    return _not_deep(robot, shaped if disks else with_grading(robot, shaped))
+
+
+def _not_deep(robot: Robot, elements: Elements) -> Elements:
+    """The elements with as many cells through the wall as the next number around needs."""
+    while elements.radial < 8 and deep_cells(robot, _finer(robot, elements, "around")):
+        elements = _finer(robot, elements, "radial")
+    return elements
 
 
 def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
