@@ -69,7 +69,8 @@ def shapes_under(model: RobotModel, loads: list[MeshLoad], near: LoadedShapes | 
     near: the shapes of another mesh of the same robot under the same loads. Newton's method starts from them; only where that
     fails, the load is followed from the straight robot.
     """
-    solver, shapes = StaticSolver(model), []
+    solver = StaticSolver(model)
+    shapes: list[np.ndarray | None] = []
     for index, load in enumerate(loads):
         solver.reset()
         known = near.shapes[index] if near else None
