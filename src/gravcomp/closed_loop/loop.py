@@ -63,7 +63,8 @@ class ClosedLoop:
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature; tracker: of the tip, which corrects the model's error; None: there is none. Raises RuntimeError where the bridge does not start.
+        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none. Raises
+        RuntimeError where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(

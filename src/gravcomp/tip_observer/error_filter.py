@@ -4,10 +4,10 @@ The true tip is the model's plus
 
     d = o + s h,
 
-with an offset o (3,) in soft_base that walks at random (creep, hysteresis, cables) and a relative error s of weight over stiffness
-(modulus, density), which acts along the model's own sensitivity h (3,) (`history.Prediction.sensitivity`): what is learnt about s
-in one direction of gravity holds in all others. A measurement gives d with noise (Kalman, 1960; gate after Bar-Shalom, Li and
-Kirubarajan, 2001, section 3.7).
+with an offset o (3,) in soft_base that walks at random (creep, hysteresis, cables) and a relative error s of weight over
+stiffness (modulus, density), which acts along the model's own sensitivity h (3,) (`history.Prediction.sensitivity`): what is
+learnt about s in one direction of gravity holds in all others. A measurement gives d with noise (Kalman, 1960). The gate against
+outliers is that of Bar-Shalom, Li and Kirubarajan (Estimation with applications to tracking and navigation, 2001).
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ class VirtualTrackerParameters:
     """A tracker of the tip with noise, latency and faults."""
 
     rate: float = parameter(
-        0.0, unit="Hz", minimum=0.0, maximum=100.0, description="measurements of the tip per second; 0: no tracker", read_only=True
+        0.0, unit="Hz", minimum=0.0, maximum=100.0, description="measurements of the tip; 0: no tracker", read_only=True
     )
     delay: float = parameter(
         100.0, edge="ms", minimum=0.0, maximum=2000.0, description="from a measurement to its arrival", read_only=True
