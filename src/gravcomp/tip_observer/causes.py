@@ -1,7 +1,7 @@
 """Names the cause of measurements that cannot be of this robot: unit, axes, handedness, frame, clock."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -67,12 +67,12 @@ def wild(measured: np.ndarray, modelled: np.ndarray, length: float, allowed: flo
     return found
 
 
-def wrong_axes(measured: Sequence[np.ndarray], modelled: Sequence[np.ndarray], std: float) -> str:
-    """Return in which way the measured tips (n of (3,)) move in other axes than the modelled ones, empty where they do not.
+def wrong_axes(pairs: Iterable[tuple[np.ndarray, np.ndarray]], std: float) -> str:
+    """Return in which way measured tips move in other axes than the modelled ones, empty where they do not.
 
-    Only changes count, so a wrong origin does not matter. std in m: of a measurement.
+    pairs: measured and modelled tip (3,) in m; std in m: of a measurement. Only changes count: a wrong origin does not matter.
     """
-    moved, expected = (np.array(points) - np.mean(points, axis=0) for points in (measured, modelled))
+    moved, expected = (np.array(points) - np.mean(points, axis=0) for points in zip(*pairs))
     cost = float(((moved - expected) ** 2).sum())
     # Small motions say nothing: noise and the robot's lag would explain them.
     if cost < 12.0 * std**2 * len(moved) or (expected**2).sum() < 6.0 * std**2 * len(moved):

@@ -195,7 +195,7 @@ class TipObserver:
         residual = measured - modelled
         far = bool(np.linalg.norm(residual) > self._allowed)
         self._pairs.append((measured, modelled))
-        axes = wrong_axes(*zip(*self._pairs), self.options.std) if len(self._pairs) >= _LEAST else ""
+        axes = wrong_axes(self._pairs, self.options.std) if len(self._pairs) >= _LEAST else ""
         if axes:
             pairs = self._pairs
             self._restart()
@@ -220,8 +220,8 @@ class TipObserver:
         self._largest_sag = max(self._largest_sag, float(np.linalg.norm(gravity)))
         if self._before is not None:
             elapsed = then.stamp - self._before.stamp
-            change = np.linalg.norm(gravity - self._before.gravity_part(self._rest_tip))
-            change += np.linalg.norm(cables - self._before.cable_part())
+            change = float(np.linalg.norm(gravity - self._before.gravity_part(self._rest_tip)))
+            change += float(np.linalg.norm(cables - self._before.cable_part()))
             self._filter.diffuse(
                 (self.options.drift * self._largest_sag) ** 2 * elapsed + _HYSTERESIS**2 * change * self._largest_sag,
                 self.options.model_error**2 * elapsed / _FORGET,
