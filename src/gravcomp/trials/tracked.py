@@ -40,11 +40,10 @@ class TrackedOutcome:
 
 
 def with_wrong_model(setup: Setup, stiffness: float) -> Setup:
-    """Return the setup with a virtual robot that creeps strongly and whose modulus is `stiffness` times the model's."""
-    material = setup.robot.segments[0].material
+    """Return the setup with a virtual robot that creeps strongly and whose modulus is `stiffness` times the described one."""
     ratio, time = STRONG_CREEP
     body = dataclasses.replace(
-        setup.truth.body, youngs_modulus=stiffness * material.youngs_modulus, creep_ratio=ratio, creep_time=time
+        setup.truth.body, youngs_modulus=None, modulus_ratio=(stiffness,), creep_ratio=ratio, creep_time=time
     )
     return dataclasses.replace(setup, truth=dataclasses.replace(setup.truth, body=body))
 
