@@ -22,8 +22,6 @@ from gravcomp.virtual.parameters import VirtualRobotParameters
 # Values for the placeholders of the documents.
 PLACEHOLDERS = {"COMMAND": "demo", "S": "10", "N": "1"}
 SUBCOMMANDS = {"bench": "engine", "reproduce": "static"}  # for NAME
-# Not a topic of the product: calibrate reads it from a bag of the user.
-FOREIGN_TOPICS = {"measured/tip"}
 FOREIGN_PACKAGES = {"robot_state_publisher", "foxglove_bridge", "plotjuggler"}
 
 
@@ -156,7 +154,7 @@ def test_ros2_lines_fit_the_graph(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_topics_and_services_exist(name):
-    topics = set(ports("publishes", "subscribes")) | FOREIGN_TOPICS
+    topics = set(ports("publishes", "subscribes"))
     services = set(ports("services"))
     for word in inline_of((ROOT / name).read_text()):
         if re.fullmatch(r"(imu|cable|robot|controller|target|truth|virtual|measured)/[a-z_]+", word):
