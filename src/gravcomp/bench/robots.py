@@ -29,8 +29,8 @@ def run(
 
     files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists. The
     figures of `whole_figures` are computed if no file is given, or if they are asked for. figures: names of the figures wanted,
-    none: all; every: compute every `every`-th row and path only; loop: the figures of `robot_loop.FIGURES` in place of the others,
-    without `whole_figures`. Raises ConfigError for a figure that does not exist.
+    none: all; every: compute every `every`-th row and path only; loop: the figures of `robot_loop.FIGURES` in place of all
+    others. Raises ConfigError for a figure that does not exist.
     """
     if loop:
         return {"robots": _loops(files, figures, progress, every)}

@@ -1,8 +1,8 @@
 """The loop held straight while its base turns from orientation to orientation and rests at each: errors at rest and in motion.
 
-The share of a residual is of what the robot sags without compensation: the lateral distance of the released virtual robot's tip from
-the target, from its statics, as the root of the mean square over all orientations of the run. One orientation would not do: a
-hanging robot does not sag at all.
+The share of a residual is of what the robot sags without compensation: the lateral distance of the released virtual robot's tip
+from the target, from its statics, as the root of the mean square over all orientations of the run. One orientation would not do:
+a hanging robot does not sag at all.
 """
 
 import math
