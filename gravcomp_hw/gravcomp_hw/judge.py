@@ -145,9 +145,7 @@ class Judge(ManagedNode):
         seed = None if p.seed < 0 else p.seed
         error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
         released = released_tip_error(self.robot_file, gravity, self._target, seed)
-        held, moving = figures.held_and_moving(
-            self._truth_tip, self._truth_gravity, self._target, _STRAIGHT, counted_from, end
-        )
+        held, moving = figures.held_and_moving(self._truth_tip, self._truth_gravity, self._target, _STRAIGHT, counted_from, end)
         started = self._compensated_at or end
         sag = figures.sag(self._truth_tip, self._target, at_rest, released_until)
         # Until the counted time begins, the demo's base rests.

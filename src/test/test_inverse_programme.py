@@ -119,7 +119,7 @@ def test_the_direction_counts_where_cables_turn_the_tip_in_place():
 
 
 def test_a_weight_of_the_direction_does_not_pull_cables_that_only_bend_off_the_place():
-    """Cables of one segment: the tip is as near to its place with a weight of its direction as without one."""
+    """Cables of one segment: a weight of the direction costs hardly any sag in one step; with all of it 9 % would remain."""
     response = ArcRobot().step(np.array([-GRAVITY, 0.0, 0.0]), None, iterations=20)
     near = []
     for weight in (0.0, direction_weight(LENGTH)):
@@ -145,4 +145,6 @@ def test_a_weight_of_the_direction_does_not_pull_cables_that_only_bend_off_the_p
             solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper
         )[0]
         near.append(np.linalg.norm((of_one.compliance_ea @ tension + of_one.effector_free)[:2]))
-    assert near[1] == pytest.approx(near[0], abs=0.002 * np.linalg.norm(response.effector_free[:2]))
+    sag = np.linalg.norm(response.effector_free[:2])
+    assert near[0] < 0.005 * sag
+    assert near[1] < 0.02 * sag

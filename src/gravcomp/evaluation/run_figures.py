@@ -65,7 +65,9 @@ def gravity_error(truth: Track, estimate: Track, begin: float, end: float) -> fl
     return float(np.sqrt((metrics.angle_between(true[both], own[both]) ** 2).mean()))
 
 
-def settled(truth_tip: Track, target: np.ndarray, direction: np.ndarray, begin: float, end: float, sag_size: float) -> float | None:
+def settled(
+    truth_tip: Track, target: np.ndarray, direction: np.ndarray, begin: float, end: float, sag_size: float
+) -> float | None:
     """Return the time (s) from `begin` until the lateral error stays within a twentieth of the sag of its final value.
 
     None without samples until `end`, and where it does not settle.
@@ -81,7 +83,10 @@ def settled(truth_tip: Track, target: np.ndarray, direction: np.ndarray, begin: 
 def held_and_moving(
     truth_tip: Track, gravity: Track, target: np.ndarray, direction: np.ndarray, begin: float, end: float
 ) -> tuple[float | None, float | None]:
-    """Return the lateral RMS errors in m while the base rests and while it turns; None where it does not. Target as in `residual`."""
+    """Return the lateral RMS errors in m while the base rests and while it turns; None where it does not.
+
+    Arguments as those of `residual`; gravity: see `rest_and_motion`.
+    """
     stamps, tip = truth_tip.between(begin, end)
     if not len(tip):
         return None, None

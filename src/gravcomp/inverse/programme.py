@@ -17,13 +17,14 @@ The part of the errors of tip and backbone along the robot counts less, because 
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.
 
-The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both responses are
-those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the lateral position, and
+The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both
+responses are those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the lateral position,
+and
 
     D = G (G + delta g I)^-1,   G = J_direction N J_direction^T,   g: largest eigenvalue of J_direction J_direction^T
 
-multiplies the rows of the direction. It is about 1 where segments move the tip and turn it each by themselves, and about 0 where the
-same cables do both: there a weight of the direction would only pull the tip off its place.
+multiplies the rows of the direction. It is about 1 where segments move the tip and turn it each by themselves, and about 0 where
+the same cables do both: there a weight of the direction would only pull the tip off its place.
 """
 
 import math

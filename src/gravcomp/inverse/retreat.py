@@ -42,7 +42,10 @@ class Move(enum.Enum):
 
 
 class Retreat:
-    """Chooses the moves of a robot of `length` (m) with cables of at most `tension_max` (N). Attribute `stride`: fraction of the usual stride that a step may take."""
+    """Chooses the moves of a robot of `length` (m) with cables of at most `tension_max` (N).
+
+    Attribute `stride`: fraction of the usual stride that a step may take.
+    """
 
     def __init__(self, length: float, tension_max: float):
         self._length, self._tension_max = length, tension_max
