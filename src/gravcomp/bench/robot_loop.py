@@ -4,7 +4,6 @@ The loop runs in one process, in virtual time. Rate and delay of commands belong
 """
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from gravcomp.closed_loop.setup import Setup
@@ -32,7 +31,7 @@ SEEDS = (1, 2, 3)
 _ORIENTATIONS = 20
 
 
-def measure(file: str, progress: Callable[[str], None], every: int = 1) -> dict[str, Any]:
+def measure(file: str, every: int = 1) -> dict[str, Any]:
     """Return the figures of `FIGURES`, the worst over `SEEDS`, and `seeds`: the two shares of each seed.
 
     Held: at the article's five poses and 20 random orientations of the base; moving: during the turns between them at 30 deg/s.
@@ -42,9 +41,7 @@ def measure(file: str, progress: Callable[[str], None], every: int = 1) -> dict[
     robot_file = load_robot_file(file)
     runs: dict[int, Residuals] = {}
     for seed in SEEDS[:1] if every > 1 else SEEDS:
-        progress(f"loop of seed {seed}")
         runs[seed] = residuals(Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every))
-    progress("whether it can be held")
     shares = {seed: {"held_pct": _pct(run.held, run.sag), "moving_pct": _pct(run.moving, run.sag)} for seed, run in runs.items()}
     return dict.fromkeys(FIGURES) | {
         "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),

@@ -57,7 +57,8 @@ def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, eve
     for file in files or _all_files(progress):
         try:
             name = load_robot_file(str(file)).robot.name
-            measured = robot_loop.measure(str(file), lambda stage, name=name: progress(f"{name}: {stage}"), every)
+            progress(f"{name}: loop")
+            measured = robot_loop.measure(str(file), every)
         except (ConfigError, MeshError, ArithmeticError, ValueError, RuntimeError) as error:
             name, measured = Path(str(file)).stem, dict.fromkeys(robot_loop.FIGURES) | {"errors": {"loop": str(error)}}
             logging.getLogger(__name__).warning("%s: %s", name, error)
