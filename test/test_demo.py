@@ -70,6 +70,15 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
 
 
 @pytest.mark.rates
+def test_a_robot_drawn_by_a_seed_is_compensated(gravcomp):
+    line = documented("./gravcomp demo --robot src/examples/own_robot.yaml --seed 7")[1:]
+    answer = gravcomp(*line, "--headless", "--duration", "12", "--json")
+    assert answer.code == 0, answer.err
+    assert answer.json["sag_mm"] > 20.0
+    assert answer.json["residual_lateral_mm"] < answer.json["sag_mm"] / 3.0
+
+
+@pytest.mark.rates
 def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
     answer = gravcomp(*documented("./gravcomp demo --imu FILE", FILE=trial[0])[1:], "--json")

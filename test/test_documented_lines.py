@@ -40,15 +40,16 @@ MODEL_LINES = (
     "./gravcomp model info src/examples/own_robot.yaml",
     "./gravcomp model info src/examples/own_robot.yaml --picture sphere.png",
     "./gravcomp model build src/examples/own_robot.yaml",
+    "./gravcomp model view ROBOT --rest --out body.png",
 )
 
 
 @pytest.mark.parametrize("line", MODEL_LINES)
 def test_a_model_is_described_solved_drawn_and_built(type_in, folder, line):
-    code, output = type_in(line)
+    code, output = type_in(line, ROBOT="ROBOT.yaml")
     assert code == 0, output
-    for option, picture in (("--out", "bent.png"), ("--picture", "sphere.png")):
-        assert option not in line or (folder / picture).read_bytes().startswith(b"\x89PNG")
+    for picture in re.findall(r"\w+\.png", line):
+        assert (folder / picture).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("line", ["./gravcomp doctor", "./gravcomp doctor --robot src/examples/own_robot.yaml"])

@@ -1,7 +1,8 @@
 """Node inverse_controller: computes the cable displacements that bring the model to its target.
 
 It solves one quadratic programme per deformation. At start a process of low priority finds out whether the cables can hold the
-target against the gravity that acts then; the status contains its answer as soon as it is known.
+target against the gravity that acts then; the status contains its answer as soon as it is known. Where a tracker measures the
+tip, the target is corrected by the model's error (`tracker_input`).
 """
 
 import math
@@ -12,7 +13,6 @@ from collections.abc import Callable
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
-from rclpy.time import Time
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
@@ -23,6 +23,7 @@ from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
+from gravcomp_fem.tracker_input import TrackerInput, seconds
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
@@ -51,6 +52,7 @@ class InverseController(ManagedNode):
         robot, transmission = self.robot_file.robot, self._transmission()
         warm_up(robot, self.parameters.inverse, transmission)
         self._problem = InverseProblem(robot, self.parameters.inverse, transmission)
+        self._tracker = TrackerInput(self, robot, self.parameters.frame)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
         self._relaxing = False
@@ -64,6 +66,7 @@ class InverseController(ManagedNode):
     def activate(self) -> None:
         """Reset the problem and subscribe."""
         self._problem.reset()
+        self._tracker.begin(self.parameters.tracker)
         self._last_stamp: float | None = None
         self._published_code, self._published_at = None, 0.0
         self._refusal, self._refused_at = "", -math.inf
@@ -75,6 +78,7 @@ class InverseController(ManagedNode):
             self.create_subscription(Deformation, "robot/deformation", self._on_deformation, SENSOR),
             self.create_subscription(PoseStamped, "target", self._on_pose_target, COMMAND),
             self.create_subscription(ShapeTarget, "target/shape", self._on_shape_target, COMMAND),
+            self._tracker.subscription(),
         ]
         self._watch = self.create_timer(0.5 * self.parameters.stale_after, self._check_stream)
         self._publish_code(ControllerCode.INACTIVE, "waiting for robot/deformation")
@@ -100,6 +104,8 @@ class InverseController(ManagedNode):
         """Apply new options and a change of `enabled`."""
         if hasattr(self, "_problem"):
             self._problem.options = new.inverse
+            if old.tracker != new.tracker:
+                self._tracker.begin(new.tracker)
         if old.enabled != new.enabled:
             self._enabled, self._relaxing = new.enabled, False
 
@@ -140,13 +146,14 @@ class InverseController(ManagedNode):
             )
             return
         self._check_hold(message)
+        self._tracker.predict(message, response)
         interval = self._interval(message)
         if self._relaxing:
             command = self._problem.relax(response, interval=interval)
         elif self._enabled and self._target is not None:
             command = self._problem.step(
                 response,
-                self._target,
+                self._tracker.corrected(self._target, message.header),
                 backbone_station=message.backbone_station,
                 tension=message.cable_tension,
                 interval=interval,
@@ -164,7 +171,7 @@ class InverseController(ManagedNode):
 
     def _interval(self, message: Deformation) -> float:
         """Return s between the stamps of this and the last deformation; 0.01 when the stamp has not increased."""
-        stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        stamp = seconds(message.header)
         interval = 0.01 if self._last_stamp is None else stamp - self._last_stamp
         self._last_stamp = stamp
         return interval if interval > 0.0 else 0.01
@@ -242,8 +249,12 @@ class InverseController(ManagedNode):
 
     def _publish_status(self, command: Command, header: Header) -> None:
         code, message = self._with_refusal(command.code, command.message)
-        self.report(_LEVELS.get(code, WARN), message, solve_time_us=round(1e6 * command.solve_time))
-        stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
+        level = _LEVELS.get(code, WARN)
+        tracker, values = self._tracker.report()
+        if tracker:
+            message, level = f"{message}; {tracker}", max(level, WARN)
+        self.report(level, message, solve_time_us=round(1e6 * command.solve_time), **values)
+        stamp = seconds(header)
         if code == self._published_code and 0.0 <= stamp - self._published_at < _STATUS_PERIOD:
             return
         self._published_code, self._published_at = code, stamp

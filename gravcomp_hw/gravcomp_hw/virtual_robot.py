@@ -12,6 +12,7 @@ import yaml
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
@@ -25,6 +26,7 @@ from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
 from gravcomp.virtual.realtime import RealtimeRobot
 from gravcomp.virtual.robot import VirtualRobot
+from gravcomp.virtual.tracker import VirtualTracker
 from gravcomp.virtual.truth import Truth
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -55,6 +57,10 @@ class VirtualRobotNode(ManagedNode):
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
+        self._tracker, self._publisher_measured = None, None
+        if self.parameters.tracker.rate > 0.0:
+            self._tracker = VirtualTracker(self.parameters.tracker, virtual.robot.length, virtual.seed)
+            self._publisher_measured = self.create_publisher(PoseStamped, "measured/tip", SENSOR)
         self._live = RealtimeRobot(robot, hardware, self._publish, self.parameters.truth_rate, self._commanded_base)
         self._base: Polled | None = None
 
@@ -82,13 +88,13 @@ class VirtualRobotNode(ManagedNode):
 
     def cleanup(self) -> None:
         """Destroy the publishers."""
-        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity"):
-            if hasattr(self, name):
+        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity", "_publisher_measured"):
+            if getattr(self, name, None) is not None:
                 self.destroy_publisher(getattr(self, name))
                 delattr(self, name)
 
     def _publish(self, truth: Truth) -> None:
-        """Publish the ground truth on the topics that have a subscriber. Called from the robot's thread."""
+        """Publish the ground truth where it has a subscriber, and what the tracker measures. Called from the robot's thread."""
         stamp, frame = self.get_clock().now().to_msg(), self.parameters.base_frame
         messages = []
         if self._publisher_tip.get_subscription_count():
@@ -100,6 +106,12 @@ class VirtualRobotNode(ManagedNode):
         if self._publisher_backbone.get_subscription_count():
             poses = [_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)]
             messages.append((self._publisher_backbone, PoseArray(poses=poses)))
+        if self._tracker is not None:
+            for measured in self._tracker.observe(truth):
+                message = PoseStamped(pose=_pose(measured.position, measured.orientation))
+                taken = self.get_clock().now() - Duration(seconds=truth.time - measured.time)
+                message.header.stamp, message.header.frame_id = taken.to_msg(), frame
+                self._publisher_measured.publish(message)
         for publisher, message in messages:
             message.header.stamp, message.header.frame_id = stamp, frame
             publisher.publish(message)

@@ -12,6 +12,7 @@ import pytest
 from gravcomp.cables.disks import disk_heights
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Cable, Cap, Disks, Elements, Lumen, Material, RestShape, Robot, Section, Segment, Station
+from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.mesh_choice import chosen_mesh
 from gravcomp.full_model.mesh_error import error_of_mesh
 from gravcomp.full_model.modes import natural_frequencies
@@ -355,6 +356,22 @@ def test_the_chosen_mesh_reaches_its_accuracy(monkeypatch, tmp_path):
     assert choice.error < 1e-3
     assert error_of_mesh(robot) < 1.2e-3  # also the robot that is twice as stiff as the one for which the mesh was chosen
     assert len(list(tmp_path.rglob("*.json"))) == 1 and chosen_mesh(robot) == choice
+
+
+def test_a_shape_is_carried_to_another_mesh():
+    def field(place):
+        x, y, z = place.T
+        return np.column_stack([z**2 - 3.0 * x * y, z * y + x**2 * z, -2.0 * z * x + z**3])
+
+    segment = Segment("a", 0.1, 12e-3, 4e-3, tip_outer_diameter=9e-3)
+    source, target = (
+        RobotModel(Robot("r", segments=(segment,), elements=Elements(around, along, radial))).mesh
+        for around, along, radial in ((6, 8, 1), (8, 13, 2))
+    )
+    carried = carried_shape(field(source.straight), source, target)
+    expected = field(target.straight)
+    expected[target.clamped] = 0.0
+    assert np.abs(carried - expected).max() < 1e-9 * np.abs(expected).max()
 
 
 def test_elements_are_well_shaped_where_the_file_gives_none():

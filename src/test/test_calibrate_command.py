@@ -9,6 +9,7 @@ from bag_of_topics import TopicBag
 
 from gravcomp.calibration.files import read_measured, write_csv
 from gravcomp.calibration.measured import Measured, StillWindows, still_windows
+from gravcomp.calibration.standstill import Standstill
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
@@ -19,6 +20,7 @@ from gravcomp.trials.known_robot import DAMPING_TIME, known_setup, known_windows
 
 MODULUS = 0.6e6  # Pa
 LOOSE = -0.03  # m
+STILL = Standstill.of(load_robot_file("article").robot, 0.28)
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +36,8 @@ def windows(setup):
 def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
     """A trial of 0.6 s a window, sampled at 20 Hz."""
     trials = []
-    for number, (gravity, command, tip) in enumerate(
-        zip(windows.gravity, windows.displacement, windows.tip_position), start=first
+    for number, window in enumerate(
+        zip(windows.gravity, windows.displacement, windows.tip_position, windows.tip_direction), start=first
     ):
         rows = 13
         trials.append(
@@ -43,7 +45,7 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
                 "here",
                 np.full(rows, number),
                 0.05 * np.arange(rows),
-                *(np.tile(value, (rows, 1)) for value in (gravity, command, tip, [0.0, 0.0, 1.0])),
+                *(np.tile(value, (rows, 1)) for value in window),
             )
         )
     return trials
@@ -53,7 +55,7 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
 def first_cable(windows):
     """The windows of one pose in which no cable but the first is taut."""
     rows = [k for k, command in enumerate(windows.displacement[:13]) if np.isnan(command[1:]).all()]
-    return StillWindows(windows.gravity[rows], windows.displacement[rows], windows.tip_position[rows])
+    return StillWindows(*(column[rows] for column in vars(windows).values()))
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +79,10 @@ def calibrate(capsys, *arguments: str) -> dict:
 def check(result: dict) -> None:
     """Check that the known robot is found, that the page shows it, and that the YAML is a robot."""
     found = {p["name"]: p for p in result["data"]["parameters"]}
-    modulus = found["Young's modulus"]
-    assert modulus["value"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
-    assert 0.0 < modulus["interval"] < 0.05 * modulus["value"]
+    moduli = [found[f"Young's modulus of {name}"] for name in ("proximal", "distal")]
+    for modulus in moduli:
+        assert modulus["value"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
+        assert 0.0 < modulus["interval"] < 0.05 * modulus["value"]
     damping, interval = result["data"]["damping_time_ms"]
     assert damping == pytest.approx(1e3 * DAMPING_TIME, rel=0.05)
     assert 0.0 < interval < 0.2 * damping
@@ -90,7 +93,9 @@ def check(result: dict) -> None:
     page = Path("pages/calibration.html").read_text()
     assert page.count("<svg") >= 2 and "Resting tips, measured and modelled" in page
     mine = load_robot_file("mine.yaml")
-    assert mine.robot.segments[0].material.youngs_modulus == pytest.approx(modulus["value"] * 1e6, rel=1e-4)
+    written = [segment.material.youngs_modulus for segment in mine.robot.segments]
+    assert written == pytest.approx([modulus["value"] * 1e6 for modulus in moduli], rel=1e-4)
+    assert "# Calibrated on" in Path("mine.yaml").read_text()
     assert mine.robot.segments[1].material.damping_time == pytest.approx(damping * 1e-3, rel=1e-3)
 
 
@@ -113,7 +118,7 @@ def test_a_bag_contains_what_a_csv_file_does(here, measured):
     fall, same_fall = from_csv.trials()[0], from_bag.trials()[0]
     tip = [np.interp(same_fall.time, fall.time, fall.tip_position[:, axis]) for axis in range(3)]
     np.testing.assert_allclose(same_fall.tip_position.T, tip, atol=1e-6)
-    rest, same_rest = still_windows(from_csv), still_windows(from_bag)
+    rest, same_rest = still_windows(from_csv, STILL), still_windows(from_bag, STILL)
     for name in ("gravity", "tip_position"):
         np.testing.assert_allclose(getattr(same_rest, name), getattr(rest, name), atol=1e-5)
     np.testing.assert_allclose(same_rest.displacement, np.nan_to_num(rest.displacement, nan=LOOSE), atol=1e-7)
@@ -122,7 +127,7 @@ def test_a_bag_contains_what_a_csv_file_does(here, measured):
 def test_a_bag_becomes_a_calibrated_robot(here, capsys, first_cable):
     write_bag(here / "bag", joined(standing(first_cable)))
     found = {p["name"]: p["value"] for p in calibrate(capsys, "bag")["data"]["parameters"]}
-    assert found["Young's modulus"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
+    assert found["Young's modulus of proximal"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
     assert load_robot_file("mine.yaml").robot.segments[0].material.youngs_modulus == pytest.approx(MODULUS, rel=0.02)
 
 
@@ -153,11 +158,16 @@ def write_bag(path: Path, measured: Measured) -> None:
     with TopicBag(path) as bag:
         start = 0.0
         for trial in measured.trials():
-            for time, gravity, wound, tip in zip(
-                start + trial.time - trial.time[0], trial.gravity, trial.displacement, trial.tip_position
+            for time, gravity, wound, tip, (x, y, z) in zip(
+                start + trial.time - trial.time[0],
+                trial.gravity,
+                trial.displacement,
+                trial.tip_position,
+                trial.tip_direction,
             ):
                 bag.vector("/gravity", time, gravity)
                 bag.vector("/truth/gravity", time, gravity)
                 bag.state("/cable/state", time, np.nan_to_num(wound, nan=LOOSE))
-                bag.pose("/measured/tip", time, tip)
+                half = np.array([-y, x, 0.0, 1.0 + z])  # of the shortest turn of the z axis to the direction
+                bag.pose("/measured/tip", time, tip, half / np.linalg.norm(half))
             start += trial.time[-1] - trial.time[0] + 2.0

@@ -69,6 +69,14 @@ ROWS = {
         Row("tentacle_held_mm", "tentacle, each pose predicted by a fit to the others", "mm", 12.0),
         Row("tdcr_mm", "nine tendons, five-fold", "mm", 4.0),
     ),
+    "track": (
+        Row("robots.*.untracked_mm", "held, modulus 15 % off and strong creep, without tracker: lateral RMS, worst", "mm"),
+        Row("robots.*.tracked_mm", "the same with a tracker: lateral RMS, worst", "mm"),
+        Row("robots.*.tracked_pct", "the same, share of the released sag", "%"),
+        Row("robots.article.tracked_mm", "article: held with a tracker, lateral RMS, worst", "mm", 0.3),
+        Row("robots.*.untracked_moving_mm", "base turning at 30 deg/s, without tracker: lateral RMS, worst", "mm"),
+        Row("robots.*.tracked_moving_mm", "base turning at 30 deg/s, with a tracker: lateral RMS, worst", "mm"),
+    ),
     "estimator": (
         Row("broad_deg", "inclination: mean RMSE of five BROAD trials, larger of 95.2 Hz and full rate", "deg", 0.37),
         Row("broad_biased_deg", "inclination: RMSE with 1 deg/s of bias and a warm-up drift added", "deg"),

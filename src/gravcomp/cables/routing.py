@@ -44,11 +44,12 @@ def route_cables(robot: Robot, mesh: Mesh) -> list[Route]:
     of the mesh between its start and its end. Raises MeshError for a cable that leaves the body.
     """
     guided = disk_heights(robot)
-    return [_route(robot, mesh, cable, guided) for cable in robot.cables]
+    sections: dict[float, np.ndarray] = {}
+    return [_route(robot, mesh, cable, guided, sections) for cable in robot.cables]
 
 
-def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
-    """The route of one cable; guided (d,): the heights of the disks."""
+def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: dict[float, np.ndarray]) -> Route:
+    """The route of one cable; guided (d,): the heights of the disks; known: the functionals (3, n) by height, added to."""
     points, at_disk = _via_points(robot, cable, mesh.stations, guided)
     smooth = _smooth(points[:, 2], mesh.stations, at_disk, 1e-6 * robot.length)
     at_section = at_disk
@@ -58,8 +59,10 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray) -> Route:
         at_section = np.ones(len(points), dtype=bool)
     parts = []
     if at_section.any():
-        sections = section_functionals(mesh, points[at_section, 2]).reshape(-1, 3, len(mesh.nodes))
-        parts.append(holes(points[at_section, :2], sections))
+        heights = points[at_section, 2].tolist()
+        missing = [height for height in heights if height not in known]
+        known.update(zip(missing, section_functionals(mesh, np.array(missing)).reshape(-1, 3, len(mesh.nodes))))
+        parts.append(holes(points[at_section, :2], np.array([known[height] for height in heights])))
     if not at_section.all():
         try:
             inside = embed(mesh, mesh.axis.points(points[~at_section]))

@@ -28,7 +28,7 @@ from numba import njit
 from gravcomp.cables.friction import Friction
 from gravcomp.cables.routing import Route
 from gravcomp.description import Cable
-from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern
+from gravcomp.mechanics.block_matrix import BlockMatrix, BlockPattern, Layout, entry_position
 
 # What a tangent at one of Gauss's points has of the second difference of three points, beyond a chord.
 _BEYOND_CHORD = 1.0 / math.sqrt(3.0) - 0.5
@@ -64,7 +64,7 @@ class Tendons:
         self._first = np.concatenate([[0], np.cumsum([len(nodes) for nodes, _ in pieces])]).astype(np.int64)
         self._nodes = np.concatenate([nodes for nodes, _ in pieces]) if pieces else np.zeros(0, dtype=np.int64)
         self._weights = np.concatenate([weights for _, weights in pieces]) if pieces else np.zeros(0)
-        self._position = self._scatter_positions(pieces, pattern)
+        self._position = _scatter_positions(self._first, self._nodes, self._n_free, pattern.layout)
         self._rest_length = np.zeros(self.count)
         self._rest_length = -self.state(rest).displacement
         # m/N: elongation from capstan to end under unit tension without friction, zero for a cable without stretch.
@@ -104,27 +104,6 @@ class Tendons:
             matrix.values,
         )  # fmt: skip
 
-    def _scatter_positions(self, pieces: list, pattern: BlockPattern) -> np.ndarray:
-        """Return the positions of the 3 x 3 entries of each pair of nodes a >= b; -1 if clamped or mirrored."""
-        rows, columns = [], []
-        for nodes, _ in pieces:
-            a, b = np.tril_indices(len(nodes))
-            for i in range(3):
-                for j in range(3):
-                    mirrored = (a == b) & (j > i)
-                    rows.append(np.where(mirrored, -1, 3 * nodes[a] + i))
-                    columns.append(3 * nodes[b] + j)
-            block = slice(-9, None)
-            rows[block] = [np.stack(rows[block], axis=1).ravel()]
-            columns[block] = [np.stack(columns[block], axis=1).ravel()]
-        if not rows:
-            return np.zeros(0, dtype=np.int64)
-        row, column = np.concatenate(rows), np.concatenate(columns)
-        free = (row >= 0) & (row < 3 * self._n_free) & (column < 3 * self._n_free)
-        position = np.full(len(row), -1, dtype=np.int64)
-        position[free] = pattern.position(row[free], column[free])
-        return position
-
 
 def pieces_of(route: Route) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return nodes and weights d of every piece e_k between neighbouring points."""
@@ -142,6 +121,26 @@ def pieces_of(route: Route) -> list[tuple[np.ndarray, np.ndarray]]:
         used = weights != 0.0
         pieces.append((unique[used], weights[used]))
     return pieces
+
+
+@njit(cache=True)
+def _scatter_positions(first: np.ndarray, nodes: np.ndarray, n_free: int, layout: Layout) -> np.ndarray:
+    """Return the positions of the 3 x 3 entries of each pair of nodes a >= b of each piece; -1 if clamped or mirrored."""
+    count = 0
+    for k in range(len(first) - 1):
+        size = first[k + 1] - first[k]
+        count += 9 * (size * (size + 1) // 2)
+    position = np.full(count, -1, dtype=np.int64)
+    entry = 0
+    for k in range(len(first) - 1):
+        for a in range(first[k], first[k + 1]):
+            for b in range(first[k], a + 1):
+                if nodes[a] < n_free and nodes[b] < n_free:
+                    for i in range(3):
+                        for j in range(3 if b < a else i + 1):
+                            position[entry + 3 * i + j] = entry_position(3 * nodes[a] + i, 3 * nodes[b] + j, layout)
+                entry += 9
+    return position
 
 
 @njit(cache=True)

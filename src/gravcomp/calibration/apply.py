@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gravcomp.calibration.motion import MotionFit
 from gravcomp.calibration.pose_prediction import moved
 from gravcomp.calibration.poses import PoseParameters
-from gravcomp.calibration.statics import StaticParameters
+from gravcomp.calibration.statics import StaticParameters, with_moduli
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Robot
 from gravcomp.description.hardware import Hardware
@@ -22,13 +23,21 @@ _STIFFEST = 1e6  # N: a stiffer cable is described as inextensible
 
 
 def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: float | None = None) -> Robot:
-    """Return the robot with the fitted modulus, cable elasticity and, if given, damping time in s."""
+    """Return the robot with the fitted moduli, cable elasticity and, if given, damping time in s."""
     cables = tuple(
         cable.with_stiffness(_stiffness(robot, cable, float(compliance)))
         for cable, compliance in zip(robot.cables, parameters.compliance)
     )
-    changes = {} if damping_time is None else {"damping_time": damping_time}
-    return dataclasses.replace(robot.with_material(youngs_modulus=float(parameters.youngs_modulus), **changes), cables=cables)
+    if damping_time is not None:
+        robot = robot.with_material(damping_time=damping_time)
+    moduli = np.broadcast_to(parameters.youngs_modulus, len(robot.materials))
+    return dataclasses.replace(with_moduli(robot, moduli), cables=cables)
+
+
+def with_behaviour(robot: Robot, motion: MotionFit) -> Robot:
+    """Return the robot with the damping time and the creep that were fitted to its motion."""
+    found = motion.robot.materials[0]
+    return robot.with_material(damping_time=found.damping_time, creep_ratio=found.creep_ratio, creep_time=found.creep_time)
 
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
@@ -53,18 +62,29 @@ def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
 
 
 def write_calibrated(
-    source: str | Path, target: str | Path, robot: Robot, hardware: Hardware | None, virtual_seed: int | None = None
+    source: str | Path,
+    target: str | Path,
+    robot: Robot,
+    hardware: Hardware | None,
+    virtual_seed: int | None = None,
+    about: str = "",
 ) -> None:
     """Write the robot's file `source` to `target` with the calibrated values of `robot` and, if given, `hardware`.
 
     virtual_seed: of the virtual robot that was measured; the new file names `source` as its description, because a virtual robot
-    drawn around the calibrated values would be another one. Comments and order are kept. Raises ConfigError if it cannot be
-    written.
+    drawn around the calibrated values would be another one. about: where the values are from, as a comment at the top. Comments
+    and order are kept. Raises ConfigError if it cannot be written, and for a target that is the source.
     """
+    if Path(target).exists() and Path(target).samefile(source):
+        raise ConfigError(f"{target}: is the robot file that was calibrated, and is not overwritten; give --write another name")
     document = _document(source)
     entries = document["robot"]["segments"] if robot.body is None else [document["robot"]["body"]]
+    shared: set[int] = set()
     for entry, calibrated in zip(entries, robot.materials):
         material = entry.setdefault("material", {})
+        if id(material) in shared:  # by a YAML alias: each segment gets values of its own
+            material = entry["material"] = type(material)(material)
+        shared.add(id(material))
         material["youngs_modulus_mpa"] = round(calibrated.youngs_modulus * 1e-6, 5)
         material["damping_time_ms"] = round(calibrated.damping_time * 1e3, 3)
         if calibrated.creep_ratio:
@@ -90,7 +110,7 @@ def write_calibrated(
         former = document.get("virtual_robot") or {}
         origin = former.get("description") or str(Path(source).resolve())
         document["virtual_robot"] = {"description": origin, "seed": virtual_seed}
-    _write(document, target)
+    _write(document, target, about)
 
 
 def write_imu_calibration(source: str | Path, target: str | Path, found: RestCalibration, bias_model: Path | None = None) -> None:
@@ -123,10 +143,11 @@ def _document(source: str | Path) -> dict:
     return _yaml().load(Path(source).read_text(encoding="utf-8"))
 
 
-def _write(document: dict, target: str | Path) -> None:
-    """Write a parsed YAML. Raises ConfigError."""
+def _write(document: dict, target: str | Path, about: str = "") -> None:
+    """Write a parsed YAML, with `about` as a comment at its top. Raises ConfigError."""
     try:
         with Path(target).open("w", encoding="utf-8") as file:
+            file.writelines(f"# {line}".rstrip() + "\n" for line in about.splitlines())
             _yaml().dump(document, file)
     except OSError as error:
         raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error

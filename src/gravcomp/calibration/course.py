@@ -8,7 +8,8 @@ from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
 
-STRAIGHT = 2e-3  # m: a course starts straight if its first tip is nearer than this to the straight robot's
+STRAIGHT = 0.02
+"""A course starts straight if its first tip is nearer than this share of the length to the straight robot's."""
 COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
 """Options of predicted courses: the error of a fall with steps of 5 ms is a tenth of a millimetre."""
 
@@ -30,7 +31,7 @@ def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = CO
 def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> Iterator[Shape | None]:
     """Yield the shapes at the course's times, None for the start at the straight robot; raises as `predict_course`."""
     simulator = DynamicSimulator(robot, options)
-    if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT:
+    if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT * robot.length:
         yield simulator.settle(course.gravity[0], course.displacement[0])
     else:
         simulator.let_go(course.gravity[0])

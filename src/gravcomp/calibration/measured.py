@@ -1,14 +1,10 @@
 """Measured courses of the tip, and the windows in them in which the robot is at rest."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-STILL_TIME = 0.5  # s: length of a window
-STILL_TIP = 0.6e-3  # m: largest motion of the tip in a window
-STILL_CABLE = 0.05e-3  # m: of a cable
-STILL_GRAVITY = math.radians(0.5)  # rad: of the gravity direction
+from gravcomp.calibration.standstill import Standstill
 
 
 class MeasurementError(ValueError):
@@ -54,44 +50,52 @@ class StillWindows:
     gravity: np.ndarray  # (k, 3)
     displacement: np.ndarray  # (k, m), NaN: released
     tip_position: np.ndarray  # (k, 3)
+    tip_direction: np.ndarray | None = None  # (k, 3), of length 1; None: not measured
 
 
-def still_windows(measured: Measured) -> StillWindows:
+def still_windows(measured: Measured, still: Standstill) -> StillWindows:
     """Return the last window of every period of rest of each trial; at rest, gravity, cables and tip do not move.
 
     Raises MeasurementError if there is none.
     """
     found = []
     for trial in measured.trials():
-        found += _windows_of(trial)
+        found += _windows_of(trial, still)
     if not found:
         raise MeasurementError(
-            f"{measured.source}: the robot is never at rest for {STILL_TIME:g} s (tip within {1e3 * STILL_TIP:g} mm,"
-            f" cables within {1e3 * STILL_CABLE:g} mm); let it settle in a few poses"
+            f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
+            f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    return StillWindows(*(np.array(column) for column in zip(*found)))
+    gravity, displacement, tip, direction = (np.array(column) for column in zip(*found))
+    if measured.tip_direction is None or np.ptp(measured.tip_direction, axis=0).max() == 0.0:
+        # A tracker of positions alone publishes one and the same orientation.
+        return StillWindows(gravity, displacement, tip)
+    return StillWindows(gravity, displacement, tip, direction / np.linalg.norm(direction, axis=1, keepdims=True))
 
 
-def _windows_of(trial: Measured) -> list[tuple]:
+def _windows_of(trial: Measured, still: Standstill) -> list[tuple]:
     """Return the last window at rest before each movement, and before the end of the trial."""
-    count = max(2, round(STILL_TIME / max(np.median(np.diff(trial.time)), 1e-6)))
+    count, limit = still.samples(trial.time), still.tip_limit(trial.tip_position)
     windows, last = [], None
     for start in range(0, len(trial.time) - count + 1, max(1, count // 2)):
         window = trial.rows(np.arange(start, start + count))
-        if _is_still(window):
-            last = (window.gravity.mean(axis=0), window.displacement.mean(axis=0), window.tip_position.mean(axis=0))
+        if _is_still(window, still, limit):
+            direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
+            last = (
+                window.gravity.mean(axis=0), window.displacement.mean(axis=0), window.tip_position.mean(axis=0), direction
+            )  # fmt: skip
         elif last is not None:
             windows.append(last)
             last = None
     return windows + ([last] if last is not None else [])
 
 
-def _is_still(window: Measured) -> bool:
-    """Return whether nothing moves in the window."""
-    spread = np.ptp(window.tip_position, axis=0).max() <= STILL_TIP
+def _is_still(window: Measured, still: Standstill, limit: float) -> bool:
+    """Return whether nothing moves in the window; limit: for the tip in m."""
+    spread = np.ptp(window.tip_position, axis=0).max() <= limit
     released = np.isnan(window.displacement)
     same = (released.all(axis=0) | ~released.any(axis=0)).all()
-    cables = np.ptp(np.nan_to_num(window.displacement), axis=0).max(initial=0.0) <= STILL_CABLE
+    cables = np.ptp(np.nan_to_num(window.displacement), axis=0).max(initial=0.0) <= still.cable
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
-    turned = np.ptp(direction, axis=0).max() <= STILL_GRAVITY
+    turned = np.ptp(direction, axis=0).max() <= still.gravity
     return bool(spread and same and cables and turned)

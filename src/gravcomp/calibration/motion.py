@@ -18,14 +18,15 @@ import numpy as np
 from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
+from gravcomp.full_model.modes import first_period
 
 _MODULUS_RANGE, _DAMPING_RANGE = (0.05, 20.0), (0.02, 50.0)  # times the values at the start
 # Of rho, and of T in s: in these courses slower creep does not show, and faster creep acts like damping.
 _CREEP_RANGES = ((0.002, 2.0), (0.03, 5.0))
 _CREEP_START = 0.08, 0.4
-# s: length of the beginnings that are fitted first. If the model swings out of phase, the fit ends in a wrong minimum with too
-# much damping; such a short beginning contains no full swing.
-_BEGINNING = 0.3
+# Length of the beginnings that are fitted first, in first periods. If the model swings out of phase, the fit ends in a wrong
+# minimum with too much damping; such a short beginning contains no full swing.
+_BEGINNING = 1.08
 _DIFFERENCE = 0.02  # step of x for the derivatives
 
 
@@ -63,7 +64,10 @@ def fit_motion(
     modulus: bool = True,
     creep: bool = True,
 ) -> MotionFit:
-    """Fit to the courses. mapper: as `map`, may compute courses in parallel; modulus, creep: False keeps the robot's values."""
+    """Fit to the courses. mapper: as `map`, may compute courses in parallel; modulus, creep: False keeps the robot's values.
+
+    A fitted modulus is that of all segments.
+    """
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
@@ -78,7 +82,8 @@ def fit_motion(
         starts = starts | dict(zip(("creep_ratio", "creep_time"), _CREEP_START))
         ranges = ranges | dict(zip(("creep_ratio", "creep_time"), np.array(_CREEP_RANGES)))
     all_of_them = _Parameters(robot, starts, ranges)
-    beginnings = [course.rows(course.time <= course.time[0] + _BEGINNING) for course in courses]
+    first = _BEGINNING * first_period(robot)
+    beginnings = [course.rows(course.time <= course.time[0] + first) for course in courses]
     short = _Courses(beginnings, beginning.robot_at, mapper, progress)
     whole = _Courses(courses, all_of_them.robot_at, mapper, progress)
     options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}

@@ -1,5 +1,7 @@
 """Report of a calibration: fitted parameters with their intervals, warnings, and the tips before and after."""
 
+import datetime
+
 import numpy as np
 
 from gravcomp.calibration.fit import StaticFit
@@ -14,7 +16,13 @@ def calibration_result(
 ) -> Result:
     """Return the result for `report.write_report`. courses: those of the fit `motion`; initial_damping in s."""
     rows = [
-        (e.name, f"{e.initial:.4g} {e.unit}", f"{e.value:.5g} {e.unit}", f"± {e.interval:.2g} {e.unit}", e.seen)
+        (
+            e.name,
+            f"{e.initial:.4g} {e.unit}",
+            f"{e.value:.5g} {e.unit}" if e.seen or not e.reason else "kept",
+            f"± {e.interval:.2g} {e.unit}",
+            e.seen,
+        )
         for e in statics.estimates
     ]
     figures = [
@@ -35,8 +43,8 @@ def calibration_result(
             (
                 "damping time",
                 f"{1e3 * initial_damping:.4g} ms",
-                f"{1e3 * motion.damping_time:.4g} ms",
-                f"± {1e3 * motion.damping_interval:.2g} ms",
+                f"{1e3 * motion.damping_time:.4g} ms" if motion.damping_seen else "kept",
+                f"± {1e3 * motion.damping_interval:.2g} ms" if motion.damping_seen else "",
                 motion.damping_seen,
             )
         )
@@ -52,7 +60,7 @@ def calibration_result(
             if motion.creep_ratio_interval > motion.creep_ratio:
                 warnings.append("creep: these data do not show any; leave --creep out")
         if not motion.damping_seen:
-            warnings.append("damping time: these data contain too little motion to determine it")
+            warnings.append("damping time: these data contain too little motion to determine it; the robot file's is kept")
         figures += [
             Figure("tip error in motion before, RMS", 1e3 * motion.rms_before, "mm"),
             Figure("tip error in motion after, RMS", 1e3 * motion.rms_after, "mm"),
@@ -73,10 +81,25 @@ def calibration_result(
         ],
         data={
             "parameters": [vars(e) for e in statics.estimates],
-            "damping_time_ms": None if motion is None else [1e3 * motion.damping_time, 1e3 * motion.damping_interval],
+            "damping_time_ms": None
+            if motion is None or not motion.damping_seen
+            else [1e3 * motion.damping_time, 1e3 * motion.damping_interval],
             "warnings": warnings,
         },
     )
+
+
+def origin_of(source: str, measured: Measured, statics: StaticFit) -> str:
+    """Return where calibrated values are from, in lines for the top of the robot file: date, data, intervals, residuals."""
+    lines = [
+        f"Calibrated on {datetime.date.today().isoformat()}: {source} fitted to {measured.source},"
+        f" {len(statics.windows.tip_position)} poses at rest.",
+        f"Tip error at rest: {1e3 * statics.rms_before:.3g} mm before, {1e3 * statics.rms_after:.3g} mm after (RMS). At 95 %:",
+    ]
+    for e in statics.estimates:
+        value = f"{e.value:.5g} +- {e.interval:.2g} {e.unit}".rstrip() if e.seen or not e.reason else "kept, not seen in the data"
+        lines.append(f"  {e.name}: {value}")
+    return "\n".join(lines)
 
 
 def _tips(fit: StaticFit) -> str:
@@ -88,7 +111,9 @@ def _tips(fit: StaticFit) -> str:
             span = [measured[:, k].min() - 1, measured[:, k].max() + 1]
             axes.plot(span, span, color=REST, linewidth=1.0)
             for prediction, colour, label in ((fit.before, MODEL, "before"), (fit.after, REAL, "after")):
-                axes.plot(measured[:, k], 1e3 * (prediction.tip - rest)[:, k], "o", color=colour, ms=4, alpha=0.8, label=label)
+                axes.plot(
+                    measured[:, k], 1e3 * (prediction.tip[:, :3] - rest)[:, k], "o", color=colour, ms=4, alpha=0.8, label=label
+                )
             axes.set_xlabel(f"{name} measured in mm")
             axes.set_ylabel(f"{name} modelled in mm")
         drawing.axes[0].legend()

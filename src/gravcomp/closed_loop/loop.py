@@ -23,6 +23,7 @@ from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import InverseController, Target
 from gravcomp.inverse.limits import within_limits
 from gravcomp.motors.bridge import Bridge
@@ -32,9 +33,11 @@ from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.thermal import HeaterControl
 from gravcomp.thermal.plant import ThermalPlantOptions
+from gravcomp.tip_observer import TipObserver
 from gravcomp.virtual.motion import BaseMotion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
+from gravcomp.virtual.tracker import VirtualTracker
 
 SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
@@ -48,11 +51,21 @@ _RELEASE_SLACK = 0.05
 class ClosedLoop:
     """State of the loop. `shape` is the last result of the simulator."""
 
-    def __init__(self, setup: Setup, motion: BaseMotion, *, delay: int = 0, heating: bool = True, warm: bool = True):
+    def __init__(
+        self,
+        setup: Setup,
+        motion: BaseMotion,
+        *,
+        delay: int = 0,
+        heating: bool = True,
+        warm: bool = True,
+        tracker: VirtualTrackerParameters | None = None,
+    ):
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature. Raises RuntimeError where the bridge does not start.
+        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none. Raises
+        RuntimeError where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -67,6 +80,8 @@ class ClosedLoop:
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot)
         self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
+        self._tracker = None if tracker is None else VirtualTracker(tracker, setup.robot.length, setup.seed)
+        self.observer = TipObserver(setup.robot, setup.controller.tracker)
         self._target: Target | None = None
         self._weightless = False
         self._release_slack = _RELEASE_SLACK * setup.robot.length  # m
@@ -157,7 +172,8 @@ class ClosedLoop:
         # The model starts at rest and relaxed, and creeps from then on.
         elapsed = None if self.shape is None else SAMPLE_PERIOD
         self.shape = shape = self._simulator.step(gravity, None if released else self._cables, duration=elapsed)
-        self._cables, tension = self._released(shape) if self._target is None else self._compensated(shape, self._target)
+        target = self._observed(shape)
+        self._cables, tension = self._released(shape) if target is None else self._compensated(shape, target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
         self._arriving.append((self._sent, tension))
         arrived = self._arriving.popleft()
@@ -166,6 +182,16 @@ class ClosedLoop:
             if refused:
                 raise RuntimeError(f"the bridge refused a command at {self.time:.2f} s: {refused}")
         self._record(shape)
+
+    def _observed(self, shape: Shape) -> Target | None:
+        """Pass the shape and what the tracker measured to the observer; return the target for the model."""
+        if self._tracker is None:
+            return self._target
+        now = self.time
+        self.observer.predict(now, shape.tip_position, shape.tip_orientation, shape.response, shape.cable_tension)
+        for measured in self._tracker.observe(self._virtual.truth):
+            self.observer.measure(measured.time, now, "soft_base", measured.position)
+        return None if self._target is None else self.observer.corrected(self._target, now)
 
     def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         free = shape.response.displacement_free - self._release_slack

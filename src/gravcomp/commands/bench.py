@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
+    "track": "a wrong model that a tracker of the tip corrects",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
@@ -30,6 +31,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "seed": (1, "seed of the random frames and faults"),
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
+    "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
 }
@@ -40,12 +42,14 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
         "files": ("FILE", "robot files or shipped robots (default: all shipped ones and those in ../shared/robots)"),
         "--figures": ("KEY", "only these figures, by their keys in --json"),
     },
+    "track": {"files": ("FILE", "robot files or shipped robots (default: article)")},
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
+    "track": {"seeds": 1},
     "estimator": {"every": 13},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},

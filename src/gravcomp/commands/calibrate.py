@@ -18,19 +18,20 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from gravcomp.calibration.measured import Measured
+    from gravcomp.calibration.standstill import Standstill
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.description import RobotFile
     from gravcomp.report.result import Result
     from gravcomp.sweep import Sweep
 
-_MOVING = 3e-3  # m within half a second: a trial that moves this far shows the damping
-_LONGEST = 4.0  # s of such a trial are used to fit the damping
+_COURSES = 2  # that the damping is fitted to
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
-        "Fit Young's modulus, damping, cable offsets, cable elasticity and the capstan radius to measured tip positions; with"
+        "Fit Young's modulus of each segment, damping, cable offsets, cable elasticity and the capstan radius to"
+        " measured tip positions; with"
         " --creep also creep. DATA is a CSV file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
         " measured/tip (geometry_msgs/PoseStamped in soft_base). With --mapping, DATA is a table of poses at rest with any"
@@ -67,15 +68,18 @@ def run(args: argparse.Namespace) -> int:
     """Fit and write. Returns 0: the robot file is written. Raises ConfigError."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
+    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, with_behaviour, write_calibrated
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError, still_windows
     from gravcomp.calibration.motion import fit_motion
-    from gravcomp.calibration.report import calibration_result
+    from gravcomp.calibration.report import calibration_result, origin_of
+    from gravcomp.calibration.standstill import Standstill
     from gravcomp.closed_loop.setup import Setup
-    from gravcomp.commands.model.build import prepare_model
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
+    from gravcomp.full_model.modes import first_period
+    from gravcomp.mesh import MeshError
+    from gravcomp.mesh.tube import with_coarse_elements
     from gravcomp.report.page import write_report
     from gravcomp.sweep import Sweep
 
@@ -85,7 +89,6 @@ def run(args: argparse.Namespace) -> int:
     setup = Setup.of(file, seed_of(args))
     if args.data == "virtual":
         output.note(setup.true_robot.summary())
-    prepare_model(args.robot)
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
     started = time.perf_counter()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -97,9 +100,10 @@ def run(args: argparse.Namespace) -> int:
 
         try:
             measured = _measured(args, setup, sweep, show)
+            still = Standstill.of(setup.robot, first_period(setup.robot))
             statics = fit_statics(
                 setup.robot,
-                still_windows(measured),
+                still_windows(measured, still),
                 offsets=not args.no_offsets,
                 compliance=not args.no_compliance,
                 winding=not args.no_winding,
@@ -107,17 +111,23 @@ def run(args: argparse.Namespace) -> int:
             )
             robot = calibrated_robot(setup.robot, statics.parameters)
             hardware = calibrated_hardware(setup.hardware, statics.parameters)
-            courses = [] if args.no_damping else _moving(measured, statics.parameters)
+            courses = [] if args.no_damping else _moving(measured, statics.parameters, still)
             motion = None
             if courses:
                 motion = fit_motion(
-                    robot, courses, modulus=False, creep=args.creep, mapper=sweep.map, progress=lambda s: show(f"damping: {s}")
+                    with_coarse_elements(robot),
+                    courses,
+                    modulus=False,
+                    creep=args.creep,
+                    mapper=sweep.map,
+                    progress=lambda s: show(f"damping: {s}"),
                 )
                 if motion.damping_seen:
-                    robot = motion.robot
-        except (MeasurementError, RuntimeError) as error:
+                    robot = with_behaviour(robot, motion)
+        except (MeasurementError, MeshError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
-    write_calibrated(file.source, target, robot, hardware, setup.seed if args.data == "virtual" else None)
+    about = origin_of(file.source, measured, statics)
+    write_calibrated(file.source, target, robot, hardware, setup.seed if args.data == "virtual" else None, about)
     result = calibration_result(measured.source, str(target), statics, motion, courses, setup.robot.materials[0].damping_time)
     if not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
@@ -178,21 +188,23 @@ def _measured(args: argparse.Namespace, setup: "Setup", sweep: "Sweep", show: "C
     return measure(Context(setup, sweep, show))
 
 
-def _moving(measured: "Measured", parameters: Any) -> "list[Measured]":
-    """Return the first seconds of the trials with fast motion, with the fitted offsets and winding ratio applied."""
+def _moving(measured: "Measured", parameters: Any, still: "Standstill") -> "list[Measured]":
+    """Return the beginnings of the trials with the fastest motion, with the fitted offsets and winding ratio applied."""
     import dataclasses
 
     import numpy as np
 
     found = []
     for trial in measured.trials():
-        trial = trial.rows(trial.time <= trial.time[0] + _LONGEST)
-        period = max(np.median(np.diff(trial.time)), 1e-6) if len(trial.time) > 2 else 1.0
-        reach = max(1, round(0.5 / period))
+        trial = trial.rows(trial.time <= trial.time[0] + still.motion)
+        reach = still.samples(trial.time)
         moved = np.linalg.norm(trial.tip_position[reach:] - trial.tip_position[:-reach], axis=1).max(initial=0.0)
-        if moved > _MOVING and period < 0.1:
-            found.append(dataclasses.replace(trial, displacement=parameters.winding * trial.displacement + parameters.offset))
-    return found
+        dense = len(trial.time) > 2 and np.median(np.diff(trial.time)) < 0.2 * still.time
+        if moved > still.moving and dense:
+            course = dataclasses.replace(trial, displacement=parameters.winding * trial.displacement + parameters.offset)
+            found.append((moved, course))
+    found.sort(key=lambda entry: -entry[0])
+    return [course for _, course in found[:_COURSES]]
 
 
 def _readable(result: "Result", target: Path, page: Path) -> "RenderableType":

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
+from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -38,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    add_tracker_argument(parser)
     add_seed_argument(parser)
     add_page_arguments(parser)
     parser.add_argument(
@@ -80,7 +82,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True}
+    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True} | tracker_parameters(args)
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:

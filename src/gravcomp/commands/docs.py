@@ -16,6 +16,9 @@ CONFIGURATION = Path("src/doc/api")
 PAGE = Path("src/doc/bodies.md")
 """The page with a picture of each robot that it describes, relative to the repository."""
 
+GALLERY = Path("src/doc/pictures/robots")
+"""Folder with a picture of each shipped robot, which the README shows, relative to the repository."""
+
 _LEFT_OUT = (".*", "build", "install", "log", "reports", "__pycache__", "*.egg-info")
 
 
@@ -23,7 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = "Build the documentation of the Python interface with Sphinx. A warning counts as an error."
     parser.add_argument(
-        "--pictures", action="store_true", help=f"draw the pictures of the robots that {PAGE} describes again, and build nothing"
+        "--pictures",
+        action="store_true",
+        help=f"draw the pictures of the shipped robots and of those that {PAGE} describes again, and build nothing",
     )
     parser.add_argument("--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository)")
 
@@ -35,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
     if args.pictures:
-        return _draw_pictures(root / PAGE)
+        return _draw_pictures(root)
     provide_extra("development")
     out = Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs"
     try:
@@ -51,20 +56,20 @@ def run(args: argparse.Namespace) -> int:
     return 0 if built else 1
 
 
-def _draw_pictures(page: Path) -> int:
-    """Draw the picture that follows each robot on the page."""
+def _draw_pictures(root: Path) -> int:
+    """Draw the picture that follows each robot on the page, and that of each shipped robot."""
     from gravcomp.environment.packages import provide_extra
     from gravcomp.report.body_picture import draw_body
-    from gravcomp.report.described_robots import robots_on
+    from gravcomp.report.described_robots import robots_on, shipped_pictures
 
     provide_extra("reports")
     pictures = []
-    for robot, picture in robots_on(page):
+    for robot, picture in [*robots_on(root / PAGE), *shipped_pictures(root / GALLERY)]:
         picture.parent.mkdir(parents=True, exist_ok=True)
         draw_body(robot, str(picture))
         output.note(f"{picture}")
         pictures.append(str(picture))
-    output.result({"pictures": pictures}, f"{page}: {len(pictures)} pictures")
+    output.result({"pictures": pictures}, f"{root / PAGE}, {root / GALLERY}: {len(pictures)} pictures")
     return 0
 
 

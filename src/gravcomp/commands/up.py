@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
+from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
 
 if TYPE_CHECKING:
     from gravcomp.launcher.host_client import NodeHost
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--channel", default="", help="channel of the interface, e.g. can0; with several buses one each, by commas"
     )
     parser.add_argument("--virtual", action="store_true", help="start the virtual robot on the bus as well")
+    add_tracker_argument(parser, "with --virtual: ")
     add_seed_argument(parser, "; with --virtual")
     parser.add_argument(
         "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
@@ -53,6 +55,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
 
     if args.namespace and not args.namespace.startswith("/"):
         raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
+    if args.tracker and not args.virtual:
+        raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
     builder = prepare(args.robot, args.virtual, seed_of(args))
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
@@ -63,7 +67,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
     specs = graph.loop()
     if args.virtual:
-        specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
+        specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic", **tracker_parameters(args)))
     with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:
         if args.viewer:
             processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))

@@ -1,9 +1,12 @@
 """The division of segments into elements that reaches an accuracy at the least cost.
 
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
-loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, the others staying as coarse as can be,
-its change of the tip is scaled to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the
-changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`.
+loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
+to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
+direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`. The first direction is
+along the robot: under coarse layers the sections seem to be worse than they are, several times so where the stiffness jumps.
+
+The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
 
 The choice is kept in the cache, by content. Young's moduli enter rounded down to steps of 19 %, so that a calibrated robot mostly
 has the mesh of the robot from which it was calibrated. `mesh_error` measures what is only estimated here.
@@ -18,7 +21,7 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
-from gravcomp.full_model.flat_elements import with_grading
+from gravcomp.full_model.flat_elements import deep_cells, with_grading
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.pieces import pieces_of
 from gravcomp.mesh.refusal import well_shaped
@@ -27,11 +30,13 @@ from gravcomp.mesh.tube import coarse_elements, tube_mesh
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 3  # part of the key; to be raised when the choice changes
+_FORMAT = 4  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
-# The power of the number of elements with which the change of a direction falls.
-_ORDER = {"along": 1.5, "around": 2.0, "radial": 1.0}
+# The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
+_ORDER = {"along": 1.0, "around": 1.5, "radial": 1.0}
+# The sections are measured only where the change along the robot is within this part of `ACCURACY`.
+_ALONG_FIRST = 1.0
 _START_ALONG = 8
 _MOST_UNKNOWNS = 15000
 # A load that a finer mesh does not carry is made smaller by this factor, so often.
@@ -103,37 +108,31 @@ def _rounded_down(modulus: float) -> float:
 
 
 def _choose(robot: Robot) -> MeshChoice:
-    tips = _Tips(robot)
-    start = here = _start(robot)
-    tips.prepare(start)
-    changes: dict[str, np.ndarray] = {}  # of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction
+    here = _start(robot)
+    tips = _Tips(robot, here)
     while True:
-        gains = {}
+        # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
+        changes: dict[str, np.ndarray] = {}
+        gains: dict[str, float] = {}
         for direction in _ORDER:
             finer = _finer(robot, here, direction)
             if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
                 continue
-            if direction not in changes:
-                changes[direction] = _change_to_twice(robot, tips, start, direction, getattr(here, direction))
+            twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
+            changes[direction] = twice * tips.change(here, finer)
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
+            if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
+                break
         error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
-        best = max(gains, key=lambda direction: gains[direction])
-        here = _finer(robot, here, best)
-        del changes[best]
+        here = _not_deep(robot, _finer(robot, here, max(gains, key=lambda direction: gains[direction])))
 
 
-def _change_to_twice(robot: Robot, tips: "_Tips", start: Elements, direction: str, number: int) -> np.ndarray:
-    """The change of the tips (l, 3) over the length from `number` of elements in a direction to twice as many.
-
-    Along the robot it is measured. A finer section costs much, so that its change is measured on the first mesh only.
-    """
+def _to_twice(number: int, finer: int, direction: str) -> float:
+    """The change from `number` of elements in a direction to twice as many, over that from `number` to `finer`."""
     order = _ORDER[direction]
-    measured = number if direction == "along" else getattr(start, direction)
-    finer = getattr(_finer(robot, _with(robot, start, direction, measured), direction), direction)
-    change = tips.change(*(_with(robot, start, direction, value) for value in (measured, finer)))
-    return change * (1.0 - 0.5**order) / (1.0 - (measured / finer) ** order) * (measured / number) ** order
+    return float((1.0 - 0.5**order) / (1.0 - (number / finer) ** order))
 
 
 def _together(changes: list[np.ndarray]) -> float:
@@ -150,16 +149,14 @@ def _largest(changes: np.ndarray) -> float:
 class _Tips:
     """The tips of a robot's meshes under its loads, each computed once."""
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, start: Elements):
+        """Find the loads with the mesh `start`."""
+        from gravcomp.full_model.mesh_loads import LoadedShapes, mesh_loads
+
         self._robot = robot
-        self._known: dict[Elements, np.ndarray] = {}
+        self._known: dict[Elements, LoadedShapes] = {}
         self._unknowns: dict[Elements, int] = {}
-
-    def prepare(self, elements: Elements) -> None:
-        """Find the loads with a mesh."""
-        from gravcomp.full_model.mesh_loads import mesh_loads
-
-        self._loads = mesh_loads(self._model(elements))
+        self._loads = mesh_loads(self._model(start))
 
     def unknowns(self, elements: Elements) -> int:
         """Return the number of unknowns of a mesh."""
@@ -170,19 +167,22 @@ class _Tips:
     def change(self, one: Elements, other: Elements) -> np.ndarray:
         """Return the change of the tips (l, 3) from one mesh to another, over the length."""
         for _ in range(_TIMES):
-            change = (self._tips(other) - self._tips(one)) / self._robot.length
+            change = (self._tips(other, one) - self._tips(one)) / self._robot.length
             if not np.isnan(change).any():
                 break
             self._known.clear()
             self._loads = [dataclasses.replace(load, tension=_LESS * load.tension) for load in self._loads]
         return change
 
-    def _tips(self, elements: Elements) -> np.ndarray:
-        from gravcomp.full_model.mesh_loads import tips_under
+    def _tips(self, elements: Elements, near: Elements | None = None) -> np.ndarray:
+        """The tips (l, 3) in m; near: a mesh that is nearly the same."""
+        from gravcomp.full_model.mesh_loads import shapes_under
 
         if elements not in self._known:
-            self._known[elements] = tips_under(self._model(elements), self._loads)
-        return self._known[elements]
+            if near is not None:
+                self._tips(near)
+            self._known[elements] = shapes_under(self._model(elements), self._loads, self._known[near] if near else None)
+        return self._known[elements].tips
 
     def _model(self, elements: Elements):  # type: ignore[no-untyped-def]
         from gravcomp.full_model.model import RobotModel
@@ -203,7 +203,14 @@ def _start(robot: Robot) -> Elements:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
-    return shaped if disks else with_grading(robot, shaped)
+    return _not_deep(robot, shaped if disks else with_grading(robot, shaped))
+
+
+def _not_deep(robot: Robot, elements: Elements) -> Elements:
+    """The elements with as many cells through the wall as the next number around needs."""
+    while elements.radial < 8 and deep_cells(robot, _finer(robot, elements, "around")):
+        elements = _finer(robot, elements, "radial")
+    return elements
 
 
 def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.full_model.mesh_loads import mesh_loads, tips_under
+from gravcomp.full_model.mesh_loads import mesh_loads, shapes_under
 from gravcomp.full_model.model import RobotModel
 from gravcomp.mesh import MeshError
 
@@ -24,7 +24,9 @@ def error_of_mesh(robot: Robot) -> float:
         raise MeshError("the mesh is that of a file, and is not refined: compare with a finer file")
     twice = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along, radial=2 * elements.radial)
     loads = mesh_loads(model)
-    here, there = tips_under(model, loads), tips_under(RobotModel(dataclasses.replace(robot, elements=twice)), loads)
+    coarse = shapes_under(model, loads)
+    fine = shapes_under(RobotModel(dataclasses.replace(robot, elements=twice)), loads, near=coarse)
+    here, there = coarse.tips, fine.tips
     for load, one, two in zip(loads, here, there):
         for tip, what in ((one, "described"), (two, "finer")):
             if np.isnan(tip).any():

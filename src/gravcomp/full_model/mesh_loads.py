@@ -11,6 +11,7 @@ import logging
 import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 
@@ -45,14 +46,52 @@ def mesh_loads(model: RobotModel) -> list[MeshLoad]:
     return loads
 
 
-def tips_under(model: RobotModel, loads: list[MeshLoad]) -> np.ndarray:
-    """Return the tips (l, 3) in m under the loads; NaN where no equilibrium is found."""
-    solver, tips = StaticSolver(model), np.full((len(loads), 3), np.nan)
+@dataclasses.dataclass(frozen=True)
+class LoadedShapes:
+    """The shapes of a model under loads: displacements (n, 3) in m of each, None where no equilibrium is found."""
+
+    model: RobotModel
+    shapes: tuple[np.ndarray | None, ...]
+
+    @property
+    def tips(self) -> np.ndarray:
+        """The tips (l, 3) in m; NaN where no equilibrium is found."""
+        tips = np.full((len(self.shapes), 3), np.nan)
+        for index, u in enumerate(self.shapes):
+            if u is not None:
+                tips[index] = self.model.effectors.sections(self.model.mesh.nodes + u)[-1, 0]
+        return tips
+
+
+def shapes_under(model: RobotModel, loads: list[MeshLoad], near: LoadedShapes | None = None) -> LoadedShapes:
+    """Return the shapes under the loads.
+
+    near: the shapes of another mesh of the same robot under the same loads. Newton's method starts from them; only where that
+    fails, the load is followed from the straight robot.
+    """
+    solver = StaticSolver(model)
+    shapes: list[np.ndarray | None] = []
     for index, load in enumerate(loads):
         solver.reset()
-        if _follow(solver, load):
-            tips[index] = model.effectors.sections(model.mesh.nodes + solver.state.u)[-1, 0]
-    return tips
+        known = near.shapes[index] if near else None
+        if (near is not None and known is not None and _from_near(solver, load, near.model, known)) or _follow(solver, load):
+            shapes.append(solver.state.u)
+        else:
+            shapes.append(None)
+    return LoadedShapes(model, tuple(shapes))
+
+
+def _from_near(solver: StaticSolver, load: MeshLoad, source: RobotModel, shape: np.ndarray) -> bool:
+    """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
+    model = solver.model
+    u = carried_shape(shape, source.mesh, model.mesh)
+    solver.state = dataclasses.replace(
+        solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
+    )
+    if solver.track(load.gravity, CableInput(tension=load.tension), _ITERATIONS).converged:
+        return True
+    solver.reset()
+    return False
 
 
 def _follow(solver: StaticSolver, load: MeshLoad) -> bool:

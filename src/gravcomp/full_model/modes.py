@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from gravcomp.description import Robot
 from gravcomp.full_model.model import RobotModel
+from gravcomp.mesh.tube import with_coarse_elements
 
 
 def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
@@ -25,3 +27,11 @@ def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:
         return_eigenvectors=False,
     )
     return np.sort(np.sqrt(np.maximum(values, 0.0))) / (2.0 * np.pi)
+
+
+def first_period(robot: Robot) -> float:
+    """Return the period in s of the slowest motion of the straight robot, from a coarse mesh: right within a few per cent.
+
+    Raises MeshError for a body that cannot be meshed.
+    """
+    return float(1.0 / natural_frequencies(RobotModel(with_coarse_elements(robot)), 1)[0])

@@ -73,6 +73,7 @@ NODES = (
             Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape and compliance"),
             Port("target", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m; its z axis is the tip direction"),
             Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "target tip, direction, backbone points or bend, with weights"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m; only its position is used"),
         ),
         publishes=(
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m, positive: pulled in", 100.0),
@@ -95,6 +96,7 @@ NODES = (
             Port("truth/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; only for evaluation"),
             Port("truth/backbone", "geometry_msgs/msg/PoseArray", "backbone in soft_base, m; only for evaluation"),
             Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in soft_base, m/s^2; only for evaluation"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip as a tracker measures it, m", optional=True),
             _DIAGNOSTICS,
         ),
     ),

@@ -53,7 +53,7 @@ def add_internal_force(
         local[:, :] = 0.0
         nodes = solid.connectivity[k]
         first, shear = _viscous_constants(solid, k)
-        mean = _mean_volume(u, u, False, solid, k) if solid.averaged[k] else 0.0
+        mean = _mean_volume(u, solid, k) if solid.averaged[k] else 0.0
         for p in range(solid.weights.shape[1]):
             gradient = solid.gradients[k, p]
             deformation_gradient(u, nodes, gradient, f)
@@ -90,6 +90,7 @@ def add_force_and_stiffness(
     s = np.empty(6)
     d = np.zeros((6, 6))
     slope = np.empty(6)
+    step = np.empty(6)
     b = np.empty((6, n))
     db = np.empty((6, n))
     sg = np.empty((3, c))
@@ -104,8 +105,9 @@ def add_force_and_stiffness(
         geometric[:, :] = 0.0
         nodes, averaged = solid.connectivity[k], solid.averaged[k]
         first, shear = _viscous_constants(solid, k)
-        mean = _mean_volume(u, origin, False, solid, k) if averaged else 0.0
-        foreseen_mean = _mean_volume(u, origin, True, solid, k) if averaged and foreseen else 0.0
+        mean = _mean_volume(u, solid, k) if averaged else 0.0
+        mean_before = _mean_volume(origin, solid, k) if averaged and foreseen else 0.0
+        mean_step = _mean_volume_step(u, origin, solid, k) if averaged and foreseen else 0.0
         volume = 0.0
         for p in range(solid.weights.shape[1]):
             gradient = solid.gradients[k, p]
@@ -133,8 +135,15 @@ def add_force_and_stiffness(
                 for q in range(r + 1):
                     local_k[r, q] += b0 * db[0, q] + b1 * db[1, q] + b2 * db[2, q] + b3 * db[3, q] + b4 * db[4, q] + b5 * db[5, q]
             if foreseen:
-                _foreseen_strain(origin, nodes, gradient, f, e)
-                _stress(solid, k, p, foreseen_mean, e, slope, s, d, False)
+                _strain_step(origin, nodes, gradient, f, e, step)
+                _stress(solid, k, p, mean_before, e, slope, s, d, True)
+                for m in range(6):
+                    for q in range(6):
+                        s[m] += d[m, q] * step[q]
+                if averaged:
+                    pressure = bulk_modulus(solid.constants[k]) * mean_step
+                    for m in range(6):
+                        s[m] += pressure * slope[m]
             for a in range(c):
                 g0, g1, g2 = w * gradient[0, a], w * gradient[1, a], w * gradient[2, a]
                 sg[0, a] = s[0] * g0 + s[3] * g1 + s[5] * g2
@@ -181,7 +190,7 @@ def total_energy(u: np.ndarray, solid: Solid) -> float:
             volume += w
             sum_of_squares += w * volume_measure(law, e, slope) ** 2
         if solid.averaged[k]:
-            mean = _mean_volume(u, u, False, solid, k)
+            mean = _mean_volume(u, solid, k)
             total += mean_volume_energy(constants, volume * mean * mean, sum_of_squares)
     return total
 
@@ -225,32 +234,43 @@ def _viscous_constants(solid: Solid, k: int) -> tuple[float, float]:
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _mean_volume(u: np.ndarray, origin: np.ndarray, foreseen: bool, solid: Solid, k: int) -> float:
-    """Return the mean of the volume measure in element k; of the foreseen strains if `foreseen`."""
+def _mean_volume(u: np.ndarray, solid: Solid, k: int) -> float:
+    """Return the mean of the volume measure in element k."""
     f, e, slope = np.empty((3, 3)), np.empty(6), np.empty(6)
     total, volume = 0.0, 0.0
     for p in range(solid.weights.shape[1]):
         deformation_gradient(u, solid.connectivity[k], solid.gradients[k, p], f)
-        if foreseen:
-            _foreseen_strain(origin, solid.connectivity[k], solid.gradients[k, p], f, e)
-        else:
-            green_strain(f, e)
+        green_strain(f, e)
         total += solid.weights[k, p] * volume_measure(solid.law[k], e, slope)
         volume += solid.weights[k, p]
     return total / volume
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _foreseen_strain(origin: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, f: np.ndarray, e: np.ndarray) -> None:
-    """Write the strain e (6) that is linear in the step from `origin` to the present f (3, 3)."""
+def _mean_volume_step(u: np.ndarray, origin: np.ndarray, solid: Solid, k: int) -> float:
+    """Return the change of the mean of the volume measure in element k, linear in the step from `origin` to u (n, 3)."""
+    f, e, step, slope = np.empty((3, 3)), np.empty(6), np.empty(6), np.empty(6)
+    total, volume = 0.0, 0.0
+    for p in range(solid.weights.shape[1]):
+        deformation_gradient(u, solid.connectivity[k], solid.gradients[k, p], f)
+        _strain_step(origin, solid.connectivity[k], solid.gradients[k, p], f, e, step)
+        volume_measure(solid.law[k], e, slope)
+        for m in range(6):
+            total += solid.weights[k, p] * slope[m] * step[m]
+        volume += solid.weights[k, p]
+    return total / volume
+
+
+@njit(cache=True, fastmath=REORDERED)
+def _strain_step(
+    origin: np.ndarray, nodes: np.ndarray, gradient: np.ndarray, f: np.ndarray, e: np.ndarray, step: np.ndarray
+) -> None:
+    """Write the strain e (6) at `origin` (n, 3), and the part of its change from there to f (3, 3) that is linear in the step."""
     start = np.empty((3, 3))
-    step = np.empty((3, 3))
+    moved = np.empty((3, 3))
     deformation_gradient(origin, nodes, gradient, start)
     for i in range(3):
         for j in range(3):
-            step[i, j] = f[i, j] - start[i, j]
-    rate = np.empty(6)
+            moved[i, j] = f[i, j] - start[i, j]
     green_strain(start, e)
-    strain_rate(start, step, rate)
-    for m in range(6):
-        e[m] += rate[m]
+    strain_rate(start, moved, step)

@@ -11,9 +11,10 @@ storage here, above all for several right-hand sides.
 """
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf
 
@@ -55,21 +56,53 @@ class BlockPattern:
 
         Raises ValueError for an entry outside the pattern.
         """
-        row, column = np.maximum(row, column), np.minimum(row, column)
-        start, (diagonal, coupling, _) = self.start, self.offsets
-        level_r = np.searchsorted(start, row, side="right") - 1
-        level_c = np.searchsorted(start, column, side="right") - 1
-        local_r, local_c = row - start[level_r], column - start[level_c]
-        same = level_r == level_c
-        below = np.minimum(level_c, len(self.seen) - 1) if len(self.seen) else np.zeros_like(level_c)
-        seen = self.seen[below] if len(self.seen) else np.zeros_like(level_c)
-        column_seen = local_c - (self.size[level_c] - seen)
-        if np.any(~same & ((level_r != level_c + 1) | (column_seen < 0))):
+        position = np.empty(np.shape(row), dtype=np.int64)
+        _write_positions(np.ravel(row), np.ravel(column), self.layout, position.reshape(-1))
+        if (position < 0).any():
             raise ValueError("an entry lies outside the block pattern")
-        first_b = coupling[below] if len(coupling) else np.zeros_like(level_c)
-        inside_level = diagonal[level_c] + local_c * self.size[level_c] + local_r
-        across = first_b + column_seen * self.size[level_r] + local_r
-        return np.where(same, inside_level, across)
+        return position
+
+    @property
+    def layout(self) -> "Layout":
+        """The pattern for compiled functions, see `entry_position`."""
+        diagonal, coupling, _ = self.offsets
+        level = np.repeat(np.arange(len(self.size)), self.size)
+        return Layout(
+            level, *(np.append(part, [0]).astype(np.int64) for part in (self.start, self.size, self.seen, diagonal, coupling))
+        )
+
+
+class Layout(NamedTuple):
+    """A `BlockPattern` as arrays: the level of every unknown; per level the first unknown, size, seen and offsets."""
+
+    level: np.ndarray
+    start: np.ndarray
+    size: np.ndarray
+    seen: np.ndarray
+    diagonal: np.ndarray
+    coupling: np.ndarray
+
+
+@njit(cache=True)
+def entry_position(row: int, column: int, layout: Layout) -> int:
+    """Return the position of an entry, or of its mirror image, in the flat storage; -1 outside the pattern."""
+    if row < column:
+        row, column = column, row
+    high, low = layout.level[row], layout.level[column]
+    r, c = row - layout.start[high], column - layout.start[low]
+    if high == low:
+        return layout.diagonal[low] + c * layout.size[low] + r
+    c -= layout.size[low] - layout.seen[low]
+    if high != low + 1 or c < 0:
+        return -1
+    return layout.coupling[low] + c * layout.size[high] + r
+
+
+@njit(cache=True)
+def _write_positions(row: np.ndarray, column: np.ndarray, layout: Layout, position: np.ndarray) -> None:
+    """Write the positions of the entries (e,)."""
+    for k in range(len(row)):
+        position[k] = entry_position(row[k], column[k], layout)
 
 
 class BlockMatrix:

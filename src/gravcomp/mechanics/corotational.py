@@ -30,6 +30,11 @@ class CorotationalElements(SolidElements):
         self._stiffness = np.einsum("k,kmi,kmn,knj->kij", self.weights[:, 0], matrix, elasticity, matrix, optimize=True)
         self._gradient = np.ascontiguousarray(self.gradients[:, 0])
 
+    def scale_stiffness(self, factor: np.ndarray) -> None:
+        """Multiply the modulus of every element by `factor` (k,)."""
+        super().scale_stiffness(factor)
+        self._stiffness *= factor[:, None, None]
+
     def internal_force(self, u: np.ndarray, viscous: ViscousStrain | None = None) -> np.ndarray:
         """Return internal forces (n, 3) in N at displacements `u` (n, 3); `viscous` is ignored."""
         force = np.zeros_like(u)

@@ -49,6 +49,11 @@ class SolidElements:
         self._position = scatter_positions(mesh.elements, pattern)
         self._elastic = ViscousStrain(np.zeros(len(self.weights)), np.zeros((*self.weights.shape, 6)))
 
+    def scale_stiffness(self, factor: np.ndarray) -> None:
+        """Multiply the modulus of every element by `factor` (k,), that of its fibres as well."""
+        self.constants.values[:, :2] *= factor[:, None]  # the laws' own constants are ratios
+        self.fibres *= np.sqrt(factor)[:, None, None, None]
+
     def internal_force(self, u: np.ndarray, viscous: ViscousStrain | None = None) -> np.ndarray:
         """Return internal forces (n, 3) in N at displacements `u` (n, 3), with damping and creep if a viscous strain is given."""
         force = np.zeros_like(u)
@@ -66,9 +71,9 @@ class SolidElements:
         """Add the tangent stiffness at displacements `u` (n, 3) to `matrix` and return the internal forces (n, 3) in N.
 
         With `origin` (n, 3), the displacements of the last iterate, the stress in grad N . S grad N is the one that the last
-        Newton step predicted, S(E + B du). Then the spurious stretch of a straight step along a curved path does not stiffen
-        the next step (Magisano, Leonetti, Garcea 2017, mixed integration points). The stress of damping is then left out of
-        that term: along the axis it is an artefact of the iteration and can make the tangent indefinite.
+        Newton step predicted, S + D B du with S and D at its origin. Then the spurious stretch of a straight step along a curved
+        path does not stiffen the next step (Magisano, Leonetti, Garcea 2017, mixed integration points). The stress of damping is
+        then left out of that term: along the axis it is an artefact of the iteration and can make the tangent indefinite.
         """
         force = np.zeros_like(u)
         strain = viscous or self._elastic

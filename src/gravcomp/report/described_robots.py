@@ -1,4 +1,4 @@
-"""Robots that a page of the documentation describes: each a YAML block, followed by its picture."""
+"""Robots with a picture in the documentation: those that a page describes in a YAML block, and the shipped ones."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 
 from gravcomp.config import ConfigError, from_mapping
-from gravcomp.description import Robot
+from gravcomp.description import Robot, load_robot_file, shipped_robots
 
 _BLOCK = re.compile(r"^```yaml\n(robot:.*?)^```\n+!\[[^\]]*\]\(([^)]+)\)", re.MULTILINE | re.DOTALL)
 
@@ -25,3 +25,8 @@ def robots_on(page: Path) -> list[tuple[Robot, Path]]:
             raise ConfigError(f"{source}: {error}") from error
         found.append((from_mapping(Robot, document["robot"], source=source, key="robot"), page.parent / picture))
     return found
+
+
+def shipped_pictures(folder: Path) -> list[tuple[Robot, Path]]:
+    """Return every shipped robot with the path of its picture in `folder`. Raises ConfigError for a robot that cannot be read."""
+    return [(load_robot_file(name).robot, folder / f"{name}.png") for name in shipped_robots()]

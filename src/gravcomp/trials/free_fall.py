@@ -8,7 +8,7 @@ from gravcomp.calibration.measured import Measured
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.standard_gravity import STANDARD_GRAVITY
-from gravcomp.trials.calibration_run import CAMERA_NOISE
+from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.dynamics import MovingRod
 from gravcomp.virtual.equilibrium import RodShape
@@ -16,7 +16,7 @@ from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 SAMPLE = 0.010  # s
 _STEP = 0.002  # s
-_RELEASED = -0.03  # m: paid out so far that the cables stay slack
+_RELEASED = -0.3  # of the length: paid out so far that the cables stay slack
 _IMU_TIME = 1.5  # s of IMU samples from which gravity is estimated
 
 
@@ -31,15 +31,15 @@ def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
         *((position[-1], orientation[-1, :, 2]) for position, orientation in falling_rod(setup, base, duration))
     )
     random = np.random.default_rng([setup.seed, trial])
-    tip = np.array(tips) @ base
+    tip, direction = Tracker().seen(setup.nominal.length, np.array(tips) @ base, np.array(directions) @ base, random)
     return Measured(
         source="virtual robot",
         trial=np.full(len(tip), trial),
         time=SAMPLE * np.arange(len(tip)),
         gravity=np.tile(_estimated_gravity(setup, base), (len(tip), 1)),
         displacement=np.full((len(tip), len(setup.nominal.cables)), np.nan),
-        tip_position=tip + CAMERA_NOISE * random.standard_normal(tip.shape),
-        tip_direction=np.array(directions) @ base,
+        tip_position=tip,
+        tip_direction=direction,
     )
 
 
@@ -57,7 +57,7 @@ def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tup
     yield rod.position.copy(), rod.orientation.copy()
     world_gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
     for step in range(1, round(duration / _STEP) + 1):
-        rod.step(_STEP, base, np.zeros(3), world_gravity, np.full(model.tendons, _RELEASED))
+        rod.step(_STEP, base, np.zeros(3), world_gravity, np.full(model.tendons, _RELEASED * setup.nominal.length))
         if step % round(SAMPLE / _STEP) == 0:
             yield rod.position.copy(), rod.orientation.copy()
 

@@ -12,6 +12,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.context import Context
 from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.motion import base_orientation
@@ -22,7 +23,7 @@ OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
 # m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (0.6e-3, 1.8e-3)
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
-_NOISE = 0.1e-3  # m: standard deviation of one image; ten are averaged
+_IMAGES = 10  # that are averaged
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,11 @@ def recover(context: Context) -> list[Recovered]:
     fits = context.map(_fit_known, jobs, "fitting robots with known parameters")
     found = []
     for modulus, fit in zip(moduli, fits):
-        estimate = fit.estimates[0]
-        found.append(Recovered("Young's modulus, at rest", "MPa", modulus * 1e-6, estimate.value, estimate.interval))
-    for estimate in fits[0].estimates[1:]:
+        found += [
+            Recovered(f"{e.name}, at rest", "MPa", modulus * 1e-6, e.value, e.interval)
+            for e in fit.estimates[: len(context.setup.robot.materials)]
+        ]
+    for estimate in fits[0].estimates:
         cable = next((i for i, c in enumerate(context.setup.robot.cables) if estimate.name == f"offset of {c.name}"), None)
         if cable is not None:
             found.append(Recovered(estimate.name, "mm", 1e3 * OFFSETS[cable], estimate.value, estimate.interval))
@@ -100,7 +103,9 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
             # A released cable is slack.
             displacement = np.where(np.isnan(command), -0.03, command + OFFSETS)
             shape = equilibrium(rod, gravity, displacement=displacement)
-            rows.append((gravity, command, shape.tip + _NOISE / np.sqrt(10.0) * random.standard_normal(3)))
+            tips, directions = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
+            tip, direction = Tracker().seen(setup.nominal.length, tips, directions, random)
+            rows.append((gravity, command, tip.mean(axis=0), direction.mean(axis=0)))
     return StillWindows(*(np.array(column) for column in zip(*rows)))
 
 

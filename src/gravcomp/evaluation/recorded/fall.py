@@ -23,7 +23,8 @@ def run(recorded: RecordedRun) -> Result:
     if not measured:
         raise ConfigError(
             f"{recorded.bag}: contains no fall. A fall: cables paid out (~/relax) for {PAID_OUT:g} s, the tip held within"
-            f" {1e3 * STRAIGHT:g} mm of straight, let go, and {1e3 * FALLEN:g} mm away from there within {WITHIN:g} s"
+            f" {1e3 * STRAIGHT * robot.length:g} mm of straight, let go, and {1e3 * FALLEN:g} mm away from there within"
+            f" {WITHIN:g} s"
         )
     models = [predict_course(robot, fall) for fall in measured]
     position = [np.linalg.norm(tip - fall.tip_position, axis=1) for fall, (tip, _) in zip(measured, models)]

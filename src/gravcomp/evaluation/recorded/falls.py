@@ -21,11 +21,11 @@ _SHORTEST = 1.0  # s
 
 def falls(course: Course, length: float) -> list[np.ndarray]:
     """Return the rows of each fall of a robot of `length` m, from the last sample near straight on."""
-    distance = np.linalg.norm(course.tip_position - [0.0, 0.0, length], axis=1)
+    distance, near = np.linalg.norm(course.tip_position - [0.0, 0.0, length], axis=1), STRAIGHT * length
     released = course.phase == RELEASED
     found: list[np.ndarray] = []
     last = -1
-    for start in np.flatnonzero((distance[:-1] <= STRAIGHT) & (distance[1:] > STRAIGHT) & released[:-1]).tolist():
+    for start in np.flatnonzero((distance[:-1] <= near) & (distance[1:] > near) & released[:-1]).tolist():
         begin = course.time[start]
         soon = (course.time > begin) & (course.time <= begin + WITHIN)
         before = (course.time >= begin - PAID_OUT) & (course.time <= begin)
@@ -34,7 +34,7 @@ def falls(course: Course, length: float) -> list[np.ndarray]:
             continue
         end = int(np.searchsorted(course.time, begin + _LONGEST, side="right"))
         # A fall ends where the cables are pulled again or the next fall begins.
-        over = np.flatnonzero(~released[start:end] | ((distance[start:end] <= STRAIGHT) & (np.arange(end - start) > 0)))
+        over = np.flatnonzero(~released[start:end] | ((distance[start:end] <= near) & (np.arange(end - start) > 0)))
         end = start + int(over[0]) if len(over) else end
         if course.time[end - 1] - begin >= _SHORTEST:
             found.append(np.arange(start, end))

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from gravcomp.calibration.measured import STILL_GRAVITY, STILL_TIME, STILL_TIP
 from gravcomp.config import ConfigError
 from gravcomp.evaluation import metrics
 from gravcomp.evaluation.recorded.course import BETWEEN, HELD, RELEASED, Course
-from gravcomp.evaluation.recorded.rests import Rest, errors_of, rests
+from gravcomp.evaluation.recorded.rests import STILL_GRAVITY, STILL_TIME, STILL_TIP, Rest, errors_of, rests
 from gravcomp.evaluation.recorded.run import RecordedRun
 from gravcomp.report.drawing import MODEL, REAL, TARGET, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table

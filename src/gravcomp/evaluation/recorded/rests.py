@@ -1,12 +1,16 @@
 """Stretches at rest in a recorded course, with their mean errors."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.measured import STILL_GRAVITY, STILL_TIME, STILL_TIP
 from gravcomp.evaluation import metrics
 from gravcomp.evaluation.recorded.course import BETWEEN, Course
+
+STILL_TIME = 0.5  # s: length of a window
+STILL_TIP = 0.6e-3  # m: largest motion of the tip in a window
+STILL_GRAVITY = math.radians(0.5)  # rad: of the gravity direction
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import dataclasses
 
 from gravcomp.config import parameter
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.tip_observer.options import TipObserverOptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,4 +32,7 @@ class InverseControllerParameters:
     frame: str = parameter("soft_base", description="frame in which targets must be given", read_only=True)
     inverse: InverseOptions = parameter(
         default_factory=InverseOptions, description="weights and tolerances of the inverse problem"
+    )
+    tracker: TipObserverOptions = parameter(
+        default_factory=TipObserverOptions, description="correction of the model's error by measured/tip"
     )

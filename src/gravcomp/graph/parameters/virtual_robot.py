@@ -3,6 +3,7 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 
 MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 
@@ -77,4 +78,7 @@ class VirtualRobotNodeParameters:
     truth_rate: float = parameter(
         100.0, unit="Hz", minimum=1.0, maximum=500.0, description="rate of the topics truth/...", read_only=True
     )
-    base_frame: str = parameter("soft_base", description="frame of truth/tip, truth/backbone and truth/gravity", read_only=True)
+    base_frame: str = parameter("soft_base", description="frame of truth/... and measured/tip", read_only=True)
+    tracker: VirtualTrackerParameters = parameter(
+        default_factory=VirtualTrackerParameters, description="tracker of the tip, which publishes measured/tip"
+    )

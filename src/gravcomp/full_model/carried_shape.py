@@ -1,0 +1,39 @@
+"""A deformed shape on one mesh of a robot's segments, carried to another mesh of the same robot.
+
+In every cross-section between two layers the displacements are fitted by polynomials of second degree in the place in the
+section, which contain its motion as a rigid body, its bending and its contraction across. Their coefficients are interpolated
+along the robot. The result is no equilibrium, but so near to one that Newton's method needs only a few steps from there.
+"""
+
+import numpy as np
+
+from gravcomp.mesh import Mesh
+
+_DEGREE = 2
+# Nodes of a section may be too few for all terms: those that they do not determine are left out.
+_UNDETERMINED = 1e-9
+
+
+def carried_shape(u: np.ndarray, source: Mesh, target: Mesh) -> np.ndarray:
+    """Return displacements (n, 3) in m of the target mesh, from those of the source (m, 3). Both are of the same segments."""
+    from scipy.interpolate import CubicSpline
+
+    here, there = source.straight, target.straight
+    size = float(np.abs(here[:, :2]).max())
+    level = np.abs(here[:, 2, None] - source.stations).argmin(axis=1)
+    heights = source.stations[::2]  # at those between them only some nodes of an element lie
+    coefficients = []
+    for number in range(len(heights)):
+        on = level == 2 * number
+        terms = _terms(here[on, :2] / size)
+        coefficients.append(np.linalg.lstsq(terms, u[on], rcond=_UNDETERMINED)[0])
+    along = CubicSpline(heights, np.array(coefficients))(np.clip(there[:, 2], heights[0], heights[-1]))
+    shape: np.ndarray = np.einsum("nc,nci->ni", _terms(there[:, :2] / size), along)
+    shape[target.clamped] = 0.0
+    return shape
+
+
+def _terms(place: np.ndarray) -> np.ndarray:
+    """The terms (n, c) of the polynomials at places (n, 2)."""
+    x, y = place.T
+    return np.column_stack([x**i * y ** (k - i) for k in range(_DEGREE + 1) for i in range(k + 1)])

@@ -1,0 +1,75 @@
+"""A robot whose model is wrong, held with and without a tracker of its tip."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.trace import Trace
+from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
+from gravcomp.inverse import straight_target
+from gravcomp.trials.holding import errors_to
+from gravcomp.virtual.motion import BaseMotion, RotationMotion, StaticMotion, base_orientation
+
+STRONG_CREEP = ((0.10, 0.10, 0.15), (0.2, 2.0, 20.0))
+"""Maxwell branches of the body that creeps: stiffness over the long-term stiffness, and relaxation time in s."""
+
+_RELEASED, _SETTLING, _HELD = 3.0, 4.0, 8.0  # s
+
+
+@dataclass(frozen=True)
+class TrackedCase:
+    """A pose of the base (deg), how fast it turns about its y axis once held (deg/s), and the tracker; None: there is none."""
+
+    inclination: float
+    roll: float = 0.0
+    turning: float = 0.0
+    tracker: VirtualTrackerParameters | None = None
+
+
+@dataclass(frozen=True)
+class TrackedOutcome:
+    """RMS of the true lateral error in m: released, and held after the settling time; used and refused: measurements."""
+
+    released: float
+    held: float
+    used: int
+    refused: int
+
+
+def with_wrong_model(setup: Setup, stiffness: float) -> Setup:
+    """Return the setup with a virtual robot that creeps strongly and whose modulus is `stiffness` times the described one."""
+    ratio, time = STRONG_CREEP
+    body = dataclasses.replace(
+        setup.truth.body, youngs_modulus=None, modulus_ratio=(stiffness,), creep_ratio=ratio, creep_time=time
+    )
+    return dataclasses.replace(setup, truth=dataclasses.replace(setup.truth, body=body))
+
+
+def run_tracked(job: tuple[Setup, TrackedCase]) -> TrackedOutcome:
+    """Release the robot, hold it straight, and compare its true tip with the target."""
+    setup, case = job
+    start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
+    motion: BaseMotion = StaticMotion(start)
+    if case.turning:
+        motion = RotationMotion(start, np.array([0.0, 1.0, 0.0]), np.radians(case.turning), _RELEASED + _SETTLING)
+    loop = ClosedLoop(setup, motion, tracker=case.tracker)
+    target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
+    loop.release()
+    loop.run(_RELEASED)
+    begin = loop.time
+    loop.hold(target)
+    loop.run(_SETTLING + _HELD)
+
+    def lateral(trace: Trace) -> float:
+        return float(np.sqrt(np.mean(errors_to(trace, target).lateral ** 2)))
+
+    trace, status = loop.trace, loop.observer.status(loop.time)
+    return TrackedOutcome(
+        released=lateral(trace.between(begin - 0.5, begin)),
+        held=lateral(trace.between(begin + _SETTLING)),
+        used=status.used,
+        refused=status.refused,
+    )
