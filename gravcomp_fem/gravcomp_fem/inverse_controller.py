@@ -20,7 +20,7 @@ from gravcomp.description.hardware import parse_hardware
 from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.holdability.background import HoldProcess
-from gravcomp.inverse import Command, ControllerCode, Target, TargetError, straight_target, warm_up
+from gravcomp.inverse import Command, ControllerCode, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
 from gravcomp_fem.tracker_input import TrackerInput, seconds
@@ -121,8 +121,11 @@ class InverseController(ManagedNode):
         return straight_target(
             self.robot_file.robot.length,
             tip_position_weight=self.parameters.tip_position_weight,
-            tip_direction_weight=self.parameters.tip_direction_weight,
+            tip_direction_weight=self._direction_weight(),
         )
+
+    def _direction_weight(self) -> float:
+        return direction_weight(self.robot_file.robot.length, self.parameters.tip_direction_weight)
 
     # The loop.
 
@@ -200,7 +203,7 @@ class InverseController(ManagedNode):
     # Targets and services.
 
     def _on_pose_target(self, message: PoseStamped) -> None:
-        weights = self.parameters.tip_position_weight, self.parameters.tip_direction_weight
+        weights = self.parameters.tip_position_weight, self._direction_weight()
         self._take_target(message.header, lambda: pose_target(message.pose, *weights))
 
     def _on_shape_target(self, message: ShapeTarget) -> None:

@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.graph.parameters.viewer import ViewerParameters
+from gravcomp.inverse import direction_weight
 from gravcomp.launcher import LaunchError, NodeProcess, NodeSpec
 from gravcomp.view import requests
 from gravcomp.virtual.motion import base_orientation, quaternion
@@ -41,8 +42,10 @@ class RequestSender:
     Attributes: shape_target, base, fault (publishers), services (clients by name), recorder (its process, or None).
     """
 
-    def __init__(self, node: LifecycleNode, parameters: ViewerParameters, notify: Notify):
+    def __init__(self, node: LifecycleNode, parameters: ViewerParameters, length: float, notify: Notify):
+        """length: of the robot in m."""
         self._node, self._parameters, self.notify = node, parameters, notify
+        self._weight = direction_weight(length, parameters.tip_direction_weight)
         self.shape_target = node.create_publisher(ShapeTarget, "target/shape", COMMAND)
         self.base = node.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
         faults = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
@@ -62,7 +65,7 @@ class RequestSender:
         """Send one request."""
         match request:
             case requests.SetTarget(angle, plane):
-                message = bend_message(angle, plane, self._parameters.tip_direction_weight, self._parameters.frame)
+                message = bend_message(angle, plane, self._weight, self._parameters.frame)
                 message.header.stamp = self._node.get_clock().now().to_msg()
                 self.shape_target.publish(message)
             case requests.TiltBase(inclination, roll):

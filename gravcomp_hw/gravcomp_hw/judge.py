@@ -26,11 +26,12 @@ from gravcomp.evaluation.bus_delay import DelayListener
 from gravcomp.evaluation.released import released_tip_error
 from gravcomp.evaluation.track import Track
 from gravcomp.graph.parameters.judge import JudgeParameters
-from gravcomp_msgs.msg import CableCommand
-from gravcomp_node import ManagedNode, run
+from gravcomp_msgs.msg import CableCommand, ControllerStatus
+from gravcomp_node import LATCHED, ManagedNode, run
 
 # Messages that the middleware keeps between two reads, which are 0.1 s apart.
 _KEPT = 100
+_NOT_HELD = 2  # ControllerStatus.holdable
 _STRAIGHT = np.array([0.0, 0.0, 1.0])
 
 
@@ -66,6 +67,8 @@ class Judge(ManagedNode):
                 (CableCommand, "cable/command", self._commands, lambda message: ()),
             )
         ]
+        self._status = Polled(self, ControllerStatus, "controller/status", LATCHED)
+        self._unholdable: str | None = None
         self._relax = self.create_client(Trigger, "inverse_controller/relax")
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
         self._state_clients = {name: self.create_client(GetState, f"{name}/get_state") for name in self.parameters.nodes}
@@ -121,6 +124,9 @@ class Judge(ManagedNode):
         for polled, track, values in self._sources:
             for received in polled.take_all():
                 track.add(_seconds(received.message), *values(received.message))
+        status = self._status.take()
+        if status is not None and status.message.holdable:
+            self._unholdable = status.message.hold_message if status.message.holdable == _NOT_HELD else None
         if self._begin is None and len(self._truth_tip):
             self._begin = self._now()
 
@@ -138,12 +144,24 @@ class Judge(ManagedNode):
         delays = 1e3 * np.array(self._delay.delays) if self._delay and self._delay.delays else None
         seed = None if p.seed < 0 else p.seed
         error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
+        released = released_tip_error(self.robot_file, gravity, self._target, seed)
+        held, moving = figures.held_and_moving(self._truth_tip, self._truth_gravity, self._target, _STRAIGHT, counted_from, end)
+        started = self._compensated_at or end
+        sag = figures.sag(self._truth_tip, self._target, at_rest, released_until)
+        # Until the counted time begins, the demo's base rests.
+        settled = figures.settled(self._truth_tip, self._target, _STRAIGHT, started, counted_from, sag) if sag else None
         return {
-            "sag_mm": _mm(figures.sag(self._truth_tip, self._target, at_rest, released_until)),
+            "sag_mm": _mm(sag),
             "residual_lateral_mm": _mm(residual and residual[0]),
             "residual_axial_mm": _mm(residual and residual[1]),
             "tip_error_with_mm": _mm(residual and float(np.hypot(*residual))),
-            "tip_error_without_mm": _mm(released_tip_error(self.robot_file, gravity, self._target, seed)),
+            "tip_error_without_mm": _mm(released),
+            "held_lateral_mm": _mm(held),
+            "held_lateral_pct": _pct(held, released),
+            "moving_lateral_mm": _mm(moving),
+            "moving_lateral_pct": _pct(moving, released),
+            "settle_s": _rounded(settled, 2),
+            "unholdable": self._unholdable,
             "correlation": _rounded(figures.correlation(self._truth_tip, self._model_tip, self._begin, end), 5),
             "imu_rate_hz": _rounded(figures.rate(self._imu.between(counted_from, end)[0]), 2),
             "command_rate_hz": _rounded(figures.rate(self._commands.between(counted_from, end)[0]), 2),
@@ -192,6 +210,10 @@ def _vector(message: Vector3Stamped) -> tuple[float, float, float]:
 
 def _mm(metres: float | None) -> float | None:
     return _rounded(None if metres is None else 1e3 * metres, 3)
+
+
+def _pct(part: float | None, whole: float | None) -> float | None:
+    return None if part is None or not whole else _rounded(100.0 * part / whole, 2)
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

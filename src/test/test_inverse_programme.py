@@ -1,13 +1,15 @@
 """The quadratic programme of one step: weights, optimality, and bounds that cannot be satisfied."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from arc_robot import LENGTH, STATIONS, ArcRobot
 
 from gravcomp.description.robot import Limits
-from gravcomp.inverse import InverseOptions, straight_target
+from gravcomp.inverse import InverseOptions, direction_weight, straight_target
 from gravcomp.inverse.limits import StepBounds
-from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.programme import _turned_in_place, build_programme
 from gravcomp.inverse.scaling import Programme, scaled, unscaled
 from gravcomp.inverse.solver import ProgrammeSolver
 
@@ -66,7 +68,7 @@ def test_weights_are_the_squares_of_the_rows():
     response = robot.step(gravity, None, iterations=20)
     target = straight_target(LENGTH, tip_direction_weight=1e-3, backbone_station=[0.3], backbone_weight=[0.7])
     options = InverseOptions(energy_weight=1e-6, proximal_weight=0.0, axial_weight=0.25)
-    zeros = np.zeros(6)
+    zeros, apart = np.zeros(6), turned_in_place(response)
     programme = build_programme(
         response,
         target,
@@ -88,9 +90,61 @@ def test_weights_are_the_squares_of_the_rows():
         middle = 0.7 * (point @ point - 0.75 * axial**2)
         towards = response.effector_free[3:6]
         along_target = (1.0 - 0.5 * (towards[2] / np.linalg.norm(towards)) ** 2) ** 2  # 0.25 for a tip that points there
-        return tip[:2] @ tip[:2] + along_target * tip[2] ** 2 + 1e-3 * np.sum((e[3:6] - [0, 0, 1]) ** 2) + middle
+        return tip[:2] @ tip[:2] + along_target * tip[2] ** 2 + 1e-3 * np.sum((apart @ (e[3:6] - [0, 0, 1])) ** 2) + middle
 
     tension = np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.1])
     x = tension / programme.scale
     quadratic = 2e-6 * (0.5 * x @ programme.hessian @ x + programme.gradient @ x)  # its cost is in mm^2, halved
     assert quadratic == pytest.approx(cost(tension) - cost(np.zeros(6)), rel=1e-3)
+
+
+def turned_in_place(response, cables=slice(None)):
+    """D (3, 3) of the programme's text for some of the cables: by projection on the null space of the lateral position."""
+    root = np.sqrt(np.diag(response.compliance_aa)[cables])
+    across, turn = response.compliance_ea[:2, cables] / root, response.compliance_ea[3:6, cables] / root
+    alone = turn @ (np.eye(across.shape[1]) - np.linalg.pinv(across) @ across)
+    part = alone @ alone.T
+    return part @ np.linalg.inv(part + 1e-3 * np.linalg.norm(turn, 2) ** 2 * np.eye(3))
+
+
+def test_the_direction_counts_where_cables_turn_the_tip_in_place():
+    robot = ArcRobot()
+    response = robot.step(np.zeros(3), None)
+    assert np.linalg.eigvalsh(turned_in_place(response))[1:] == pytest.approx([1.0, 1.0], abs=0.1)
+    assert np.abs(turned_in_place(response, [3, 4, 5])).max() < 1e-3
+    for cables in ([0, 1, 2, 3, 4, 5], [3, 4, 5]):
+        change, compliance = response.compliance_ea[:, cables], response.compliance_aa[np.ix_(cables, cables)]
+        found = _turned_in_place(np.ascontiguousarray(change), np.ascontiguousarray(compliance), np.array([0.0, 0.0, 1.0]))
+        assert found == pytest.approx(turned_in_place(response, cables), abs=1e-6)
+
+
+def test_a_weight_of_the_direction_does_not_pull_cables_that_only_bend_off_the_place():
+    """Cables of one segment: a weight of the direction costs hardly any sag in one step; with all of it 9 % would remain."""
+    response = ArcRobot().step(np.array([-GRAVITY, 0.0, 0.0]), None, iterations=20)
+    near = []
+    for weight in (0.0, direction_weight(LENGTH)):
+        of_one = SimpleNamespace(
+            compliance_aa=response.compliance_aa[3:, 3:],
+            compliance_ea=response.compliance_ea[:, 3:],
+            displacement_free=response.displacement_free[3:],
+            effector_free=response.effector_free,
+        )
+        programme = build_programme(
+            of_one,
+            straight_target(LENGTH, tip_direction_weight=weight),
+            Limits(tension_max=50.0, tension_rate=1e5, displacement_rate=10.0),
+            tension=np.zeros(3),
+            displacement=np.zeros(3),
+            backbone_station=STATIONS,
+            interval=0.1,
+            damping=1.0,
+            options=InverseOptions(proximal_weight=0.0),
+        )
+        solution = ProgrammeSolver().solve(programme)
+        tension = unscaled(
+            solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper
+        )[0]
+        near.append(np.linalg.norm((of_one.compliance_ea @ tension + of_one.effector_free)[:2]))
+    sag = np.linalg.norm(response.effector_free[:2])
+    assert near[0] < 0.005 * sag
+    assert near[1] < 0.02 * sag

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from arc_robot import LENGTH, STATIONS, ArcRobot, closed_loop, controller
+from arc_robot import LENGTH, LIMITS, STATIONS, ArcRobot, closed_loop, controller
 
 from gravcomp.description import load_robot_file
 from gravcomp.inverse import ControllerCode, InverseController, Target, bend_target, straight_target
@@ -120,7 +120,7 @@ def moves_at_a_dead_end(sag, missed, steps=400):
 
     Paying out reduces the tension by 0.1 N per step; a step onward restores it.
     """
-    retreat, target, tension = Retreat(LENGTH), straight_target(LENGTH), np.full(6, 4.0)
+    retreat, target, tension = Retreat(LENGTH, LIMITS.tension_max), straight_target(LENGTH), np.full(6, 4.0)
     retreat.move(True, target, np.array([-sag, 0.0, LENGTH]), np.zeros(6))
     moves = []
     for _ in range(steps):

@@ -261,7 +261,7 @@ def setup() -> Setup:
 
 def held(setup: Setup, seconds: float, tracker: VirtualTrackerParameters | None) -> ClosedLoop:
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)), tracker=tracker)
-    loop.hold(straight_target(setup.robot.length, tip_direction_weight=setup.controller.tip_direction_weight))
+    loop.hold(straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight))
     loop.run(seconds)
     return loop
 

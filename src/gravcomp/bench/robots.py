@@ -1,7 +1,8 @@
 """Every robot's model in figures, and the model against what others measured and computed.
 
 Of each robot: the error of its mesh, its shape at rest without load, the time of its reduced model's build and step, and the
-reduced model's error. Robots are computed one after the other, each with an empty cache; one that fails does not stop the others.
+reduced model's error; or, asked for, the loop on its virtual robot. Robots are computed one after the other, each with an empty
+cache; one that fails does not stop the others.
 """
 
 import logging
@@ -12,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gravcomp.bench import robot_figures, whole_figures
+from gravcomp.bench import robot_figures, robot_loop, whole_figures
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
 from gravcomp.experiments.measured import default_folder
@@ -21,13 +22,18 @@ from gravcomp.mesh import MeshError
 Progress = Callable[[str], None]
 
 
-def run(progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str] = (), every: int = 1) -> dict:
+def run(
+    progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str] = (), every: int = 1, loop: bool = False
+) -> dict:
     """Return `robots`, the figures of `robot_figures.FIGURES` of every robot by name, and the figures of `whole_figures`.
 
     files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists. The
     figures of `whole_figures` are computed if no file is given, or if they are asked for. figures: names of the figures wanted,
-    none: all; every: compute every `every`-th row and path only. Raises ConfigError for a figure that does not exist.
+    none: all; every: compute every `every`-th row and path only; loop: the figures of `robot_loop.FIGURES` in place of all
+    others. Raises ConfigError for a figure that does not exist.
     """
+    if loop:
+        return {"robots": _loops(files, figures, progress, every)}
     allowed = [*robot_figures.FIGURES, *whole_figures.FIGURES]
     for name in figures:
         if name not in allowed:
@@ -40,6 +46,24 @@ def run(progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str]
             result["robots"][name] = measured
     whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
     return result | whole_figures.run(progress, whole, every)
+
+
+def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, every: int) -> dict[str, dict[str, Any]]:
+    """Return the figures of the loop of every robot by name."""
+    unknown = [name for name in figures if name not in robot_loop.FIGURES]
+    if unknown:
+        raise ConfigError(f"--figures has '{unknown[0]}'; allowed with --loop: {', '.join(robot_loop.FIGURES)}")
+    found = {}
+    for file in files or _all_files(progress):
+        try:
+            name = load_robot_file(str(file)).robot.name
+            progress(f"{name}: loop")
+            measured = robot_loop.measure(str(file), every)
+        except (ConfigError, MeshError, ArithmeticError, ValueError, RuntimeError) as error:
+            name, measured = Path(str(file)).stem, dict.fromkeys(robot_loop.FIGURES) | {"errors": {"loop": str(error)}}
+            logging.getLogger(__name__).warning("%s: %s", name, error)
+        found[name] = {key: value for key, value in measured.items() if not figures or key in figures or key == "errors"}
+    return found
 
 
 def _all_files(progress: Progress) -> list[str]:

@@ -43,9 +43,9 @@ SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _HEATER_PERIOD = 0.1  # s
-_IDLE = 2e-3  # N, tension below which a cable counts as idle
-RELEASE_SLACK = 5e-3
-"""m: released cables are paid out by this length beyond their paths, so that no motion of the robot makes them taut."""
+_IDLE = 4e-4  # of the largest tension, below which a cable counts as idle
+_RELEASE_SLACK = 0.05
+"""Of the robot's length: released cables are paid out so far beyond their paths that no motion of the robot makes them taut."""
 
 
 class ClosedLoop:
@@ -84,6 +84,7 @@ class ClosedLoop:
         self.observer = TipObserver(setup.robot, setup.controller.tracker)
         self._target: Target | None = None
         self._weightless = False
+        self._release_slack = _RELEASE_SLACK * setup.robot.length  # m
         self._cables = np.zeros(len(setup.robot.cables))  # m, displacement of the model's cables
         self._sent = self._cables
         self._arriving: collections.deque[tuple[np.ndarray, np.ndarray] | None] = collections.deque([None] * delay)
@@ -193,7 +194,7 @@ class ClosedLoop:
         return None if self._target is None else self.observer.corrected(self._target, now)
 
     def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-        free = shape.response.displacement_free - RELEASE_SLACK
+        free = shape.response.displacement_free - self._release_slack
         displacement = (
             self._cables if self._waiting else within_limits(free, self._cables, self.setup.robot.limits, SAMPLE_PERIOD)
         )
@@ -211,7 +212,7 @@ class ClosedLoop:
         return command.displacement, command.tension
 
     def _idle_released(self, tension: np.ndarray) -> np.ndarray:
-        wanted = np.where(tension > _IDLE, self._cables, self._cables - RELEASE_SLACK)
+        wanted = np.where(tension > _IDLE * self.setup.robot.limits.tension_max, self._cables, self._cables - self._release_slack)
         paid_out = within_limits(wanted, self._sent, self.setup.robot.limits, SAMPLE_PERIOD)
         return self.setup.hardware.transmission.possible(paid_out, tension)
 

@@ -11,6 +11,7 @@ from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
+from gravcomp.inverse import direction_weight
 from gravcomp.virtual.described import described
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -57,6 +58,11 @@ class Setup:
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
         )
+
+    @property
+    def direction_weight(self) -> float:
+        """Weight of the tip's direction in m^2, of the controller or of the robot's size."""
+        return direction_weight(self.robot.length, self.controller.tip_direction_weight)
 
     @property
     def virtual_hardware(self) -> Hardware:

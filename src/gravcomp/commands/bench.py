@@ -30,6 +30,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
     },
+    "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
@@ -90,8 +91,9 @@ def run(args: argparse.Namespace) -> int:
     if args.write:
         figures_table.check_place(Path(args.write), command)
     module = importlib.import_module(f"gravcomp.bench.{args.benchmark}")
-    options = BRIEF[args.benchmark] if args.brief else {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
-    options = options | {name.lstrip("-"): getattr(args, name.lstrip("-")) for name in LISTS.get(args.benchmark, {})}
+    options = {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
+    options |= BRIEF[args.benchmark] if args.brief else {}
+    options |= {name.lstrip("-"): getattr(args, name.lstrip("-")) for name in LISTS.get(args.benchmark, {})}
     console = output.console()
     with console.status(command) as status:
         measured = module.run(lambda stage: status.update(f"{command}: {stage}"), **options)

@@ -210,6 +210,13 @@ def _summary(figures: dict[str, Any]) -> "Table":
             f"{figures['tip_error_with_mm']} / {figures['tip_error_without_mm']}",
             "mm RMS",
         ),
+        ("lateral, base at rest / turning", f"{figures['held_lateral_mm']} / {figures['moving_lateral_mm']}", "mm RMS"),
+        (
+            "the same, of the tip error without compensation",
+            f"{figures['held_lateral_pct']} / {figures['moving_lateral_pct']}",
+            "%",
+        ),
+        ("settled after", figures["settle_s"], "s"),
         ("correlation of model and ground truth", figures["correlation"], ""),
         ("error of gravity", figures["gravity_error_deg"], "deg RMS"),
         ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),

@@ -1,6 +1,7 @@
 """Figures of a run on the virtual robot: sag without compensation, error with it, and agreement of the model.
 
 sag: mean distance of the true tip from that of the straight robot, with released cables, at rest.
+held, moving: the lateral part of it while the base rests, and while it turns.
 residual: root mean square of the true tip's distance from the target across (lateral) and along (axial) the target's direction.
 correlation: Pearson's r between modelled and true tip over time (recovery rate).
 """
@@ -11,6 +12,10 @@ import numpy as np
 
 from gravcomp.evaluation import metrics
 from gravcomp.evaluation.track import Track
+
+_AT_REST, _JUST = 1.0, 0.1  # s
+_TURN_RATE = math.radians(1.0)  # rad/s, slowest turn that counts as motion
+_BAND = 0.05  # of the sag, within which the tip counts as settled
 
 
 def sag(truth_tip: Track, straight: np.ndarray, begin: float, end: float) -> float | None:
@@ -26,6 +31,17 @@ def residual(truth_tip: Track, target: np.ndarray, direction: np.ndarray, begin:
         return None
     errors = metrics.tip_errors(tip, direction, target, direction)
     return float(np.sqrt((errors.lateral**2).mean())), float(np.sqrt((errors.axial**2).mean()))
+
+
+def rest_and_motion(gravity: Track, stamps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return for the stamps (t,) in s whether the base has been at rest for `_AT_REST`, and whether it turns at present.
+
+    gravity: the true one, m/s^2, of a base that turns about any but the vertical axis.
+    """
+    now, before, long_before = (gravity.at(stamps - ago) for ago in (0.0, _JUST, _AT_REST))
+    turning = metrics.angle_between(now, before) > _TURN_RATE * _JUST
+    resting = metrics.angle_between(now, long_before) <= _TURN_RATE * _JUST
+    return resting & ~turning, turning
 
 
 def correlation(truth_tip: Track, model_tip: Track, begin: float, end: float) -> float | None:
@@ -47,6 +63,38 @@ def gravity_error(truth: Track, estimate: Track, begin: float, end: float) -> fl
     if not both.any():
         return None
     return float(np.sqrt((metrics.angle_between(true[both], own[both]) ** 2).mean()))
+
+
+def settled(
+    truth_tip: Track, target: np.ndarray, direction: np.ndarray, begin: float, end: float, sag_size: float
+) -> float | None:
+    """Return the time (s) from `begin` until the lateral error stays within a twentieth of the sag of its final value.
+
+    None without samples until `end`, and where it does not settle.
+    """
+    stamps, tip = truth_tip.between(begin, end)
+    if not len(tip):
+        return None
+    lateral = metrics.tip_errors(tip, direction, target, direction).lateral
+    time = metrics.settling_time(stamps, lateral, start=begin, band=_BAND * sag_size)
+    return time if math.isfinite(time) else None
+
+
+def held_and_moving(
+    truth_tip: Track, gravity: Track, target: np.ndarray, direction: np.ndarray, begin: float, end: float
+) -> tuple[float | None, float | None]:
+    """Return the lateral RMS errors in m while the base rests and while it turns; None where it does not.
+
+    Arguments as those of `residual`; gravity: see `rest_and_motion`.
+    """
+    stamps, tip = truth_tip.between(begin, end)
+    if not len(tip):
+        return None, None
+    lateral = metrics.tip_errors(tip, direction, target, direction).lateral
+    held, moving = (
+        float(np.sqrt((lateral[part] ** 2).mean())) if part.any() else None for part in rest_and_motion(gravity, stamps)
+    )
+    return held, moving
 
 
 def rate(stamps: np.ndarray) -> float | None:

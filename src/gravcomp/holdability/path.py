@@ -103,7 +103,7 @@ class HoldPath:
 
     def _settled(self, gravity: np.ndarray, tension: np.ndarray, limits: Limits) -> Equilibrium | None:
         """Return the equilibrium under gravity (3,) nearest to the target, from the tensions (m,) on; None if there is none."""
-        model, damping = self.model, StepDamping()
+        model, damping = self.model, StepDamping(self.model.length)
         state = self._tracked(gravity, tension)
         last = np.zeros(len(tension))
         for _ in range(_PROGRAMMES):

@@ -11,7 +11,7 @@ from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.solver import SolverFailed
 from gravcomp.inverse.status import ControllerCode
-from gravcomp.inverse.target import Target, TargetError, bend_target, straight_target
+from gravcomp.inverse.target import Target, TargetError, bend_target, direction_weight, straight_target
 from gravcomp.inverse.warm_up import warm_up
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "Target",
     "TargetError",
     "bend_target",
+    "direction_weight",
     "straight_target",
     "warm_up",
 ]

@@ -47,7 +47,7 @@ class InverseController:
         self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
-        self._retreat = Retreat(robot.length)
+        self._retreat = Retreat(robot.length, robot.limits.tension_max)
         self.reset()
 
     def reset(self, displacement: np.ndarray | None = None) -> None:
@@ -56,7 +56,7 @@ class InverseController:
         Rate limits count from `displacement` (m,) in m; None: from the displacements of the cables' paths at the next step.
         """
         self._solver.reset()
-        self._damping = StepDamping()
+        self._damping = StepDamping(self.robot.length)
         self._retreat.reset()
         self._displacement: np.ndarray | None = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
@@ -228,7 +228,7 @@ class InverseController:
             else:
                 message = "the model finds no equilibrium: paying the cables out"
         self._displacement, self._tension = displacement, tension
-        self._damping = StepDamping()  # the old factor belongs to another shape
+        self._damping = StepDamping(self.robot.length)  # the old factor belongs to another shape
         effector = response.compliance_ea @ tension + response.effector_free
         return Command(
             displacement,

@@ -7,23 +7,24 @@ displacement shows whether they agree: the loop has no other trial.
 """
 
 _LARGEST = 1e4
-# m. A smaller change is noise of the gravity direction, not an overshoot.
-_SMALLEST_CHANGE = 5e-6
+# Of the robot's length. A smaller change is noise of the gravity direction, not an overshoot.
+_SMALLEST_CHANGE = 5e-5
 _BACK_AND_FORTH = -0.3
 
 
 class StepDamping:
-    """Factor (1 or more) of the proximal term, adapted from step to step."""
+    """Factor (1 or more) of the proximal term of a robot of `length` (m), adapted from step to step."""
 
-    def __init__(self) -> None:
+    def __init__(self, length: float) -> None:
         self.factor = 1.0
+        self._smallest = (_SMALLEST_CHANGE * length) ** 2  # m^2
 
     def observe(self, along: float, lengths: float) -> None:
         """Update the factor with the changes of path displacement (m,) of the last two programmes.
 
         along: their scalar product; lengths: product of their lengths; both in m^2.
         """
-        if lengths <= _SMALLEST_CHANGE**2:
+        if lengths <= self._smallest:
             return  # settled; with less damping it could start to oscillate
         if along < _BACK_AND_FORTH * lengths:
             self.factor = min(4.0 * self.factor, _LARGEST)

@@ -16,6 +16,15 @@ Gauss-Newton iteration, settle (see `damping`).
 The part of the errors of tip and backbone along the robot counts less, because cables can only pull: they cannot undo their
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.
+
+The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both
+responses are those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the lateral position,
+and
+
+    D = G (G + delta g I)^-1,   G = J_direction N J_direction^T,   g: largest eigenvalue of J_direction J_direction^T
+
+multiplies the rows of the direction. It is about 1 where segments move the tip and turn it each by themselves, and about 0 where
+the same cables do both: there a weight of the direction would only pull the tip off its place.
 """
 
 import math
@@ -86,6 +95,10 @@ def build_programme(
     )
 
 
+# delta of the module's text: cables that turn the tip in place by less than a thirtieth of what they turn it do not count.
+_SEPARATE = 1e-3
+
+
 @njit(cache=True)
 def tip_axis(effector: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return the unit vector (3,) that splits the tip's error into axial and lateral error.
@@ -104,8 +117,9 @@ def _built(
 ) -> ScaledProgramme:  # fmt: skip
     """Compiled `build_programme`; limits: the last six arguments of `step_bounds`; `less` as in `_weighted_errors`."""
     jacobian, offset = _weighted_errors(
-        change, free, tension, tip, tip_weight, direction, direction_weight, stations, points, weights, backbone_station, less
-    )
+        change, free, compliance_aa, tension, tip, tip_weight, direction, direction_weight, stations, points, weights,
+        backbone_station, less,
+    )  # fmt: skip
     hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
     bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
     return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds, couplings))
@@ -113,9 +127,9 @@ def _built(
 
 @njit(cache=True)
 def _weighted_errors(
-    change: np.ndarray, free: np.ndarray, tension: np.ndarray, tip: np.ndarray, tip_weight: float, direction: np.ndarray,
-    direction_weight: float, stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray,
-    less: float,
+    change: np.ndarray, free: np.ndarray, compliance_aa: np.ndarray, tension: np.ndarray, tip: np.ndarray, tip_weight: float,
+    direction: np.ndarray, direction_weight: float, stations: np.ndarray, points: np.ndarray, weights: np.ndarray,
+    backbone_station: np.ndarray, less: float,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return M W_ea (k, m) and M (e_free - e_target) (k,) for the weighted parts of the target.
 
@@ -137,6 +151,9 @@ def _weighted_errors(
         row = 3
     if direction_weight > 0.0:
         jacobian[row : row + 3], offset[row : row + 3] = change[3:6], free[3:6] - direction
+        if tip_weight > 0.0:
+            apart = _turned_in_place(change, compliance_aa, direction)
+            jacobian[row : row + 3], offset[row : row + 3] = apart @ change[3:6], apart @ offset[row : row + 3]
         _weigh(jacobian[row : row + 3], offset[row : row + 3], direction, 0.0, direction_weight)
         row += 3
     for index in range(len(stations)):
@@ -151,6 +168,34 @@ def _weighted_errors(
         _weigh(jacobian[row : row + 3], offset[row : row + 3], along, less, weights[index])
         row += 3
     return jacobian, offset
+
+
+@njit(cache=True)
+def _turned_in_place(change: np.ndarray, compliance_aa: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return D (3, 3) of the module's text for the effector's response `change` (e, m); axis (3,): the target's direction."""
+    m = change.shape[1]
+    across, turn = np.empty((3, m)), np.empty((3, m))
+    for k in range(m):
+        root = 1.0 / np.sqrt(compliance_aa[k, k])
+        along = axis[0] * change[0, k] + axis[1] * change[1, k] + axis[2] * change[2, k]
+        for i in range(3):
+            across[i, k], turn[i, k] = root * (change[i, k] - along * axis[i]), root * change[3 + i, k]
+    # The part of each tension that moves the tip across; the third direction, along the axis, is no motion across.
+    moved = across @ across.T
+    size = np.trace(moved)
+    if size <= 0.0:
+        return np.eye(3)
+    for i in range(3):
+        for j in range(3):
+            moved[i, j] += size * axis[i] * axis[j]
+        moved[i, i] += 1e-12 * size
+    both = turn @ across.T
+    whole = turn @ turn.T
+    alone = whole - both @ np.linalg.solve(moved, both.T)
+    largest = np.linalg.eigvalsh(whole)[2]
+    if largest <= 0.0:
+        return np.zeros((3, 3))
+    return alone @ np.linalg.inv(alone + _SEPARATE * largest * np.eye(3))
 
 
 @njit(cache=True)

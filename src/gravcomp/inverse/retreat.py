@@ -14,21 +14,23 @@ other side of a strongly bent robot may end in a local minimum of the distance.
 """
 
 import enum
+import math
 
 import numpy as np
 
 from gravcomp.inverse.target import Target
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _SHORTER, _LONGER = 0.25, 1.05
 _LEAST_STRIDE = 1.0 / 256.0
 _LOST_TIMES = 3
 _BACK_STEPS = 2  # the model may be one sample behind the commands
-# Nothing moves if no cable is faster than this for this number of steps.
-_SLOW = 2e-3  # m/s
+# Nothing moves if no cable is faster than this share of the speed of a fall from the robot's length, for this number of steps.
+_SLOW = 2e-3
 _STILL_STEPS = 20
 _FAR = 0.3  # of the robot's length
 _SHARES = (0.5, 0.25, 0.0)  # fractions of the tension at which a target is tried again
-_NO_TENSION, _LITTLE_TENSION = 0.02, 0.1  # N
+_NO_TENSION, _LITTLE_TENSION = 0.004, 0.02  # of the largest tension
 
 
 class Move(enum.Enum):
@@ -40,10 +42,14 @@ class Move(enum.Enum):
 
 
 class Retreat:
-    """Chooses the moves of a robot of `length` (m). Attribute `stride`: fraction of the usual stride that a step may take."""
+    """Chooses the moves of a robot of `length` (m) with cables of at most `tension_max` (N).
 
-    def __init__(self, length: float):
-        self._length = length
+    Attribute `stride`: fraction of the usual stride that a step may take.
+    """
+
+    def __init__(self, length: float, tension_max: float):
+        self._length, self._tension_max = length, tension_max
+        self._slow = _SLOW * math.sqrt(STANDARD_GRAVITY * length)  # m/s
         self._tip_at_rest = np.array([0.0, 0.0, length])  # until it is observed
         self.reset()
 
@@ -62,7 +68,7 @@ class Retreat:
         """
         if not _same(target, self._target):
             self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
-        if followed and tension.max() <= _LITTLE_TENSION:
+        if followed and tension.max() <= _LITTLE_TENSION * self._tension_max:
             self._tip_at_rest = tip
         if not followed:
             self._lost += 1
@@ -85,7 +91,7 @@ class Retreat:
 
     def observe(self, change: np.ndarray, interval: float) -> None:
         """Record a move onward: the change (m,) of the winches' displacement in m, within `interval` s."""
-        self._still = self._still + 1 if np.abs(change).max() <= _SLOW * interval else 0
+        self._still = self._still + 1 if np.abs(change).max() <= self._slow * interval else 0
 
     def _try_again(self, tip: np.ndarray, tension: np.ndarray) -> None:
         """Start paying the cables out if another attempt from there may get nearer to the target."""
@@ -95,7 +101,7 @@ class Retreat:
         nearer_at_rest = np.linalg.norm(self._tip_at_rest - wanted) < missed
         asked = self._target.tip_position_weight > 0.0
         if self._until is None and self._tries < len(_SHARES) and asked and nearer_at_rest and missed > _FAR * self._length:
-            self._until = max(_SHARES[self._tries] * tension.max(), _NO_TENSION)
+            self._until = max(_SHARES[self._tries] * tension.max(), _NO_TENSION * self._tension_max)
             self._tries += 1
             self._lost_times = 0
 

@@ -16,6 +16,7 @@ import numpy as np
 
 _NO_DIRECTION = np.zeros(3)
 _REACH = 1.5  # of the robot's length
+_DIRECTION_SHARE = 0.1  # of the square of the robot's length
 
 
 class TargetError(ValueError):
@@ -124,6 +125,15 @@ def bend_target(
 def straight_target(length: float, **weights: Any) -> Target:
     """Return the target of the straight robot of `length` m; the keyword arguments are those of `bend_target`."""
     return bend_target(length, 0.0, 0.0, **weights)
+
+
+def direction_weight(length: float, given: float | None = None) -> float:
+    """Return the weight of the tip's direction in m^2 for a robot of `length` m: the given one, else that of the robot's size.
+
+    >>> direction_weight(0.2)  # 0.1 rad counts like 6.3 mm
+    0.004
+    """
+    return round(_DIRECTION_SHARE * length**2, 12) if given is None else given
 
 
 def arc_points(length: float, angle: float, plane: float, station: np.ndarray) -> np.ndarray:

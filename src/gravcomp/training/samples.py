@@ -17,7 +17,7 @@ import numpy as np
 
 from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.shape import ShapeStatus
-from gravcomp.inverse import InverseController, bend_target
+from gravcomp.inverse import InverseController, bend_target, direction_weight
 from gravcomp.simulation.simulator import Simulator
 
 GRAVITY = 9.81
@@ -108,7 +108,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     target = None
     if kind >= _RELEASED:
         bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
-        weight = rng.choice([0.0, 1e-3])
+        weight = rng.choice([0.0, direction_weight(model.length)])
         target = bend_target(model.length, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
     gravity, displacement = size * _direction(rng), None

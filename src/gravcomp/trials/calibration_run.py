@@ -100,14 +100,14 @@ def calibration_trial(job: tuple[Setup, tuple[float, float], int, float, float])
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(inclination), np.radians(roll))))
     loop.release()
     loop.run(duration)
-    loop.hold(straight_target(setup.robot.length, tip_direction_weight=setup.controller.tip_direction_weight))
+    loop.hold(straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight))
     loop.run(held * duration)
     loop.hold(
         bend_target(
             setup.robot.length,
             np.radians(30.0),
             np.radians(60.0 * trial),
-            tip_direction_weight=setup.controller.tip_direction_weight,
+            tip_direction_weight=setup.direction_weight,
         )
     )
     loop.run(held * duration)

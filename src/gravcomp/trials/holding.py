@@ -64,7 +64,7 @@ class Outcome:
 
 def target_of(setup: Setup, case: Case) -> Target:
     """Return the target of a case, with the weights of the controller."""
-    options = {"tip_direction_weight": setup.controller.tip_direction_weight, **case.options}
+    options = {"tip_direction_weight": setup.direction_weight, **case.options}
     return bend_target(setup.robot.length, np.radians(case.bend), np.radians(case.plane), **options)
 
 

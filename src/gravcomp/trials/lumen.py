@@ -165,7 +165,7 @@ def target_at(setup: Setup, reach: Reach, depth: float, feed: float = 0.0) -> Ta
     return Target(
         tip_position=points[-1],
         tip_direction=lumen.direction(np.array(depth)),
-        tip_direction_weight=setup.controller.tip_direction_weight,
+        tip_direction_weight=setup.direction_weight,
         backbone_station=np.array(_STATIONS),
         backbone_position=points[:-1],
         backbone_weight=np.array(_WEIGHTS),

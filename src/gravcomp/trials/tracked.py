@@ -56,7 +56,7 @@ def run_tracked(job: tuple[Setup, TrackedCase]) -> TrackedOutcome:
     if case.turning:
         motion = RotationMotion(start, np.array([0.0, 1.0, 0.0]), np.radians(case.turning), _RELEASED + _SETTLING)
     loop = ClosedLoop(setup, motion, tracker=case.tracker)
-    target = straight_target(setup.robot.length, tip_direction_weight=setup.controller.tip_direction_weight)
+    target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
     loop.release()
     loop.run(_RELEASED)
     begin = loop.time

@@ -69,6 +69,11 @@ class WaypointMotion(SyntheticMotion):
         self.duration = time
         self._repeat = repeat
 
+    @property
+    def rests(self) -> list[tuple[float, float]]:
+        """Begin and end of the time at rest at each stop in s, of the first time through."""
+        return [(begin, end) for begin, end, _, _ in self._legs]
+
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation (3, 3), world from soft_base, and position (3,) m at `time` s."""
         time = time % self.duration if self._repeat else min(time, self.duration)

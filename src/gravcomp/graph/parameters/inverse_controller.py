@@ -16,9 +16,10 @@ class InverseControllerParameters:
     tip_position_weight: float = parameter(
         1.0, minimum=0.0, maximum=1e3, description="weight of the tip position for a target pose and for the straight robot"
     )
-    tip_direction_weight: float = parameter(
-        1e-3, unit="m^2", minimum=0.0, maximum=10.0,
-        description="weight of the tip direction for both: 0.001 makes 0.1 rad count like 3 mm; 0: direction free",
+    tip_direction_weight: float | None = parameter(
+        None, unit="m^2", minimum=0.0, maximum=10.0,
+        description="weight of the tip direction for both: 0.001 makes 0.1 rad count like 3 mm; 0: direction free;"
+        " none: a tenth of the square of the robot's length",
     )  # fmt: skip
     stale_after: float = parameter(
         200.0, edge="ms", minimum=20.0, maximum=10000.0, description="without robot/deformation for this time no command is sent"

@@ -1,0 +1,70 @@
+"""Figures of one robot's loop: the controller as described, on virtual robots that seeds draw around the description.
+
+The loop runs in one process, in virtual time. Rate and delay of commands belong to the running graph: `demo --json` has them.
+"""
+
+import math
+from typing import Any
+
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.description import RobotFile, load_robot_file
+from gravcomp.holdability import holdability
+from gravcomp.holdability.text import sentence
+from gravcomp.trials.turning_base import Residuals, residuals
+
+FIGURES = (
+    "uncalibrated_pct",
+    "moving_pct",
+    "held_lateral_mm",
+    "moving_lateral_mm",
+    "sag_mm",
+    "settle_s",
+    "unholdable",
+    "calibrated_pct",
+    "modulus_error_pct",
+    "compliance_error_pct",
+    "calibrate_s",
+)
+"""Keys of the result. Those of the calibration are None: they are not measured here yet."""
+
+SEEDS = (1, 2, 3)
+_ORIENTATIONS = 20
+
+
+def measure(file: str, every: int = 1) -> dict[str, Any]:
+    """Return the figures of `FIGURES`, the worst over `SEEDS`, and `seeds`: the two shares of each seed.
+
+    Held: at the article's five poses and 20 random orientations of the base; moving: during the turns between them at 30 deg/s.
+    every > 1: one seed and so many times fewer random orientations. Raises ConfigError, NoEquilibrium and RuntimeError where the
+    loop does not run.
+    """
+    robot_file = load_robot_file(file)
+    runs: dict[int, Residuals] = {}
+    for seed in SEEDS[:1] if every > 1 else SEEDS:
+        runs[seed] = residuals(Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every))
+    shares = {seed: {"held_pct": _pct(run.held, run.sag), "moving_pct": _pct(run.moving, run.sag)} for seed, run in runs.items()}
+    return dict.fromkeys(FIGURES) | {
+        "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),
+        "moving_pct": max(share["moving_pct"] for share in shares.values()),
+        "held_lateral_mm": round(1e3 * max(run.held for run in runs.values()), 3),
+        "moving_lateral_mm": round(1e3 * max(run.moving for run in runs.values()), 3),
+        "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
+        "settle_s": _worst([run.settled for run in runs.values()]),
+        "unholdable": unholdable(robot_file),
+        "seeds": {str(seed): share for seed, share in shares.items()},
+    }
+
+
+def unholdable(file: RobotFile) -> str | None:
+    """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
+    answer = holdability(file.robot, with_needed=False)
+    return None if answer.held else sentence(file.robot, answer)
+
+
+def _pct(residual: float, sag: float) -> float:
+    return round(100.0 * residual / sag, 2)
+
+
+def _worst(times: list[float]) -> float | None:
+    """The longest time in s; None where one run never settled."""
+    return None if any(math.isnan(time) for time in times) else round(max(times), 2)
