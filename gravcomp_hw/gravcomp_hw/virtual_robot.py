@@ -19,7 +19,6 @@ from gravcomp.canbus.bus import BusError
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description.hardware import parse_hardware
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
-from gravcomp.recordings.imu import RecordingError
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
@@ -50,10 +49,7 @@ class VirtualRobotNode(ManagedNode):
             motors = dataclasses.replace(parameters.motors, feedback_rate=self.parameters.feedback_rate)
             parameters = dataclasses.replace(parameters, motors=motors)
         seed = parameters.seed if self.parameters.seed < 0 else self.parameters.seed
-        try:
-            motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, seed)
-        except RecordingError as error:
-            raise ConfigError(str(error)) from error
+        motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
         robot = VirtualRobot(parameters, self.robot_file.robot, hardware, seed, motion)
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)

@@ -36,18 +36,18 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
     from gravcomp.orientation.inclination import inclination_rmse
-    from gravcomp.recordings.imu import RecordingError, read_recording
+    from gravcomp.recordings.imu import read_recording
 
+    if args.average < 1:
+        raise ConfigError(f"--average is {args.average}; 1 or more is needed")
     try:
-        if args.average < 1:
-            raise RecordingError(f"--average is {args.average}; 1 or more is needed")
         recording = read_recording(args.file, args.topic)
         if args.average > 1:
             recording = recording.averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         options, mount = _of_robot(args.robot)
         estimator = GravityEstimator(options, mount, model)
-    except (RecordingError, BiasModelError, ValueError) as error:
+    except (BiasModelError, ValueError) as error:
         raise ConfigError(str(error)) from error
 
     from rich.progress import Progress
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         "inclination_std_deg": float(np.degrees(np.nanmean(result.inclination_std))),
         "inclination_rmse_deg": None,
         "rejected": estimator.filter.rejected,
-        "problems": result.problems,
+        "problems": dict.fromkeys(recording.notes, 1) | result.problems,
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
     if recording.orientation is not None:
