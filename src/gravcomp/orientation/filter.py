@@ -31,6 +31,8 @@ UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer measures nothing
 CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those of a stuck sensor, not of a sensor at rest
 # Between the mean specific force at rest and the filter's gravity: a larger angle is more than a calibration error explains.
 CONTRADICTED_TILT = math.radians(2.0)
+# Of the threshold of a spike: an angle lacks for good what a wrong spike removes, a velocity is corrected all the time.
+SURE_GYRO, SURE_ACCEL = 1.5, 1.0
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -48,7 +50,7 @@ class OrientationFilter:
         self._guard = SampleGuard(self.options.sensor)
         self._rest = RestDetector(self.options.rest)
         spikes = self.options.spikes
-        self._gyro_gate, self._accel_gate = SpikeGate(spikes.gyro, spikes), SpikeGate(spikes.accel, spikes)
+        self._gyro_gate, self._accel_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO), SpikeGate(spikes.accel, spikes, SURE_ACCEL)
         self._errors = ErrorCovariance()
         self.reset()
 

@@ -15,7 +15,6 @@ from gravcomp.orientation.quaternion import Vector
 BOUND = 0.5  # of the threshold: a larger jump counts as this one in the mean jump, so that spikes hardly raise it
 NEARER = 2.0  # ratio of the distances to the suspect and to the signal that decides
 FAR = 2.0  # of the threshold: farther from the signal no sample has returned to it
-SURE = 1.0  # of the threshold: what is nearer to the straight line counts as it is
 CLEAR = 3.0  # of the threshold: a jump beyond this needs `longest` samples in a row to count as motion, a smaller one needs one
 
 
@@ -23,21 +22,22 @@ CLEAR = 3.0  # of the threshold: a jump beyond this needs `longest` samples in a
 class SpikeOptions:
     """What counts as a spike."""
 
-    gyro: float = parameter(10.0, edge="deg/s", minimum=0.1, maximum=10000, description="a smaller jump of the rate is no spike")
+    gyro: float = parameter(20.0, edge="deg/s", minimum=0.1, maximum=10000, description="a smaller jump of the rate is no spike")
     accel: float = parameter(
-        2.0, unit="m/s^2", minimum=0.05, maximum=4000, description="a smaller jump of the specific force is no spike"
+        3.0, unit="m/s^2", minimum=0.05, maximum=4000, description="a smaller jump of the specific force is no spike"
     )
-    ratio: float = parameter(6.0, minimum=2, maximum=1000, description="jump of a spike, in mean jumps of the signal")
+    ratio: float = parameter(4.5, minimum=2, maximum=1000, description="jump of a spike, in mean jumps of the signal")
     time_constant: float = parameter(0.2, unit="s", minimum=0.02, maximum=10, description="of the mean jump")
-    longest: int = parameter(3, minimum=1, maximum=10, description="spikes in a row; more are motion")
+    longest: int = parameter(2, minimum=1, maximum=10, description="spikes in a row; more are motion")
 
 
 @dataclass
 class SpikeGate:
     """One sensor of three axes; `count`: spikes held so far."""
 
-    floor: float
+    floor: float  # a smaller jump is no spike
     options: SpikeOptions
+    sure: float  # of the threshold: what is nearer to the straight line counts as it is
     count: int = 0
     _last: Vector | None = None
     _slope: Vector = (0.0, 0.0, 0.0)  # change per sample
@@ -114,7 +114,7 @@ class SpikeGate:
         for k, suspect in enumerate(pending, 1):
             part = k / (len(pending) + 1)
             x, y, z = (a + (v - a) * part for a, v in zip(last, value))
-            spike = bool(max(abs(suspect[0] - x), abs(suspect[1] - y), abs(suspect[2] - z)) > SURE * threshold)
+            spike = bool(max(abs(suspect[0] - x), abs(suspect[1] - y), abs(suspect[2] - z)) > self.sure * threshold)
             self.count += spike
             counted.append((x, y, z) if spike else suspect)
         return self._decide(value, counted)

@@ -1,0 +1,31 @@
+"""One odd thing of a stream, and a block of samples in which it is looked for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Finding:
+    """`kind`: a key; `text`: a sentence for the user; `fatal`: gravity would be wrong by more than calibration explains.
+
+    A finding with a `gyro_matrix` or an `accel_factor` can be converted: rate (rad/s) = gyro_matrix rate as recorded,
+    specific force (m/s^2) = accel_factor times the one recorded.
+    """
+
+    kind: str
+    text: str
+    fatal: bool = False
+    gyro_matrix: np.ndarray | None = None
+    accel_factor: float | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """n samples in the order of reception, all finite; the first follows the last one of the block before."""
+
+    stamp_ns: np.ndarray  # (n,) int64
+    gyro: np.ndarray  # (n, 3), as recorded
+    accel: np.ndarray  # (n, 3), as recorded
+    period: float  # s, median step
+    steps: np.ndarray  # (n or n - 1,) s, from the sample before
