@@ -15,6 +15,7 @@ BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
+    "streams": "faulty IMU streams: what is reported, what is held",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
@@ -29,6 +30,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
     },
+    "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
 }
@@ -46,6 +48,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
     "estimator": {"every": 13},
+    "streams": {"every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},

@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Finding:
-    """`kind`: a key; `text`: a sentence for the user; `fatal`: gravity would be wrong by more than calibration explains.
+    """`kind`: a key; `text`: a sentence for the user; `fatal`: the unit is wrong, nothing can be computed.
 
     A finding with a `gyro_matrix` or an `accel_factor` can be converted: rate (rad/s) = gyro_matrix rate as recorded,
     specific force (m/s^2) = accel_factor times the one recorded.
@@ -18,6 +18,11 @@ class Finding:
     fatal: bool = False
     gyro_matrix: np.ndarray | None = None
     accel_factor: float | None = None
+
+    @property
+    def convertible(self) -> bool:
+        """Whether the finding says how to convert the stream."""
+        return self.gyro_matrix is not None or self.accel_factor is not None
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,11 @@ class Resting:
                 return [Finding("accel_unit", text, fatal=True, accel_factor=STANDARD_GRAVITY / unit)]
         if length < 0.05 * STANDARD_GRAVITY:
             return [Finding("no_gravity", f"the specific force at rest is {length:.2f}: gravity was removed", fatal=True)]
-        return [Finding("accel_unit", f"the accelerometer is in no known unit: {length:.3g} at rest, 9.81 m/s^2 is needed", fatal=True)]
+        return [
+            Finding(
+                "accel_unit", f"the accelerometer is in no known unit: {length:.3g} at rest, 9.81 m/s^2 is needed", fatal=True
+            )
+        ]
 
     def _of_bias(self) -> list[Finding]:
         if len(self._bias) < 20:
