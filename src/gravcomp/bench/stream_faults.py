@@ -128,7 +128,7 @@ FAULTS: dict[str, Fault] = {
     "duplicates": Fault(_duplicates, ("duplicates",), 0.05),
     "time_back": Fault(_time_back, ("time_back",), 0.25),
     "counter_wrap": Fault(_wrap, ("notes",), 0.05),
-    "gaps": Fault(_gaps, ("gaps",), 0.5),
+    "gaps": Fault(_gaps, ("gaps",)),
     "clipped": Fault(_clipped, ("gyro_clipped",)),
     "stuck": Fault(_stuck, ("gyro_stuck",)),
     "quantised": Fault(_quantised, ("gyro_quantised",)),

@@ -19,10 +19,11 @@ STRETCH = 8.0  # s
 WINDOWS = 4  # of a stretch
 STEP = 0.03  # s between the rotations; rates are averaged over it
 LONGEST_STEP = 0.2  # s: with a longer gap a stretch is left out
-LIVE_PAUSE = 40.0  # s between two stretches of a live stream
+LIVE_PAUSE = 16.0  # s between two stretches of a live stream
 ALIKE = 1.1  # ratio of scatters that says nothing
 CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
 OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
+FEWEST = 3  # stretches: one that hardly turns says nothing
 LEAST = 0.005  # mean scatter of a stretch, of gravity squared, of a stream that turns too little
 SCALES = {"": 1.0, "half": 0.5, "double": 2.0, "deg/s": math.pi / 180.0, "millideg/s": math.pi / 180e3}
 
@@ -78,7 +79,7 @@ class Axes:
 
     def findings(self) -> list[Finding]:
         """Return what is odd."""
-        if not self._stretches or self._scatter.max() < LEAST * self._stretches:
+        if self._stretches < FEWEST or self._scatter.max() < LEAST * self._stretches:
             return []
         best, same_axes = self._likeliest(len(CANDIDATES)), self._likeliest(len(SCALES))
         if self._scatter[best] > OTHER_AXES * self._scatter[same_axes]:

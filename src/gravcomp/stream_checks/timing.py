@@ -44,8 +44,7 @@ class Timing:
         if self._older > 0:
             found.append(Finding("time_back", f"the time goes back {self._older:.0f} time(s): those samples are left out"))
         if self._gaps > 0.5:
-            held = "held" if self._longest <= 1.0 else "longer than 1 s: the inclination starts again"
-            found.append(Finding("gaps", f"samples are missing {self._gaps:.0f} time(s), up to {self._longest:.2f} s: {held}"))
+            found.append(Finding("gaps", f"samples are missing {self._gaps:.0f} time(s), up to {self._longest:.2f} s"))
         jitter = (self._square / max(self._even, 1.0)) ** 0.5
         if jitter > JITTER:
             found.append(Finding("jitter", f"the stamps jitter by {100 * jitter:.0f} % of the period, RMS"))
