@@ -140,10 +140,13 @@ def recording():
 
 @pytest.fixture(scope="module")
 def made(folder):
-    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once."""
+    """Return a function that runs a command with --brief; lines that differ only in the document they write to run once.
+
+    low: with lower priority.
+    """
 
     @functools.cache
-    def run(words: tuple[str, ...]) -> tuple[int, str]:
+    def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
         done = subprocess.run(
             [*words, "--brief"],
             cwd=folder,
@@ -151,12 +154,13 @@ def made(folder):
             text=True,
             timeout=1500,
             start_new_session=True,
-            preexec_fn=_give_way,
+            preexec_fn=_give_way if low else None,
         )
         return done.returncode, done.stderr + done.stdout
 
-    def made(line: str) -> tuple[int, str]:
-        return run(tuple(word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md")))
+    def made(line: str, low: bool) -> tuple[int, str]:
+        words = (word for word in documented(line) if word not in ("--brief", "--write") and not word.endswith(".md"))
+        return run(tuple(words), low)
 
     return made
 

@@ -14,6 +14,6 @@ pytestmark = pytest.mark.timeout(1600)
 )
 def test_experiments_are_reproduced(made, line, about):
     """Without --brief all of them take minutes. `test_figures_table` checks what --write does with a document."""
-    code, output = made(line)
+    code, output = made(line, low=True)  # also next to the graph of another test
     # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output

@@ -17,6 +17,7 @@ from gravcomp.config import declared_parameters, load_yaml
 from gravcomp.description import shipped_robots
 from gravcomp.description.hardware import Hardware
 from gravcomp.graph.nodes import NODES, node
+from gravcomp.virtual.parameters import VirtualRobotParameters
 
 # Values for the placeholders of the documents.
 PLACEHOLDERS = {"COMMAND": "demo", "S": "10", "N": "1"}
@@ -171,11 +172,12 @@ CURRENT = [name for name in NAMES if name != "CHANGELOG.md"]
 @pytest.mark.parametrize("name", CURRENT)
 def test_parameters_and_keys_exist(name):
     article = load_yaml(shipped_robots()["article"])
-    hardware = {f"hardware.{leaf.key}" for leaf in declared_parameters(Hardware)}
+    sections = (("hardware", Hardware), ("virtual_robot", VirtualRobotParameters))
+    declared = {f"{section}.{leaf.key}" for section, kind in sections for leaf in declared_parameters(kind)}
     for word in inline_of((ROOT / name).read_text()):
         if re.fullmatch(r"(inverse|prediction|calibration|filter|heater|lumen)\.[a-z_.]+", word):
             assert word in NODE_PARAMETERS, f"no parameter {word}"
-        if re.fullmatch(r"(robot|hardware|virtual_robot)\.[a-z_.]+", word) and word not in hardware:
+        if re.fullmatch(r"(robot|hardware|virtual_robot)\.[a-z_.]+", word) and word not in declared:
             section = article
             for key in word.split("."):
                 assert isinstance(section, dict) and key in section, f"no key {word}"
@@ -220,7 +222,7 @@ GLOSSARY = "src/doc/glossary.md"
 # Frames and words of ROS, and the name of the shipped robot.
 OTHER_NAMES = {"soft_base", "soft_tip", "soft_rest", "imu_link", "__ns", "stamp", "article"}
 # Keys with a default that no shipped robot file gives.
-DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time", "c01_ratio", "c20_ratio", "c30_ratio"}
+DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time", "prony", "fibres", "c01_ratio", "c20_ratio", "c30_ratio"}
 
 
 def glossary_names() -> list[str]:

@@ -107,7 +107,10 @@ class CanBridge(ManagedNode):
         file, p = self.robot_file, self.parameters
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         check_pairs(hardware, file.robot, file.source)
-        return hardware.on(p.interface, p.channel)
+        hardware = hardware.on(p.interface, p.channel)
+        for bus in hardware.all_buses:
+            file.require_motors(bus.interface)
+        return hardware
 
     def _command(self, message: CableCommand) -> None:
         stamp = message.header.stamp

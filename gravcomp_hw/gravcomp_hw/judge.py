@@ -136,13 +136,14 @@ class Judge(ManagedNode):
         residual = figures.residual(self._truth_tip, self._target, _STRAIGHT, counted_from, end)
         _, gravity = self._truth_gravity.between(counted_from, end)
         delays = 1e3 * np.array(self._delay.delays) if self._delay and self._delay.delays else None
+        seed = None if p.seed < 0 else p.seed
         error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
         return {
             "sag_mm": _mm(figures.sag(self._truth_tip, self._target, at_rest, released_until)),
             "residual_lateral_mm": _mm(residual and residual[0]),
             "residual_axial_mm": _mm(residual and residual[1]),
             "tip_error_with_mm": _mm(residual and float(np.hypot(*residual))),
-            "tip_error_without_mm": _mm(released_tip_error(self.robot_file, gravity, self._target)),
+            "tip_error_without_mm": _mm(released_tip_error(self.robot_file, gravity, self._target, seed)),
             "correlation": _rounded(figures.correlation(self._truth_tip, self._model_tip, self._begin, end), 5),
             "imu_rate_hz": _rounded(figures.rate(self._imu.between(counted_from, end)[0]), 2),
             "command_rate_hz": _rounded(figures.rate(self._commands.between(counted_from, end)[0]), 2),

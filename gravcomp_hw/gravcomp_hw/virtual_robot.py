@@ -16,13 +16,12 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from gravcomp.canbus.bus import BusError
-from gravcomp.config import ConfigError, from_mapping
-from gravcomp.description.hardware import parse_hardware
+from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
+from gravcomp.virtual.described import described
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
-from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.realtime import RealtimeRobot
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.truth import Truth
@@ -40,18 +39,15 @@ class VirtualRobotNode(ManagedNode):
 
     def configure(self) -> None:
         """Create the robot and the publishers. Raises ConfigError for a wrong robot file or recording."""
-        source = self.robot_file.source
-        hardware = parse_hardware(self.robot_file.section("hardware"), source=source, cables=self.robot_file.robot.cable_names)
-        parameters = from_mapping(
-            VirtualRobotParameters, self.robot_file.section("virtual_robot"), source=source, key="virtual_robot"
-        )
+        virtual = described(self.robot_file, None if self.parameters.seed < 0 else self.parameters.seed)
+        hardware, parameters = virtual.hardware, virtual.given
         if self.parameters.feedback_rate:
             motors = dataclasses.replace(parameters.motors, feedback_rate=self.parameters.feedback_rate)
             parameters = dataclasses.replace(parameters, motors=motors)
-        seed = parameters.seed if self.parameters.seed < 0 else self.parameters.seed
-        motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, seed)
+        motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
-        robot = VirtualRobot(parameters, self.robot_file.robot, hardware, seed, motion)
+        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion)
+        self.get_logger().info(robot.true.summary())
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)

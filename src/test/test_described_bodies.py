@@ -12,7 +12,10 @@ from gravcomp.mesh.refusal import well_shaped
 from gravcomp.mesh.tube import coarse_elements
 from gravcomp.report.described_robots import robots_on
 from gravcomp.view.backbone import rest_backbone
+from gravcomp.view.options import PageOptions
+from gravcomp.view.page import Page
 from gravcomp.view.skin import cable_skin, half_width
+from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.wall import lumen_skin, wall_skins
 
 PAGE = Path(__file__).resolve().parents[1] / "doc" / "bodies.md"
@@ -73,6 +76,17 @@ def test_cables_run_straight_between_disks():
     robot = ROBOTS["disks"]
     station = np.unique(cable_skin(robot, robot.cables[0]).station)
     assert station == pytest.approx(np.linspace(0.0, 1.0, 9))
+
+
+@pytest.mark.parametrize("name", ["bottle", "disks", "hook"])
+def test_the_live_page_shows_a_described_robot(name):
+    robot = ROBOTS[name]
+    page = Page(robot, PageOptions(port=8950))
+    names = page._server.scene._handle_from_node_name
+    page.show(Snapshot(time=0.0, backbone=rest_backbone(robot)))
+    page.close()
+    assert {"/robot/wall0", "/robot/rest0", "/robot/cable_c1"} <= set(names)
+    assert ("/robot/lumen" in names) == any(piece.lumens for piece in robot.pieces)
 
 
 def test_the_picture_is_drawn(tmp_path):

@@ -5,20 +5,30 @@ import math
 
 import numpy as np
 import pytest
-from virtual_article import article
+from virtual_article import article, given
 
 from gravcomp.description.hardware import Hardware, Motor
+from gravcomp.virtual.draw import draw
 from gravcomp.virtual.motors import TICK, MotorBank
-from gravcomp.virtual.parameters import Motors
+from gravcomp.virtual.true_robot import TrueMotors
 
+MOTORS = given().motors
 SPRING = np.full(6, 3000.0)
 
 
 def bank(slack=0.0, directions=(1,) * 6, **changes) -> MotorBank:
-    _, hardware = article()
+    robot, hardware = article()
     motors = tuple(dataclasses.replace(motor, direction=d) for motor, d in zip(hardware.motors, directions))
     hardware = dataclasses.replace(hardware, motors=motors)
-    return MotorBank(dataclasses.replace(Motors(), **changes), hardware, np.full(6, slack), np.random.default_rng(1))
+    parameters = dataclasses.replace(given(), motors=dataclasses.replace(MOTORS, **changes))
+    return MotorBank(draw(parameters, robot, hardware).motors, hardware, np.full(6, slack), np.random.default_rng(1))
+
+
+def same_motors(hardware: Hardware, **changes) -> TrueMotors:
+    """The article's motors, as many as the hardware has."""
+    common, count = dataclasses.replace(MOTORS, **changes), len(hardware.motors)
+    varying = ("torque_constant", "capstan_radius", "backlash", "load_friction")
+    return TrueMotors(*(np.full(count, getattr(common, name)) for name in varying), common)
 
 
 def run(motors, seconds, shortened=0.0):
@@ -36,7 +46,7 @@ def test_the_last_current_is_kept():
 
 
 def test_a_current_below_friction_does_not_move_and_above_does():
-    friction_current = Motors().friction_torque / (Motors().torque_constant / 36)
+    friction_current = MOTORS.friction_torque / (MOTORS.torque_constant / 36)
     motors = bank(slack=10.0, capstan_drag=0.0)
     motors.commanded[0], motors.commanded[1] = 0.9 * friction_current, 1.1 * friction_current
     run(motors, 0.5)
@@ -49,7 +59,7 @@ def test_cable_force_and_current_balance_at_the_capstan():
     motors.commanded[:] = 0.4
     run(motors, 3.0)
     tension = 3000.0 * motors.wound[0]
-    p = Motors()
+    p = MOTORS
     friction = p.friction_torque * 36 / p.capstan_radius
     wanted = (0.4 * p.torque_constant / p.capstan_radius - friction) / (1 + p.load_friction)
     # While winding in, friction takes part of the torque; after an overshoot the tension is larger.
@@ -70,7 +80,7 @@ def test_backlash_shows_only_when_the_cable_is_slack():
     assert motors.wound[0] == wound, "the gear turns inside its backlash"
     run(motors, 1.0)
     turned = angle - motors._rotor[0] / 36
-    assert wound - motors.wound[0] == pytest.approx((turned - backlash) * Motors().capstan_radius, rel=1e-6)
+    assert wound - motors.wound[0] == pytest.approx((turned - backlash) * MOTORS.capstan_radius, rel=1e-6)
 
     taut = bank(backlash=backlash)
     taut.commanded[0] = 0.4
@@ -79,7 +89,7 @@ def test_backlash_shows_only_when_the_cable_is_slack():
     taut.commanded[0] = 0.1
     run(taut, 0.3)
     turned = angle - taut._rotor[0] / 36
-    assert wound - taut.wound[0] == pytest.approx(turned * Motors().capstan_radius, abs=1e-9)
+    assert wound - taut.wound[0] == pytest.approx(turned * MOTORS.capstan_radius, abs=1e-9)
 
 
 def test_feedback_counts_the_rotor_wraps_at_8192_and_has_the_direction_of_the_motor():
@@ -99,7 +109,7 @@ def test_feedback_counts_the_rotor_wraps_at_8192_and_has_the_direction_of_the_mo
     assert wraps > 10
     assert travelled[0] > 0 > travelled[1]
     wound = motors.wound[:2] + 10.0
-    np.testing.assert_allclose(wound, abs(travelled) / 8192 / 36 * 2 * math.pi * Motors().capstan_radius, atol=1e-4)
+    np.testing.assert_allclose(wound, abs(travelled) / 8192 / 36 * 2 * math.pi * MOTORS.capstan_radius, atol=1e-4)
     assert motors.feedback()[0]["speed"] > 0 > motors.feedback()[1]["speed"]
 
 
@@ -107,7 +117,7 @@ def test_currents_beyond_ten_amperes_and_speeds_beyond_the_motors_are_not_reache
     motors = bank(slack=100.0)
     motors.commanded[:] = 32.0
     run(motors, 2.0)
-    assert motors.feedback()[0]["speed"] * 2 * math.pi / 60 < Motors().no_load_speed
+    assert motors.feedback()[0]["speed"] * 2 * math.pi / 60 < MOTORS.no_load_speed
     assert abs(motors.feedback()[0]["current"]) < 10.0
 
 
@@ -125,25 +135,25 @@ def test_a_stalled_rotor_does_not_turn_and_an_encoder_jumps():
 
 def test_a_motor_of_two_antagonists_pulls_one_at_a_time_and_carries_their_difference():
     hardware = Hardware(motors=(Motor("a", 1, pair="b", preload=1e-3),))
-    motors = MotorBank(dataclasses.replace(Motors(), load_friction=0.0), hardware, np.zeros(2), np.random.default_rng(1))
+    motors = MotorBank(same_motors(hardware, load_friction=0.0), hardware, np.zeros(2), np.random.default_rng(1))
     spring = np.full(2, 3000.0)
     for sign in (1.0, -1.0):
         motors.commanded[:] = 0.2 * sign
         motors.step(round(2.0 / TICK), np.zeros(2), spring)
         pulled, other = motors.wound if sign > 0 else motors.wound[::-1]
         force = spring[0] * (max(0.0, pulled) - max(0.0, other))
-        torque = Motors().torque_constant * 0.2
-        friction = Motors().friction_torque * hardware.drive.gear_ratio
-        assert force * Motors().capstan_radius == pytest.approx(torque, abs=1.1 * friction)
+        torque = MOTORS.torque_constant * 0.2
+        friction = MOTORS.friction_torque * hardware.drive.gear_ratio
+        assert force * MOTORS.capstan_radius == pytest.approx(torque, abs=1.1 * friction)
         assert pulled + other == pytest.approx(2e-3, abs=1e-12)
 
 
 def test_a_differential_adds_the_turns_of_its_motors():
     both = ({"b": 1.0}, {"b": -1.0})
     hardware = Hardware(motors=tuple(Motor("a", i + 1, also=also, differential=True) for i, also in enumerate(both)))
-    motors = MotorBank(Motors(), hardware, np.full(2, 10.0), np.random.default_rng(1))
+    motors = MotorBank(same_motors(hardware), hardware, np.full(2, 10.0), np.random.default_rng(1))
     motors.commanded[:] = [0.5, 0.2]
     motors.step(round(0.2 / TICK), np.zeros(2), np.full(2, 3000.0))
-    first, second = motors._capstan * Motors().capstan_radius
+    first, second = motors._capstan * MOTORS.capstan_radius
     assert first > second > 0.0
     assert motors.wound + 10.0 == pytest.approx([first + second, first - second])

@@ -5,48 +5,49 @@ import math
 
 import numpy as np
 import pytest
-from virtual_article import article, horizontal, reference_robot, with_body
+from virtual_article import article, horizontal, reference_robot, true_robot, with_body
 
-from gravcomp.config import ConfigError
-from gravcomp.description import MeshBody
 from gravcomp.references import calculix
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import equilibrium
-from gravcomp.virtual.forces import assemble
-from gravcomp.virtual.parameters import VirtualRobotParameters
-from gravcomp.virtual.rod import strains, tendon_lengths
+from gravcomp.virtual.forces import assemble, half_bandwidth
+from gravcomp.virtual.rod import strains
+from gravcomp.virtual.routing import tendon_lengths
 from gravcomp.virtual.se3 import advance, motion_exp, motion_log
 
 
 def rod(**changes):
-    return build_rod(reference_robot(), with_body(**({"density": 1150.0, "poissons_ratio": 0.45} | changes)))
+    return build_rod(true_robot(reference_robot(), with_body(**({"density": 1150.0, "poissons_ratio": 0.45} | changes))))
 
 
 def forces(model, orientation, position, tension):
     """Residual of the free cross-sections, band, gradient and path lengths at a state."""
     n, m = model.elements, model.tendons
-    strain, path, direction = np.empty((n, 6)), np.empty((m, n)), np.zeros((m, n, 3))
-    gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
+    strain, path = np.empty((n, 6)), np.empty((m, n))
+    direction, chord = model.scratch()
+    gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
+    band = np.empty((6 * n, 2 * half_bandwidth(model.routing.reach) + 1))
     strains(orientation, position, model.length, strain)
-    tendon_lengths(strain, model.length, model.tendon_offset, model.tendon_start, model.tendon_end, direction, path)
+    tendon_lengths(orientation, position, strain, model.length, model.routing, direction, chord, path)
     residual = assemble(
         orientation,
         model.length,
         strain,
+        model.rest_strain,
         model.stiffness,
         np.zeros((n, 6)),
         np.zeros(n),
         np.zeros(n),
         np.zeros((n, 2)),
-        model.tendon_offset,
-        model.tendon_start,
-        model.tendon_end,
+        model.routing,
         direction,
+        chord,
         path,
         tension,
         np.ones((m, n)),
         model.mass[:, None] * horizontal(),
+        model.centre,
         gradient,
         pull,
         band,
@@ -134,7 +135,8 @@ def test_one_tendon_bends_a_weightless_rod_into_a_circle_of_the_right_curvature(
     shape = equilibrium(model, np.zeros(3), tension=tension)
     strain = np.empty((model.elements, 6))
     strains(shape.orientation, shape.position, model.length, strain)
-    radius, bending, axial = float(np.linalg.norm(model.tendon_offset[4])), model.stiffness[5, 3], model.stiffness[5, 2]
+    radius = float(np.linalg.norm(model.routing.offset[4, 0]))
+    bending, axial = model.stiffness[5, 3, 3], model.stiffness[5, 2, 2]
     np.testing.assert_allclose(np.hypot(strain[1:, 3], strain[1:, 4]), 0.2 * radius / bending, rtol=0.01)
     np.testing.assert_allclose(strain[1:, 2], 1.0 - 0.2 / axial, atol=1e-4)
     shortened = 0.1 * (0.2 / axial + 0.2 * radius**2 / bending)
@@ -175,22 +177,10 @@ def test_an_equilibrium_is_found_for_every_gravity_and_displacement():
 def test_element_ends_meet_segments_caps_and_cables():
     robot, _ = article()
     model = build_rod(
-        dataclasses.replace(robot, segments=(robot.segments[0], dataclasses.replace(robot.segments[1], length=80e-3))),
-        VirtualRobotParameters(),
+        true_robot(dataclasses.replace(robot, segments=(robot.segments[0], dataclasses.replace(robot.segments[1], length=80e-3))))
     )
     np.testing.assert_allclose(model.length.sum(), 0.13)
     np.testing.assert_allclose(model.tendon_length, [0.05] * 3 + [0.13] * 3)
-
-
-def test_robots_that_a_rod_cannot_represent_are_refused():
-    robot, _ = article()
-    with pytest.raises(ConfigError, match="body from a file"):
-        build_rod(dataclasses.replace(robot, segments=(), cables=(), body=MeshBody("a.stl", 0.1)), VirtualRobotParameters())
-    bent = dataclasses.replace(
-        robot.cables[0], angle=None, radius=None, segment=None, via_points=((3e-3, 0.0, 0.0), (3e-3, 0.0, 0.05))
-    )
-    with pytest.raises(ConfigError, match=r"s1c1.*via_points_mm"):
-        build_rod(dataclasses.replace(robot, cables=(bent, *robot.cables[1:])), VirtualRobotParameters())
 
 
 def test_values_of_the_wrong_shape_are_refused():

@@ -4,11 +4,14 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.config import from_mapping
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.robot_file import load_robot_file
-from gravcomp.virtual.parameters import Body, VirtualRobotParameters
+from gravcomp.virtual.draw import draw
+from gravcomp.virtual.parameters import Tendons, VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
+from gravcomp.virtual.true_robot import TrueRobot
 
 GRAVITY = 9.81
 
@@ -24,8 +27,20 @@ def reference_robot() -> Robot:
     return dataclasses.replace(robot, segments=tuple(dataclasses.replace(s, lumen_diameter=3e-3) for s in robot.segments))
 
 
-def with_body(**changes) -> VirtualRobotParameters:
-    return VirtualRobotParameters(body=dataclasses.replace(Body(), **changes))
+def given() -> VirtualRobotParameters:
+    """What the article's robot file gives: nothing is drawn but the noise."""
+    file = load_robot_file("article")
+    return from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")
+
+
+def with_body(tendons: Tendons | None = None, **changes) -> VirtualRobotParameters:
+    parameters = given()
+    body = dataclasses.replace(parameters.body, **changes)
+    return dataclasses.replace(parameters, body=body, tendons=tendons or parameters.tendons)
+
+
+def true_robot(robot: Robot, parameters: VirtualRobotParameters | None = None) -> TrueRobot:
+    return draw(parameters or given(), robot, article()[1])
 
 
 def horizontal() -> np.ndarray:
@@ -35,4 +50,4 @@ def horizontal() -> np.ndarray:
 
 def virtual_robot(parameters: VirtualRobotParameters | None = None, **options) -> VirtualRobot:
     robot, hardware = article()
-    return VirtualRobot(parameters or VirtualRobotParameters(), robot, hardware, **options)
+    return VirtualRobot(parameters or given(), robot, hardware, **options)

@@ -19,6 +19,7 @@ from gravcomp.orientation.prediction import PredictionOptions
 from gravcomp.recordings.imu import Recording, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 from gravcomp.thermal import HeaterOptions
+from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.trials.yaw_drift import DURATION, ablation, board_samples
 from gravcomp.virtual.parameters import Board
 
@@ -158,7 +159,7 @@ def _thermal() -> dict:
     """Return the figures of heating the virtual board from 20 degC by 15 degC."""
     options = HeaterOptions(margin=0.5)
     samples = list(board_samples(Board(), options, 300.0, lambda t: 0.0, seed=1))
-    target = Board().thermal.ambient + options.rise
+    target = ThermalPlantOptions().ambient + options.rise
     temperature = np.array([s.true_temperature for s in samples])
     outside = np.flatnonzero(np.abs(temperature - target) > 0.5)
     return {

@@ -52,19 +52,26 @@ def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
     return dataclasses.replace(robot.with_material(youngs_modulus=parameters.youngs_modulus), cables=cables)
 
 
-def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardware: Hardware | None) -> None:
+def write_calibrated(
+    source: str | Path, target: str | Path, robot: Robot, hardware: Hardware | None, virtual_seed: int | None = None
+) -> None:
     """Write the robot's file `source` to `target` with the calibrated values of `robot` and, if given, `hardware`.
 
-    Comments and order are kept. Raises ConfigError if it cannot be written.
+    virtual_seed: of the virtual robot that was measured; the new file names `source` as its description, because a virtual robot
+    drawn around the calibrated values would be another one. Comments and order are kept. Raises ConfigError if it cannot be
+    written.
     """
     document = _document(source)
-    for entry, segment in zip(document["robot"]["segments"], robot.segments):
+    entries = document["robot"]["segments"] if robot.body is None else [document["robot"]["body"]]
+    for entry, calibrated in zip(entries, robot.materials):
         material = entry.setdefault("material", {})
-        material["youngs_modulus_mpa"] = round(segment.material.youngs_modulus * 1e-6, 5)
-        material["damping_time_ms"] = round(segment.material.damping_time * 1e3, 3)
-        if segment.material.creep_ratio:
-            material["creep_ratio"] = round(segment.material.creep_ratio, 5)
-            material["creep_time"] = round(segment.material.creep_time, 4)
+        material["youngs_modulus_mpa"] = round(calibrated.youngs_modulus * 1e-6, 5)
+        material["damping_time_ms"] = round(calibrated.damping_time * 1e3, 3)
+        if calibrated.creep_ratio:
+            material["creep_ratio"] = round(calibrated.creep_ratio, 5)
+            material["creep_time"] = round(calibrated.creep_time, 4)
+    if robot.body is not None and Path(target).resolve().parent != Path(source).resolve().parent:
+        entries[0]["file"] = robot.body.file  # relative to the source, another folder than the target's
     for entry, cable in zip(document["robot"].get("cables", []), robot.cables):
         if cable.axial_stiffness is not None:
             for described in ("material", "diameter_mm"):
@@ -79,6 +86,10 @@ def write_calibrated(source: str | Path, target: str | Path, robot: Robot, hardw
         for entry, motor in zip(motors.get("motors", []), hardware.motors):
             entry["offset_mm"] = round(motor.offset * 1e3, 4)
         motors.setdefault("drive", {})["capstan_radius_mm"] = round(hardware.drive.capstan_radius * 1e3, 5)
+    if virtual_seed is not None:
+        former = document.get("virtual_robot") or {}
+        origin = former.get("description") or str(Path(source).resolve())
+        document["virtual_robot"] = {"description": origin, "seed": virtual_seed}
     _write(document, target)
 
 

@@ -52,15 +52,13 @@ def fit_statics(
 ) -> StaticFit:
     """Fit to the windows; offsets, compliance and winding select what is fitted in addition to the modulus.
 
-    Raises MeasurementError if the windows cannot determine the modulus, and for a robot whose body comes from a file.
+    Raises MeasurementError if the windows cannot determine the modulus.
     """
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
-    if not robot.segments:
-        raise MeasurementError(f"robot '{robot.name}' has a body from a file; calibration needs segments")
     predictor = StaticPredictor(robot, windows)
-    initial = StaticParameters(robot.segments[0].material.youngs_modulus, np.zeros(len(robot.cables)), cable_compliance(robot))
+    initial = StaticParameters(robot.materials[0].youngs_modulus, np.zeros(len(robot.cables)), cable_compliance(robot))
     before = predictor.predict(initial)
     bends = np.linalg.norm(before.by_modulus, axis=1).max() * initial.youngs_modulus
     if bends < 5 * TIP_NOISE:

@@ -67,7 +67,7 @@ def fit_motion(
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
-    material = robot.segments[0].material
+    material = robot.materials[0]
     starts = {"damping_time": material.damping_time}
     ranges = {"damping_time": material.damping_time * np.array(_DAMPING_RANGE)}
     if modulus:
@@ -96,7 +96,7 @@ def fit_motion(
     variance = float((error**2).sum()) / freedom * (1 + rho) / (1 - rho)
     deviation = np.sqrt(np.diag(np.linalg.pinv(solution.jac.T @ solution.jac) * variance)) * student.ppf(0.975, freedom)
     fitted = all_of_them.robot_at(x)
-    final = fitted.segments[0].material
+    final = fitted.materials[0]
     half = {name: getattr(final, name) * float(width) for name, width in zip(all_of_them.names, deviation)}
     before = np.concatenate(mapper(_tip_course, [(robot, course) for course in courses])) - whole.measured
     return MotionFit(

@@ -34,7 +34,7 @@ class PosePredictor:
         """elements: mesh of the segments, instead of the robot's."""
         self.robot = robot if elements is None else dataclasses.replace(robot, elements=elements)
         self.poses = poses
-        material = robot.segments[0].material if robot.body is None else robot.body.material
+        material = robot.materials[0]
         self.modulus = material.youngs_modulus
         self._models: dict[tuple, _Model] = {}
 

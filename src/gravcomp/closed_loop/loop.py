@@ -31,6 +31,7 @@ from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.thermal import HeaterControl
+from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.virtual.motion import BaseMotion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
@@ -55,14 +56,14 @@ class ClosedLoop:
         """
         self.setup = setup
         self._virtual = VirtualRobot(
-            _truth(setup, warm and heating), setup.nominal, setup.hardware, seed=setup.seed, motion=motion
+            _truth(setup, warm and heating), setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion
         )
         self._bridge = Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
         # The first reading of a board that starts warm is not the ambient temperature.
-        ambient = setup.truth.board.thermal.ambient if warm else setup.estimator.heater.ambient
+        ambient = _thermal(setup).ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot)
         self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
@@ -213,7 +214,11 @@ def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:
     truth = setup.truth
     if not warm:
         return truth
-    heater, thermal = setup.estimator.heater, truth.board.thermal
+    heater, thermal = setup.estimator.heater, _thermal(setup)
     target = thermal.ambient + heater.rise if heater.target is None else heater.target
     thermal = dataclasses.replace(thermal, start=target)
     return dataclasses.replace(truth, board=dataclasses.replace(truth.board, thermal=thermal))
+
+
+def _thermal(setup: Setup) -> ThermalPlantOptions:
+    return setup.true_robot.board.thermal or ThermalPlantOptions()

@@ -1,6 +1,7 @@
 """Setup of an experiment: the robot in the model of the controller, and the virtual robot in place of the real one."""
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +11,19 @@ from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
+from gravcomp.virtual.described import described
+from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
+from gravcomp.virtual.true_robot import TrueRobot
 
 
 @dataclass(frozen=True)
 class Setup:
     """Model and virtual robot of one robot.
 
-    robot: the robot in model and controller; nominal: the robot from which the virtual robot is built, with the deviations in
-    `truth`. Both are equal unless a calibration changes `robot`.
+    robot, hardware: in model, controller and bridge; nominal, nominal_hardware: the description from which the virtual robot is
+    built, with what is given in `truth` and what `seed` draws. They are equal (hardware: None) unless a calibration changes
+    robot and hardware.
     """
 
     source: str
@@ -29,6 +34,7 @@ class Setup:
     estimator: ImuEstimatorParameters
     controller: InverseControllerParameters
     seed: int
+    nominal_hardware: Hardware | None = None
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
@@ -37,20 +43,31 @@ class Setup:
         def section(kind: type, name: str) -> Any:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
 
-        truth = from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")
+        virtual = described(file, seed)
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         check_pairs(hardware, file.robot, file.source)
         return cls(
             source=file.source,
             robot=file.robot,
-            nominal=file.robot,
-            truth=truth,
+            nominal=virtual.robot,
+            truth=virtual.given,
             hardware=hardware,
             estimator=section(ImuEstimatorParameters, "imu_estimator"),
             controller=section(InverseControllerParameters, "inverse_controller"),
-            seed=truth.seed if seed is None else seed,
+            seed=virtual.seed,
+            nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
         )
+
+    @property
+    def virtual_hardware(self) -> Hardware:
+        """Motors of the virtual robot, as described."""
+        return self.nominal_hardware or self.hardware
+
+    @functools.cached_property
+    def true_robot(self) -> TrueRobot:
+        """The virtual robot as it truly is. Raises ConfigError where `truth` describes no robot."""
+        return draw(self.truth, self.nominal, self.virtual_hardware, self.seed)
 
     def with_model(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
         """Return the same virtual robot with another model, and with the motor offsets of `hardware` where it is given."""
-        return dataclasses.replace(self, robot=robot, hardware=hardware or self.hardware)
+        return dataclasses.replace(self, robot=robot, hardware=hardware or self.hardware, nominal_hardware=self.virtual_hardware)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "data", metavar="DATA", help="CSV file or rosbag2 folder; 'virtual' measures the virtual robot of the robot file"
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
+    add_seed_argument(parser, "; with virtual")
     parser.add_argument("--write", metavar="YAML", help="calibrated robot file to write (default: NAME-calibrated.yaml)")
     parser.add_argument(
         "--out", metavar="DIR", default="reports", help="folder for the report page and its JSON (default: reports)"
@@ -80,7 +82,9 @@ def run(args: argparse.Namespace) -> int:
     file = load_robot_file(args.robot)
     if args.mapping:
         return _poses(args, file)
-    setup = Setup.of(file)
+    setup = Setup.of(file, seed_of(args))
+    if args.data == "virtual":
+        output.note(setup.true_robot.summary())
     prepare_model(args.robot)
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
     started = time.perf_counter()
@@ -113,10 +117,8 @@ def run(args: argparse.Namespace) -> int:
                     robot = motion.robot
         except (MeasurementError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
-    write_calibrated(file.source, target, robot, hardware)
-    result = calibration_result(
-        measured.source, str(target), statics, motion, courses, setup.robot.segments[0].material.damping_time
-    )
+    write_calibrated(file.source, target, robot, hardware, setup.seed if args.data == "virtual" else None)
+    result = calibration_result(measured.source, str(target), statics, motion, courses, setup.robot.materials[0].damping_time)
     if not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
     result.seconds = time.perf_counter() - started

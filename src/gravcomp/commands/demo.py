@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    add_seed_argument(parser)
     add_page_arguments(parser)
     parser.add_argument(
         "--screenshots",
@@ -59,9 +61,11 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.commands.page_pictures import PagePictures
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
+    from gravcomp.description import load_robot_file
     from gravcomp.launcher import Graph
     from gravcomp.launcher.domain import private_domain
     from gravcomp.launcher.robot_graph import LOOP, RobotGraph, private_channels
+    from gravcomp.virtual.described import described
 
     if not _SHORTEST <= args.duration <= 86400.0:
         raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
@@ -71,7 +75,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         raise ConfigError(
             f"--screenshots looks back over the run: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
         )
-    builder = prepare(args.robot, virtual=True)
+    builder = prepare(args.robot, virtual=True, seed=seed_of(args))
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
@@ -86,7 +90,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         compensated = relax_time + 0.75 * (compensate_until - relax_time)  # before the base turns
         moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
         pictures = PagePictures(Path(args.screenshots), moments)
-    graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), parameters={"virtual_robot": motion})
+    channels = private_channels(args.robot)
+    graph = RobotGraph(args.robot, "udp_multicast", channels, parameters={"virtual_robot": motion}, seed=args.seed)
     nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
@@ -117,6 +122,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             figures = {
                 **state["figures"],
                 "nodes": state["nodes"],
+                "seed": described(load_robot_file(args.robot), args.seed).seed,
                 "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
             }
     output.result(figures, _summary(figures))

@@ -8,13 +8,16 @@ from gravcomp.launcher.model_builder import ModelBuilder
 from gravcomp.launcher.robot_graph import check_robot_file
 
 
-def prepare(robot: str, virtual: bool) -> ModelBuilder:
+def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
     """Check the robot's file and compile what its nodes run, where that is not done yet. Raises ConfigError.
 
-    virtual: with the virtual robot. Returns the builder of the reduced model, a context manager. From its `start` on a process of
+    virtual: with the virtual robot, whose seed and drawn values are shown; seed: in place of the file's. Returns the builder of
+    the reduced model, a context manager. From its `start` on a process of
     low priority builds the model if it is missing, and the nodes use it as soon as it is stored.
     """
-    check_robot_file(robot)
+    summary = check_robot_file(robot, seed)
+    if virtual:
+        output.note(summary)
     _compile(virtual)
     return ModelBuilder(robot)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.experiments import EXPERIMENTS, MEASURED, experiment
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", metavar="DIR", default="reports", help="folder for the pages and JSON (default: reports)")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
-    parser.add_argument("--seed", type=int, help="seed of the virtual robot's noise (default: the robot file's)")
+    add_seed_argument(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="number of processes for sweeps (default: one per core)")
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
     parser.add_argument(
@@ -89,6 +90,8 @@ def run(args: argparse.Namespace) -> int:
     file = load_robot_file(args.robot)
     if args.bag:
         return _evaluate_bag(args, Setup.of(file), folder)
+    setup = Setup.of(file, seed_of(args))
+    output.note(setup.true_robot.summary())
     prepare_model(args.robot)
     results, pages = [], []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
@@ -96,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
         task = progress.add_task("starting")
         label = ""
         context = Context(
-            Setup.of(file, args.seed),
+            setup,
             sweep,
             lambda stage: progress.update(task, description=f"{label}: {stage}"),
             args.brief,

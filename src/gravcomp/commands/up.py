@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 
 if TYPE_CHECKING:
     from gravcomp.launcher.host_client import NodeHost
@@ -25,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--channel", default="", help="channel of the interface, e.g. can0; with several buses one each, by commas"
     )
     parser.add_argument("--virtual", action="store_true", help="start the virtual robot on the bus as well")
+    add_seed_argument(parser, "; with --virtual")
     parser.add_argument(
         "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
     )
@@ -45,17 +47,20 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
+    from gravcomp.description import load_robot_file
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
     if args.namespace and not args.namespace.startswith("/"):
         raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
-    builder = prepare(args.robot, args.virtual)
+    builder = prepare(args.robot, args.virtual, seed_of(args))
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
         # On the bus of the robot file, several virtual robots on one machine would receive each other's frames.
         interface, channel = "udp_multicast", private_channels(args.robot)
-    graph = RobotGraph(args.robot, interface, channel, args.namespace)
+    if interface and not args.virtual:
+        load_robot_file(args.robot).require_motors(interface)
+    graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
     specs = graph.loop()
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))

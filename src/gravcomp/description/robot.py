@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gravcomp.config import parameter
-from gravcomp.description.body import Elements
+from gravcomp.description.body import Elements, Material
 from gravcomp.description.cable import Cable
 from gravcomp.description.cable_line import CableLine
 from gravcomp.description.cable_path import check_crossings, check_path
@@ -126,6 +126,11 @@ class Robot:
                 before, here = piece.section(low)[0], piece.section(high)[0]
                 across, up = across * here.half_width / before.half_width, up * here.half_height / before.half_height
         return x * across, y * up
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """Materials of the segments from base to tip, without caps, or the one of the body from a file."""
+        return tuple(segment.material for segment in self.segments) if self.body is None else (self.body.material,)
 
     @property
     def cable_names(self) -> tuple[str, ...]:

@@ -6,7 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
+from gravcomp.description.default_hardware import has_motors, with_motors
 from gravcomp.description.robot import Robot
+
+IN_SOFTWARE = ("udp_multicast", "virtual")
+"""Interfaces of python-can without hardware."""
 
 SECTIONS = ("robot", "hardware", "virtual_robot", "nodes")
 
@@ -22,11 +26,21 @@ class RobotFile:
     def section(self, name: str) -> dict:
         """Return a top-level section as a plain mapping of edge keys; empty when the file does not have it.
 
-        Raises ConfigError when no section has this name.
+        Without `hardware.motors`, the section `hardware` has motors that follow from the robot, for the virtual robot (see
+        `require_motors`). Raises ConfigError when no section has this name.
         """
         if name not in SECTIONS:
             raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
-        return dict(self.sections.get(name) or {})
+        section = dict(self.sections.get(name) or {})
+        return section if name != "hardware" or has_motors(section) else with_motors(section, self.robot)
+
+    def require_motors(self, interface: str) -> None:
+        """Raise ConfigError for a file without motors on a bus (python-can's `interface`) that can carry real ones."""
+        if interface not in IN_SOFTWARE and not has_motors(dict(self.sections.get("hardware") or {})):
+            raise ConfigError(
+                f"{self.source}: key 'hardware.motors' is missing, which {interface} needs;"
+                f" without it, the robot can only be the virtual one ({', '.join(IN_SOFTWARE)})"
+            )
 
 
 def shipped_robots() -> dict[str, Path]:

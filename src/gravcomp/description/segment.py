@@ -115,15 +115,6 @@ class Segment:
         base, here = self.outline(0.0), self.outline(part)
         return here.half_width / base.half_width, here.half_height / base.half_height
 
-    def area(self, part: float) -> float:
-        """Return the area (m^2) of the section there."""
-        return self.outline(part).area - sum(lumen.area for lumen in self.lumen_outlines(part))
-
-    def contains(self, x: float, y: float, part: float) -> bool:
-        """Return whether the point (x, y) of the section there lies in the body, on its surface included."""
-        inside = self.outline(part).gauge(x, y) <= 1.0 + 1e-9
-        return inside and all(lumen.gauge(x, y) >= 1.0 - 1e-9 for lumen in self.lumen_outlines(part))
-
     def _size(self, key: str, base: float, tip: float | None, part: float) -> float:
         return size_at(key, base, tip, self.stations, self.length, part)
 

@@ -2,26 +2,22 @@
 
 import numpy as np
 
-from gravcomp.config import from_mapping
 from gravcomp.description import RobotFile
 
 # Number of directions of gravity of a run that are solved; its motion is slow compared with their distance.
 _DIRECTIONS = 40
 
 
-def released_tip_error(robot_file: RobotFile, gravity: np.ndarray, target: np.ndarray) -> float | None:
+def released_tip_error(robot_file: RobotFile, gravity: np.ndarray, target: np.ndarray, seed: int | None = None) -> float | None:
     """Return the RMS distance (m) of the released virtual robot's tip from `target` (3,) over the gravity (n, 3) m/s^2 of a run.
 
-    None without an equilibrium at any of them.
+    seed: of the virtual robot, in place of the file's. None without an equilibrium at any of the directions.
     """
     from gravcomp.virtual.body import build_rod
+    from gravcomp.virtual.described import described
     from gravcomp.virtual.equilibrium import NoEquilibrium, equilibrium
-    from gravcomp.virtual.parameters import VirtualRobotParameters
 
-    parameters = from_mapping(
-        VirtualRobotParameters, robot_file.section("virtual_robot"), source=robot_file.source, key="virtual_robot"
-    )
-    rod = build_rod(robot_file.robot, parameters)
+    rod = build_rod(described(robot_file, seed).draw())
     distances = []
     shape = None
     for direction in gravity[:: max(1, len(gravity) // _DIRECTIONS)]:

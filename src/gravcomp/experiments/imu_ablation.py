@@ -24,7 +24,7 @@ def run(context: Context) -> Result:
     """Run the experiment."""
     duration = DURATION / 9 if context.brief else DURATION
     jobs = [
-        (context.setup.truth.board, rate, heated, duration, context.setup.seed)
+        (context.setup.true_robot.board, rate, heated, duration, context.setup.seed)
         for _, rate in _MOTIONS
         for heated in (True, False)
     ]
@@ -77,7 +77,7 @@ def run(context: Context) -> Result:
             "duration_s": duration,
             "rest_s": REST,
             "rate_deg_s": float(np.degrees(RATE)),
-            "board": repr(context.setup.truth.board),
+            "board": repr(context.setup.true_robot.board),
         },
     )
 

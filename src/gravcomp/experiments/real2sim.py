@@ -108,8 +108,7 @@ def run(context: Context) -> Result:
             "damping time": f"{1e3 * fit.damping_time:.2f} ± {1e3 * fit.damping_interval:.2f} ms",
             "creep": f"{fit.creep_ratio:.4f} ± {fit.creep_ratio_interval:.4f} of the modulus within"
             f" {fit.creep_time:.3f} ± {fit.creep_time_interval:.3f} s",
-            "virtual robot": f"{setup.truth.body.youngs_modulus * 1e-6:g} MPa in the long term, creep"
-            f" {setup.truth.body.creep_ratio} over {setup.truth.body.creep_time} s",
+            "virtual robot": setup.true_robot.materials_in_words(),
             "duration_s": duration,
         },
         notes=[

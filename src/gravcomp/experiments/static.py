@@ -70,7 +70,7 @@ def run(context: Context) -> Result:
         parameters={
             "poses": [case.name for case in cases],
             "calibrated": {e.name: f"{e.value:.5g} +- {e.interval:.2g} {e.unit}" for e in calibrated.fit.estimates},
-            "virtual robot's modulus": f"{context.setup.truth.body.youngs_modulus * 1e-6:g} MPa",
+            "virtual robot": context.setup.true_robot.materials_in_words(),
             "seed": context.setup.seed,
         },
         notes=[

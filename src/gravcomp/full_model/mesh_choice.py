@@ -4,7 +4,6 @@ The error of a mesh is the distance of its tip from that of a mesh twice as fine
 loads of `mesh_loads`. It is estimated on coarse meshes: each direction alone is refined, the others staying as coarse as can be,
 its change of the tip is scaled to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the
 changes are added up. The direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`.
-Around the axis the comparison has twice as many elements, so that the cables keep their places in the elements.
 
 The choice is kept in the cache, by content. Young's moduli enter rounded down to steps of 19 %, so that a calibrated robot mostly
 has the mesh of the robot from which it was calibrated. `mesh_error` measures what is only estimated here.
@@ -28,7 +27,7 @@ from gravcomp.mesh.tube import coarse_elements, tube_mesh
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 2  # part of the key; to be raised when the choice changes
+_FORMAT = 3  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls.
@@ -132,9 +131,7 @@ def _change_to_twice(robot: Robot, tips: "_Tips", start: Elements, direction: st
     """
     order = _ORDER[direction]
     measured = number if direction == "along" else getattr(start, direction)
-    finer = 2 * measured
-    if direction == "along":
-        finer = _finer(robot, _with(robot, start, direction, measured), direction).along
+    finer = getattr(_finer(robot, _with(robot, start, direction, measured), direction), direction)
     change = tips.change(*(_with(robot, start, direction, value) for value in (measured, finer)))
     return change * (1.0 - 0.5**order) / (1.0 - (measured / finer) ** order) * (measured / number) ** order
 
@@ -197,7 +194,7 @@ def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
     parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
     disks = any(segment.disks for segment in robot.segments)
-    around = _around(robot, 4 if coarse_elements(robot).around == 8 else 1)
+    around = 4 if coarse_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
     # Between disks the layers are even; else they are graded towards the clamp, whose corner is singular.
     start = Elements(around=around, along=along, radial=1, grading=1.0, equal_stiffness=True)
@@ -207,17 +204,6 @@ def _start(robot: Robot) -> Elements:
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
     return shaped if disks else with_grading(robot, shaped)
-
-
-def _around(robot: Robot, multiple: int) -> int:
-    """The least number from 4 to 12 with an edge at every cable, a multiple of `multiple`; without any such number 6 or 8."""
-    angles = np.array([cable.angle for cable in robot.cables if cable.angle is not None])
-    first = math.pi / 4 if multiple == 4 else 0.0
-    for around in range(4 if multiple == 4 else 6, 13):
-        parts = (angles - first) * around / (2 * math.pi)
-        if around % multiple == 0 and np.abs(parts - np.rint(parts)).max(initial=0.0) < 1e-6:
-            return around
-    return 8 if multiple == 4 else 6
 
 
 def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
@@ -233,5 +219,5 @@ def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
 
 def _with(robot: Robot, elements: Elements, direction: str, number: int) -> Elements:
     """The elements with another number in a direction, and the grading that suits it."""
-    changed = dataclasses.replace(elements, **{direction: number})
+    changed = Elements(**(dataclasses.asdict(elements) | {direction: number}))
     return changed if any(segment.disks for segment in robot.segments) else with_grading(robot, changed)

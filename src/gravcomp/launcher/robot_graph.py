@@ -19,8 +19,8 @@ class RobotGraph:
     """Nodes of one robot.
 
     robot: name of a shipped robot or path of a robot file; interface, channel: CAN bus in place of the file's (with several buses
-    one channel each, separated by commas); namespace: of all
-    nodes; parameters: {executable: {parameter: value}} in addition to the robot file.
+    one channel each, separated by commas); namespace: of all nodes; parameters: {executable: {parameter: value}} in addition to
+    the robot file; seed: of the virtual robot, in place of the file's.
     """
 
     robot: str
@@ -28,6 +28,7 @@ class RobotGraph:
     channel: str = ""
     namespace: str = ""
     parameters: dict = field(default_factory=dict)
+    seed: int | None = None
 
     def loop(self) -> list[NodeSpec]:
         """Return the four nodes of the loop: bridge, estimator, simulator, controller."""
@@ -38,6 +39,8 @@ class RobotGraph:
         given: dict[str, Any] = {"robot": self.robot}
         if executable in ("can_bridge", "virtual_robot", "judge"):
             given.update({key: value for key, value in (("interface", self.interface), ("channel", self.channel)) if value})
+        if executable in ("virtual_robot", "judge") and self.seed is not None:
+            given["seed"] = self.seed
         given.update(self.parameters.get(executable, {}))
         given.update(parameters)
         return NodeSpec(package, executable, given, self.namespace)
@@ -54,15 +57,17 @@ def private_channels(robot: str) -> str:
     return ",".join(private_channel() for _ in hardware.all_buses)
 
 
-def check_robot_file(robot: str) -> None:
-    """Check every section of a robot file before any process starts. Raises ConfigError."""
-    from gravcomp.config import from_mapping
+def check_robot_file(robot: str, seed: int | None = None) -> str:
+    """Check every section of a robot file before any process starts. Raises ConfigError.
+
+    Returns what the virtual robot is, in one sentence; `seed` replaces the file's.
+    """
     from gravcomp.description import load_robot_file
     from gravcomp.description.hardware import parse_hardware
     from gravcomp.description.pairs import check_pairs
-    from gravcomp.virtual.parameters import VirtualRobotParameters
+    from gravcomp.virtual.described import described
 
     file = load_robot_file(robot)
     hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
     check_pairs(hardware, file.robot, file.source)
-    from_mapping(VirtualRobotParameters, file.section("virtual_robot"), source=file.source, key="virtual_robot")
+    return described(file, seed).draw().summary()

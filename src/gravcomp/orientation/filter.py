@@ -51,6 +51,8 @@ class OrientationFilter:
         self._rest = RestDetector(self.options.rest)
         spikes = self.options.spikes
         self._gyro_gate, self._accel_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO), SpikeGate(spikes.accel, spikes, SURE_ACCEL)
+        self._before_suspects: tuple | None = None  # state before the first sample that is not decided
+        self._undecided: list[list] = []  # arguments of the steps since then
         self._errors = ErrorCovariance()
         self.reset()
 

@@ -1,6 +1,7 @@
 """One odd thing of a stream, and a block of samples in which it is looked for."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -34,3 +35,17 @@ class Block:
     accel: np.ndarray  # (n, 3), as recorded
     period: float  # s, median step
     steps: np.ndarray  # (n or n - 1,) s, from the sample before
+
+
+class Check(Protocol):
+    """One kind of check over the blocks of a stream."""
+
+    def forget(self, keep: float) -> None:
+        """Let what was seen so far count only `keep` (0 to 1) times as much."""
+
+    def take(self, block: Block) -> None:
+        """Look at a block."""
+
+    def findings(self) -> list[Finding]:
+        """Return what is odd so far."""
+        ...

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.stream_checks.axes import Axes
-from gravcomp.stream_checks.finding import Block, Finding
+from gravcomp.stream_checks.finding import Block, Check, Finding
 from gravcomp.stream_checks.resting import Resting
 from gravcomp.stream_checks.spikes import Spikes
 from gravcomp.stream_checks.timing import Timing
@@ -30,9 +30,8 @@ class StreamMonitor:
         self._accel: list[Sequence[float]] = []
         self._last_ns: int | None = None
         self._period = 0.0
-        self._resting, self._axes = Resting(), Axes()
-        self._timing, self._spikes = Timing(), Spikes()
-        self._values = [Values("gyro"), Values("accel")]
+        self._resting = Resting()
+        self._checks: tuple[Check, ...] = (Axes(), self._resting, Spikes(), Values("gyro"), Values("accel"), Timing())
         self._current: list[Finding] | None = None
 
     @property
@@ -65,7 +64,7 @@ class StreamMonitor:
             return
         block = Block(stamp_ns, gyro, accel, self._period, steps)
         keep = math.exp(-len(stamp_ns) * self._period / self._memory)
-        for check in (self._timing, self._spikes, *self._values, self._resting, self._axes):
+        for check in self._checks:
             if keep < 1.0:
                 check.forget(keep)
             check.take(block)
@@ -74,7 +73,6 @@ class StreamMonitor:
     def findings(self) -> list[Finding]:
         """Return what is odd, the worst first."""
         if self._current is None:
-            checks = (self._axes, self._resting, self._spikes, *self._values, self._timing)
-            found = [finding for check in checks for finding in check.findings()]
+            found = [finding for check in self._checks for finding in check.findings()]
             self._current = sorted(found, key=lambda finding: not finding.fatal)
         return self._current

@@ -1,4 +1,4 @@
-"""Free fall of the virtual robot: straight and at rest at first, with released cables and a base at rest."""
+"""Free fall of the virtual robot: unloaded and at rest at first, with released cables and a base at rest."""
 
 from collections.abc import Iterator
 
@@ -48,10 +48,11 @@ def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tup
 
     base (3, 3): world from soft_base; duration in s.
     """
-    model = build_rod(setup.nominal, setup.truth)
-    rod = MovingRod(model, build_material(model, setup.truth), build_friction(setup.nominal, setup.truth))
+    true = setup.true_robot
+    model = build_rod(true)
+    rod = MovingRod(model, build_material(model, true), build_friction(true))
     none = np.zeros(model.tendons)
-    rod.rest(RodShape(*model.straight(), tension=none, displacement=none, iterations=0), base, np.zeros(3))
+    rod.rest(RodShape(*model.unloaded(), tension=none, displacement=none, iterations=0), base, np.zeros(3))
     # Copies: the rod updates its arrays in place.
     yield rod.position.copy(), rod.orientation.copy()
     world_gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])

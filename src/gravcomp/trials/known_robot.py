@@ -78,7 +78,7 @@ def recover(context: Context) -> list[Recovered]:
 
 def known_setup(setup: Setup, modulus: float) -> Setup:
     """Return a virtual robot with the model's material law and this module's parameters, without creep and friction."""
-    material, truth = setup.robot.segments[0].material, setup.truth
+    material, truth = setup.robot.materials[0], setup.truth
     body = dataclasses.replace(
         truth.body, youngs_modulus=modulus, poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(0.0,),
         creep_time=(1.0,), damping_time=DAMPING_TIME, slip_ratio=0.0,
@@ -89,7 +89,7 @@ def known_setup(setup: Setup, modulus: float) -> Setup:
 
 def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES) -> StillWindows:
     """Return tips at rest of the known robot: released, and with each cable pulled in, in each pose (inclination, roll, deg)."""
-    rod, random = build_rod(setup.nominal, setup.truth), np.random.default_rng(setup.seed)
+    rod, random = build_rod(setup.true_robot), np.random.default_rng(setup.seed)
     count, rows = rod.tendons, []
     for inclination, roll in poses:
         gravity = base_orientation(np.radians(inclination), np.radians(roll)).T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])

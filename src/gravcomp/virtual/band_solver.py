@@ -1,7 +1,7 @@
 """Solution of the rod's linear systems: a band matrix plus one update of rank one for each tendon, compiled.
 
 The band comes from `assemble` of forces.py: each cross-section couples with its two neighbours, which makes 11 diagonals on
-either side.
+either side, and more where chords of tendons reach over several elements.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from numba import njit
 
 @njit(cache=True, error_model="numpy")
 def solve(band: np.ndarray, right_sides: np.ndarray) -> None:
-    """Solve in place: band (N, 23) holds a matrix with 11 diagonals on either side, right_sides (N, r) becomes the solution.
+    """Solve in place: band (N, 2 w + 1) holds a matrix with w diagonals on either side, right_sides (N, r) becomes the solution.
 
     There is no pivoting: the tangent at a stable equilibrium is positive definite, and inertia adds to that.
     """
-    size, width, columns = band.shape[0], 11, right_sides.shape[1]
+    size, width, columns = band.shape[0], band.shape[1] // 2, right_sides.shape[1]
     for k in range(size):
         pivot = 1.0 / band[k, width]
         last = min(size, k + width + 1)

@@ -1,4 +1,4 @@
-"""The virtual IMU board: a BMI088 with its errors, the heater, and the frames that the board sends (canbus/FRAMES.md).
+"""The virtual IMU board: an IMU with its errors, the heater, and the frames that the board sends (canbus/FRAMES.md).
 
     counts = round(((1 + s) C^T x + b + d (T - 25 degC) + noise) / scale), limited to int16
 

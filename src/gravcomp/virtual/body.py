@@ -1,12 +1,7 @@
-"""Data of the rod from the description of the robot and the parameters of the virtual robot.
+"""Data of the rod from the true robot: its sections, masses, tendons and material.
 
-Stiffness of a tube: E A, E I, G J with J = 2 I, and the shear stiffness k G A with Cowper's coefficient for hollow circles
-(G. R. Cowper, "The shear coefficient in Timoshenko's beam theory", J. Appl. Mech. 33, 1966):
-
-    k = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2),   m = inner / outer radius
-
-A clamped face cannot contract across the axis, which stiffens the tube next to it. Compared with three-dimensional finite
-elements (CalculiX) this has the effect of a clamp that lies 0.39 nu^2 R_o farther along the axis.
+A clamped face cannot contract across the axis, which stiffens the body next to it. Compared with three-dimensional finite
+elements (CalculiX) this has the effect of a clamp that lies 0.39 nu^2 h farther along the axis, h half the height of the section.
 """
 
 import math
@@ -14,116 +9,171 @@ import math
 import numpy as np
 
 from gravcomp.config import ConfigError
-from gravcomp.description import Cable, Robot
-from gravcomp.virtual.lines import true_lines
+from gravcomp.description import PointLoad, Robot
+from gravcomp.mesh.mesh import MeshError
+from gravcomp.mesh.pieces import rest_axis
+from gravcomp.rest_axis import RestAxis
 from gravcomp.virtual.material import RodMaterial
-from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.rod import RodModel
+from gravcomp.virtual.stretches import Stretch, stretches_of
 from gravcomp.virtual.tendon_friction import TendonFriction
+from gravcomp.virtual.true_robot import TrueRobot
+from gravcomp.virtual.ways import element_marks, routing_of
 
 _CLAMP_COEFFICIENT = 0.39
+_CLAMP_REACH = 2.5  # times the shift of the clamp: the elements over which it is spread
+_LARGEST_TURN = 0.15  # rad by which an element is bent at rest
+_FIRST_BENDING = 3.516  # squared wave number of a cantilever times its length squared
 
 
-def build_rod(robot: Robot, parameters: VirtualRobotParameters) -> RodModel:
-    """Return the rod model. Raises ConfigError for a body from a file and for cables through via points."""
-    if robot.body is not None:
-        raise ConfigError(f"robot '{robot.name}' has a body from a file; the virtual robot needs segments")
-    for segment in robot.segments:
-        if not segment.plain:
-            raise ConfigError(
-                f"segment '{segment.name}': the virtual robot needs round segments, straight at rest, of constant section,"
-                " without lumens off the axis and without disks"
-            )
-    for cable in robot.cables:
-        if cable.via_points is not None or cable.tip_radius is not None:
-            raise ConfigError(
-                f"cable '{cable.name}' runs through via_points_mm or has tip_radius_mm;"
-                " the virtual robot needs angle_deg and radius_mm"
-            )
-    ends = _element_ends(robot, parameters.body.element_length)
-    length = np.diff(ends)
+def build_rod(true: TrueRobot) -> RodModel:
+    """Return the rod model. Raises ConfigError for a body from a file that has no section somewhere, or cannot be read."""
+    robot = true.robot
+    try:
+        axis, stretches = rest_axis(robot), stretches_of(robot)
+    except MeshError as error:
+        raise ConfigError(str(error)) from error
+    loads = [(load, *_place(robot, axis, load)) for load in robot.loads]
+    ends = _element_ends(true, axis, stretches, [s for _, s, _ in loads])
+    length, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
     n = len(length)
-    stiffness, line_density, line_inertia = np.empty((n, 6)), np.empty(n), np.empty((n, 3))
-    for e, middle in enumerate((ends[1:] + ends[:-1]) / 2):
-        stiffness[e], line_density[e], line_inertia[e] = _section(robot, parameters, middle)
-    outer = robot.segments[0].outer_diameter / 2
-    clamp = _CLAMP_COEFFICIENT * parameters.body.poissons_ratio**2 * outer
-    stiffness[0, 3:5] *= length[0] / max(length[0] - clamp, 0.2 * length[0])
-
-    mass, inertia = np.zeros(n + 1), np.zeros((n + 1, 3))
-    for side in (slice(0, n), slice(1, n + 1)):
-        mass[side] += line_density * length / 2
-        inertia[side] += line_inertia * length[:, None] / 2
-        inertia[side, :2] += (line_density * length**3 / 24)[:, None]
+    stiffness, rest_strain = np.empty((n, 6, 6)), np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (n, 1))
+    mass, moment, inertia = np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
+    for e, z in enumerate(middle):
+        stretch = _at(stretches, z)
+        section, material = stretch.section(z), stretch.material
+        stiffness[e] = section.stiffness(material.youngs_modulus, material.poissons_ratio, stretch.axial_modulus)
+        rest_strain[e, 3:5] = _curvature(axis, z)
+        half = material.density * section.area * length[e] / 2
+        across = np.diag([1.0, 1.0, 0.0]) * half * length[e] ** 2 / 12
+        for k in (e, e + 1):
+            mass[k] += half
+            moment[k, :2] += half * np.array(section.centroid)
+            inertia[k] += section.inertia(material.density) * length[e] / 2 + across
+    _stiffen_clamp(stretches[0], length, stiffness)
+    _add_disks(robot, ends, mass, inertia)
+    for load, s, offset in loads:
+        k = _nearest(ends, s)
+        mass[k] += load.mass
+        moment[k] += load.mass * offset
+        inertia[k] += load.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     mass[-1] += robot.payload.mass
-    offset, start, end, spring = _tendons(robot, parameters, ends)
-    return RodModel(length, stiffness, mass, inertia, offset, start, end, spring)
+    centre = moment / np.maximum(mass, 1e-300)[:, None]
+    lines = true.cables
+    inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
+    spring = lines.axial_stiffness / (lines.free_length + inside)
+    return RodModel(length, stiffness, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring)
 
 
-def build_material(model: RodModel, parameters: VirtualRobotParameters) -> RodMaterial:
-    """Return damping, creep and slip of the material."""
-    body = parameters.body
-    slip = body.slip_ratio * model.stiffness[:, 3]
-    return RodMaterial(np.array(body.creep_ratio), np.array(body.creep_time), body.damping_time, slip, slip * body.slip_curvature)
+def build_material(model: RodModel, true: TrueRobot) -> RodMaterial:
+    """Return damping, creep and slip of the material.
+
+    A damping that is not given is the class's share of the critical one in the first bending motion, and the curvature at which
+    the frictional branch slips that of the class's strain in the outer fibre.
+    """
+    stretches = stretches_of(true.robot)
+    ends = model.station * true.robot.length
+    middle = (ends[1:] + ends[:-1]) / 2
+    found = [_at(stretches, z) for z in middle]
+    materials = [true.materials[stretch.index] for stretch in found]
+    branches = max(len(material.creep_ratio) for material in materials)
+    ratio, time = np.zeros((model.elements, branches)), np.ones((model.elements, branches))
+    damping, slip, moment = (np.empty(model.elements) for _ in range(3))
+    frequency = first_frequency(model)
+    bending = 0.5 * (model.stiffness[:, 3, 3] + model.stiffness[:, 4, 4])
+    for e, (stretch, material) in enumerate(zip(found, materials)):
+        k = len(material.creep_ratio)
+        ratio[e, :k], time[e, :k] = material.creep_ratio, material.creep_time
+        own = 2.0 * material.damping_factor * material.kind.damping / frequency
+        damping[e] = own if material.damping_time is None else material.damping_time
+        section = stretch.section(middle[e])
+        curvature = material.slip_curvature or material.slip_strain / max(section.half_width, section.half_height)
+        slip[e] = material.slip_ratio * bending[e]
+        moment[e] = slip[e] * curvature
+    return RodMaterial(ratio, time, damping, slip, moment)
 
 
-def build_friction(robot: Robot, parameters: VirtualRobotParameters) -> TendonFriction:
+def build_friction(true: TrueRobot) -> TendonFriction:
     """Return the friction of the tendons."""
-    lines = true_lines(robot, parameters.tendons)
-    return TendonFriction(lines.friction, lines.guide_angle, parameters.tendons.presliding)
+    return TendonFriction(true.cables.friction, true.cables.guide_angle, true.cables.presliding)
 
 
-def _element_ends(robot: Robot, longest: float) -> np.ndarray:
-    """Return the positions (n + 1,) of the element ends along the axis; every end of a segment, cap or cable is one."""
-    marks = {0.0}
-    for segment in robot.segments:
-        marks |= {max(marks) + segment.length, max(marks) + segment.full_length}
-    for cable in robot.cables:
-        marks |= {cable.start, robot.cable_end(cable)}
-    rounded = sorted(round(mark, 9) for mark in marks)
-    distinct = [a for a, b in zip(rounded, [*rounded[1:], math.inf]) if b - a > 1e-6]
-    ends = [
-        np.linspace(a, b, max(1, math.ceil((b - a) / longest - 1e-9)), endpoint=False) for a, b in zip(distinct, distinct[1:])
-    ]
+def first_frequency(model: RodModel) -> float:
+    """Return the first angular frequency (rad/s) of a uniform cantilever that is as soft and heavy as the rod on average."""
+    length = float(model.length.sum())
+    compliance = float((model.length / np.minimum(model.stiffness[:, 3, 3], model.stiffness[:, 4, 4])).sum())
+    # A mass at the tip counts four times as much as one that is spread over the length.
+    mass = float((model.mass[:-1]).sum() + 4.0 * max(model.mass[-1] - model.mass[-2], 0.0) + model.mass[-2])
+    return _FIRST_BENDING / math.sqrt(length * compliance * length * max(mass, 1e-9))
+
+
+def _curvature(axis: RestAxis, s: float) -> tuple[float, float]:
+    """Curvature at rest at the arc length s (m), about x and about y (rad/m)."""
+    start = 0.0
+    for arc in axis.arcs:
+        start += arc.length
+        if s < start or arc is axis.arcs[-1]:
+            bend = arc.angle / arc.length
+            return -bend * math.sin(arc.plane), bend * math.cos(arc.plane)
+    return 0.0, 0.0
+
+
+def _at(stretches: list[Stretch], z: float) -> Stretch:
+    return next((stretch for stretch in stretches if z < stretch.start + stretch.length), stretches[-1])
+
+
+def _nearest(ends: np.ndarray, z: float) -> int:
+    return int(np.argmin(np.abs(ends - z)))
+
+
+def _element_ends(true: TrueRobot, axis: RestAxis, stretches: list[Stretch], more: list[float]) -> np.ndarray:
+    """Return the arc lengths (n + 1,) of the element ends; every end of a stretch or cable, disk and load is one."""
+    robot = true.robot
+    close = 1e-5 * robot.length
+    arcs = np.cumsum([arc.length for arc in axis.arcs]).tolist()
+    marks = sorted({0.0, robot.length, *(stretch.start for stretch in stretches), *arcs[:-1], *element_marks(robot), *more})
+    distinct = [a for a, b in zip(marks, [*marks[1:], math.inf]) if b - a > close]
+    ends = []
+    for a, b in zip(distinct, distinct[1:]):
+        turn = math.hypot(*_curvature(axis, (a + b) / 2)) * (b - a)
+        count = max(1, math.ceil((b - a) / true.element_length - 1e-6), math.ceil(turn / _LARGEST_TURN))
+        ends.append(np.linspace(a, b, count, endpoint=False))
     return np.append(np.concatenate(ends), distinct[-1])
 
 
-def _section(robot: Robot, parameters: VirtualRobotParameters, z: float) -> tuple[list[float], float, list[float]]:
-    """Return stiffness (6,), mass and rotational inertia (3,) per metre of the cross-section at z m."""
-    start = 0.0
+def _stiffen_clamp(stretch: Stretch, length: np.ndarray, stiffness: np.ndarray) -> None:
+    """Stiffen the bending of the first elements, so that their compliance is that of a length shorter by the clamp's shift."""
+    section = stretch.section(stretch.start)
+    scale = np.ones(6)
+    for axis, half in ((3, section.half_height), (4, section.half_width)):
+        shift = _CLAMP_COEFFICIENT * stretch.material.poissons_ratio**2 * half
+        count = int(np.searchsorted(np.cumsum(length), _CLAMP_REACH * shift) + 1)
+        reach = float(length[:count].sum())
+        scale[axis] = math.sqrt(reach / max(reach - shift, 0.2 * reach))
+        rows = stiffness[:count]
+        rows[:, axis, :] *= scale[axis]
+        rows[:, :, axis] *= scale[axis]
+
+
+def _add_disks(robot: Robot, ends: np.ndarray, mass: np.ndarray, inertia: np.ndarray) -> None:
+    base = 0.0
     for segment in robot.segments:
-        if z < start + segment.full_length:
-            break
-        start += segment.full_length
-    body = parameters.body
-    modulus, nu, density, inner = body.youngs_modulus, body.poissons_ratio, body.density, segment.lumen_diameter / 2
-    if segment.cap and z > start + segment.length:
-        cap = segment.cap.material
-        modulus, nu, density, inner = cap.youngs_modulus, cap.poissons_ratio, cap.density, 0.0
-    outer = segment.outer_diameter / 2
-    area, second = math.pi * (outer**2 - inner**2), math.pi / 4 * (outer**4 - inner**4)
-    m2 = (inner / outer) ** 2
-    cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
-    shear = modulus / (2 * (1 + nu))
-    stiffness = [cowper * shear * area] * 2 + [modulus * area] + [modulus * second] * 2 + [2 * shear * second]
-    return stiffness, density * area, [density * second, density * second, 2 * density * second]
+        if segment.disks:
+            for height in segment.disks.heights(segment.length):
+                k = _nearest(ends, base + height)
+                one = segment.disks.mass_of(segment.outline(height / segment.length).area)
+                across = one * (segment.disks.outer_diameter**2 / 16 + segment.disks.thickness**2 / 12)
+                mass[k] += one
+                inertia[k] += np.diag([across, across, one * segment.disks.outer_diameter**2 / 8])
+        base += segment.full_length
 
 
-def _tendons(robot: Robot, parameters: VirtualRobotParameters, ends: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return offset (m, 3) m, first element (m,), the element after the last (m,) and stiffness (m,) N/m of each tendon."""
-
-    def element_at(z: float) -> int:
-        return int(np.argmin(np.abs(ends - z)))
-
-    def offset(cable: Cable) -> list[float]:
-        assert cable.radius is not None and cable.angle is not None  # `build_rod` refused via points
-        radius, angle = cable.radius + tendons.radius_offset, cable.angle + tendons.angle_offset
-        return [radius * math.cos(angle), radius * math.sin(angle), 0.0]
-
-    tendons = parameters.tendons
-    start = np.array([element_at(cable.start) for cable in robot.cables], dtype=np.int64)
-    end = np.array([element_at(robot.cable_end(cable)) for cable in robot.cables], dtype=np.int64)
-    inside = np.array([robot.cable_end(cable) - cable.start for cable in robot.cables])
-    offsets = np.array([offset(cable) for cable in robot.cables]).reshape(-1, 3)
-    lines = true_lines(robot, tendons)
-    return offsets, start, end, lines.stiffness / (lines.free_length + inside)
+def _place(robot: Robot, axis: RestAxis, load: PointLoad) -> tuple[float, np.ndarray]:
+    """Return the arc length (m) of the section that a load hangs from, and its place (3,) m in the section."""
+    at = np.array(load.at)
+    stations = np.linspace(0.0, robot.length, 2001)
+    position, orientation = axis.frames(stations)
+    ahead = np.abs(np.einsum("ni,ni->n", at - position, orientation[:, :, 2]))
+    best = int(np.argmin(np.linalg.norm(at - position, axis=1) + 1e3 * ahead))
+    offset = orientation[best].T @ (at - position[best])
+    return float(stations[best]), np.array([offset[0], offset[1], 0.0])

@@ -4,8 +4,10 @@ import numpy as np
 
 from gravcomp.virtual.backbone import backbone_poses
 from gravcomp.virtual.equilibrium import RodShape
+from gravcomp.virtual.forces import half_bandwidth
 from gravcomp.virtual.material import RodMaterial
-from gravcomp.virtual.rod import RodModel, strains, tendon_lengths
+from gravcomp.virtual.rod import RodModel, strains
+from gravcomp.virtual.routing import tendon_lengths
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
 from gravcomp.virtual.time_step import MOST_ITERATIONS, time_step
 
@@ -14,23 +16,24 @@ class MovingRod:
     """State of the moving rod. The arrays are changed in place by each step."""
 
     def __init__(self, model: RodModel, material: RodMaterial, friction: TendonFriction):
-        """Start straight and at rest, the base at the origin, the tendons slack."""
+        """Start unloaded and at rest, the base at the origin, the tendons slack."""
         self.model, self.material, self.friction = model, material, friction
-        n, m, k = model.elements, model.tendons, len(material.branch_time)
-        self.orientation, self.position = model.straight()
+        n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
+        self.orientation, self.position = model.unloaded()
         self.velocity = np.zeros((n + 1, 6))
         self._acceleration, self._velocity_rate = np.zeros((n + 1, 6)), np.zeros((n + 1, 6))
-        self._branch_strain = np.zeros((k, n, 6))
-        self._branch_strain[:, :, 2] = 1.0
-        self._slip_strain = np.zeros((n, 2))
+        self._branch_strain = np.tile(model.rest_strain, (k, 1, 1))
+        self._slip_strain = model.rest_strain[:, 3:5].copy()
         self.strain = np.zeros((n, 6))
         self._sliding = np.zeros((m, n + 1))  # the guide first
         self._path = np.zeros((m, n))
         self._wound = np.zeros(m)
         self.tension = np.zeros(m)  # N, at the capstan
-        self.shortened = np.zeros(m)  # m, by how much the tendons' paths are shorter than in the straight rod
+        self.shortened = np.zeros(m)  # m, by how much the tendons' paths are shorter than in the unloaded rod
         self._compliance = np.zeros(m)  # m/N, of the tendons' paths within one step
         self.tendon_stiffness = model.tendon_stiffness.copy()  # N/m; 0: the tendon is broken
+        self._direction, self._chord = model.scratch()
+        self._band = np.empty((6 * n, 2 * half_bandwidth(model.routing.reach) + 1))
         self._measure()
 
     def along(self, station: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -61,8 +64,8 @@ class MovingRod:
             self.strain,
             self.model.length,
             self._sliding,
-            self.model.tendon_start,
-            self.model.tendon_end,
+            self.model.routing.start,
+            self.model.routing.end,
             friction.coefficient,
             friction.guide_angle,
         )
@@ -114,11 +117,11 @@ class MovingRod:
             self._compliance,
             model.length,
             model.stiffness,
+            model.rest_strain,
             model.mass,
+            model.centre,
             model.inertia,
-            model.tendon_offset,
-            model.tendon_start,
-            model.tendon_end,
+            model.routing,
             model.tendon_length,
             self.tendon_stiffness,
             material.branch_ratio,
@@ -129,6 +132,10 @@ class MovingRod:
             friction.coefficient,
             friction.guide_angle,
             friction.presliding,
+            model.tolerances,
+            self._direction,
+            self._chord,
+            self._band,
         )
         self._wound[:] = wound
         if not possible:
@@ -146,9 +153,8 @@ class MovingRod:
     def _measure(self) -> None:
         model = self.model
         strains(self.orientation, self.position, model.length, self.strain)
-        direction = np.zeros((model.tendons, model.elements, 3))
         tendon_lengths(
-            self.strain, model.length, model.tendon_offset, model.tendon_start, model.tendon_end, direction, self._path
+            self.orientation, self.position, self.strain, model.length, model.routing, self._direction, self._chord, self._path
         )
         self.shortened[:] = model.tendon_length - self._path.sum(axis=1)
 

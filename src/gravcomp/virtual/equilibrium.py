@@ -4,7 +4,8 @@ It is the minimum of the potential energy of rod, tendons and weight, with the l
 iteration runs on the residual of `assemble` of forces.py. Each increment is changed until it is a direction of descent, and
 shortened until the energy falls, because cables change between taut and slack and a straight rod under strong cables is unstable:
 
-    U = sum_e L/2 (epsilon - e_z)^T K (epsilon - e_z) + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2) - sum_k m_k g p_k
+    U = sum_e L/2 (epsilon - epsilon_0)^T K (epsilon - epsilon_0) + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2)
+        - sum_k m_k g (p_k + R_k c_k)
 """
 
 from dataclasses import dataclass
@@ -13,16 +14,17 @@ import numpy as np
 from numba import njit
 
 from gravcomp.virtual.band_solver import newton_step
-from gravcomp.virtual.forces import assemble
-from gravcomp.virtual.rod import RodModel, strains, tendon_lengths
+from gravcomp.virtual.forces import assemble, half_bandwidth
+from gravcomp.virtual.rod import RodModel, strains
+from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
 
 _MOST_ITERATIONS = 200
 _MOST_HALVINGS = 12
 _MOST_ADDITIONS = 8
-_ROUNDING = 1e-13  # J; the energies are some 1e-3 J
+_CONTINUATION = 20  # steps from no pull to the whole, where one step fails
+_ROUNDING = 1e-4  # of the moment that stands for zero, J
 _LARGEST_TURN = 0.3  # rad for each cross-section and iteration; beyond it the linearisation is poor
-_FORCE_TOLERANCE = 1e-8  # N and N m; the robot weighs 0.06 N
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class RodShape:
     orientation: np.ndarray  # (n + 1, 3, 3)
     position: np.ndarray  # (n + 1, 3) m
     tension: np.ndarray  # (m,) N, at the base
-    displacement: np.ndarray  # (m,) m, by how much the tendons' paths are shorter than in the straight rod
+    displacement: np.ndarray  # (m,) m, by how much the tendons' paths are shorter than in the unloaded rod
     iterations: int
 
     @property
@@ -56,7 +58,7 @@ def equilibrium(
     """Return the rod at rest under `gravity` (3,) m/s^2 in the frame of its base.
 
     The tendons are given by displacement (m,) m, wound in at the capstans, or by tension (m,) N; with neither they are released.
-    The iteration begins at `start` (a similar shape saves iterations), without it at the straight rod. Raises ValueError for
+    The iteration begins at `start` (a similar shape saves iterations), without it at the unloaded rod. Raises ValueError for
     values of the wrong shape, for values that are not finite and for both of displacement and tension; raises NoEquilibrium where
     the iteration does not converge.
     """
@@ -67,26 +69,42 @@ def equilibrium(
     stiffness = np.zeros(m) if displacement is None else model.tendon_stiffness
     wound = np.zeros(m) if displacement is None else _tendon_values(displacement, m, "displacement")
     gravity = np.asarray(gravity, float)
-    first = model.straight() if start is None else (start.orientation, start.position)
+    for steps in (1, _CONTINUATION):  # stiff lines wound in at once compress the straight rod far beyond its limit
+        shape = start
+        for step in range(1, steps + 1):
+            shape = _settled(model, gravity, stiffness, wound * step / steps, preload * step / steps, shape)
+            if shape is None:
+                break
+        if shape is not None:
+            return shape
+    raise NoEquilibrium(f"no equilibrium for gravity {gravity}, displacement {wound} m, tension {preload} N")
+
+
+def _settled(
+    model: RodModel, gravity: np.ndarray, stiffness: np.ndarray, wound: np.ndarray, preload: np.ndarray, start: RodShape | None
+) -> RodShape | None:
+    """Return the rod at rest, None where the iteration does not converge."""
+    first = model.unloaded() if start is None else (start.orientation, start.position)
     orientation, position = first[0].copy(), first[1].copy()
     iterations, tensions, shortened = _settle(
         orientation,
         position,
         model.length,
         model.stiffness,
+        model.rest_strain,
         model.mass,
-        model.tendon_offset,
-        model.tendon_start,
-        model.tendon_end,
+        model.centre,
+        model.routing,
         model.tendon_length,
         stiffness,
         wound,
         preload,
         gravity,
+        model.tolerances,
+        *model.scratch(),
+        np.empty((6 * model.elements, 2 * half_bandwidth(model.routing.reach) + 1)),
     )
-    if iterations < _MOST_ITERATIONS:
-        return RodShape(orientation, position, tensions, shortened, iterations)
-    raise NoEquilibrium(f"no equilibrium for gravity {gravity}, displacement {wound} m, tension {preload} N")
+    return RodShape(orientation, position, tensions, shortened, iterations) if iterations < _MOST_ITERATIONS else None
 
 
 def _tendon_values(values: np.ndarray, m: int, name: str) -> np.ndarray:
@@ -102,24 +120,28 @@ def _settle(
     position: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    rest_strain: np.ndarray,
     mass: np.ndarray,
-    tendon_offset: np.ndarray,
-    tendon_start: np.ndarray,
-    tendon_end: np.ndarray,
+    centre: np.ndarray,
+    routing: Routing,
     tendon_rest: np.ndarray,
     spring: np.ndarray,
     wound: np.ndarray,
     preload: np.ndarray,
     gravity: np.ndarray,
+    tolerances: np.ndarray,
+    direction: np.ndarray,
+    chord: np.ndarray,
+    band: np.ndarray,
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Move orientation and position to the equilibrium, in place; return iterations, tension (m,), shortened (m,).
 
     The number of iterations is _MOST_ITERATIONS where no equilibrium was found.
     """
-    n, m = length.shape[0], tendon_end.shape[0]
-    strain, path, direction = np.empty((n, 6)), np.empty((m, n)), np.zeros((m, n, 3))
-    gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
-    factors = np.empty((6 * n, 23))
+    n, m, width = length.shape[0], tendon_rest.shape[0], band.shape[1]
+    strain, path = np.empty((n, 6)), np.empty((m, n))
+    gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
+    factors = np.empty(band.shape)
     none, no_slip, share = np.zeros(n), np.zeros((n, 2)), np.ones((m, n))
     constant, force = np.zeros((n, 6)), np.empty((n + 1, 3))
     for k in range(n + 1):
@@ -128,8 +150,10 @@ def _settle(
     tension, active, shortened, compliance = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     strains(orientation, position, length, strain)
-    tendon_lengths(strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
-    energy = _energy(position, strain, length, stiffness, path, tendon_rest, spring, wound, preload, force)
+    tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
+    energy = _energy(
+        orientation, position, strain, length, stiffness, rest_strain, path, tendon_rest, spring, wound, preload, force, centre
+    )
     for iteration in range(_MOST_ITERATIONS):
         for c in range(m):
             shortened[c] = tendon_rest[c] - np.sum(path[c])
@@ -140,33 +164,34 @@ def _settle(
             orientation,
             length,
             strain,
+            rest_strain,
             stiffness,
             constant,
             none,
             none,
             no_slip,
-            tendon_offset,
-            tendon_start,
-            tendon_end,
+            routing,
             direction,
+            chord,
             path,
             tension,
             share,
             force,
+            centre,
             gradient,
             pull,
             band,
         )
-        if np.max(np.abs(residual[1:])) < _FORCE_TOLERANCE:
+        if np.max(np.abs(residual[1:, :3])) < tolerances[0] and np.max(np.abs(residual[1:, 3:])) < tolerances[1]:
             return iteration, tension, shortened
         # Where the tangent is not positive definite (a straight rod under strong cables), multiples of its own diagonal are added
         # until the increment descends.
         addition = 0.0
         for _ in range(_MOST_ADDITIONS):
             for k in range(6 * n):
-                for i in range(23):
+                for i in range(width):
                     factors[k, i] = band[k, i]
-                factors[k, 11] += addition * band[k, 11]
+                factors[k, width // 2] += addition * band[k, width // 2]
             increment = newton_step(factors, residual, gradient, pull, active, compliance)
             largest, slope = 0.0, 0.0
             for k in range(n):
@@ -187,9 +212,23 @@ def _settle(
                 motion_exp(factor * increment[6 * k : 6 * k + 6], turn, shift)
                 advance(orientation[k + 1], position[k + 1], turn, shift, work)
             strains(orientation, position, length, strain)
-            tendon_lengths(strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
-            energy = _energy(position, strain, length, stiffness, path, tendon_rest, spring, wound, preload, force)
-            if energy <= start_energy + 1e-4 * factor * slope + _ROUNDING:
+            tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
+            energy = _energy(
+                orientation,
+                position,
+                strain,
+                length,
+                stiffness,
+                rest_strain,
+                path,
+                tendon_rest,
+                spring,
+                wound,
+                preload,
+                force,
+                centre,
+            )
+            if energy <= start_energy + 1e-4 * factor * slope + _ROUNDING * tolerances[1]:
                 break
             factor *= 0.5
     return _MOST_ITERATIONS, tension, shortened
@@ -197,28 +236,34 @@ def _settle(
 
 @njit(cache=True, error_model="numpy")
 def _energy(
+    orientation: np.ndarray,
     position: np.ndarray,
     strain: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    rest_strain: np.ndarray,
     path: np.ndarray,
     tendon_rest: np.ndarray,
     spring: np.ndarray,
     wound: np.ndarray,
     preload: np.ndarray,
     force: np.ndarray,
+    centre: np.ndarray,
 ) -> float:
     """Return the potential energy in J."""
     energy = 0.0
     for e in range(length.shape[0]):
         for i in range(6):
-            deviation = strain[e, i] - (1.0 if i == 2 else 0.0)
-            energy += 0.5 * length[e] * stiffness[e, i] * deviation * deviation
+            for j in range(6):
+                energy += (
+                    0.5 * length[e] * stiffness[e, i, j] * (strain[e, i] - rest_strain[e, i]) * (strain[e, j] - rest_strain[e, j])
+                )
     for c in range(path.shape[0]):
         total = np.sum(path[c])
         stretch = max(0.0, wound[c] + total - tendon_rest[c])
         energy += preload[c] * total + 0.5 * spring[c] * stretch * stretch
     for k in range(position.shape[0]):
         for i in range(3):
-            energy -= force[k, i] * position[k, i]
+            place = position[k, i] + orientation[k, i, 0] * centre[k, 0] + orientation[k, i, 1] * centre[k, 1]
+            energy -= force[k, i] * place
     return energy

@@ -2,12 +2,12 @@
 
 With the strain epsilon = theta / L of an element between the cross-sections A and B (see rod.py):
 
-    sigma = K (epsilon - e_z) + ...                                  Cosserat law; the history of the material adds to it
+    sigma = K (epsilon - epsilon_0) + ...                            Cosserat law; the history of the material adds to it
     delta theta = J_r^-1(theta) eta_B - J_l^-1(theta) eta_A          eta: body-frame variations of the two cross-sections
 
-A tendon at the offset d with the tension T pulls in the element with T (t, d x t), t the unit vector along v + w x d (D. C.
+A tendon at the offset d with the tension T pulls in the element with T (t, d x t), t the unit vector along v + w x d + d' (D. C.
 Rucker, R. J. Webster, "Statics and dynamics of continuum robots with general tendon routing and external loading", IEEE T-RO 27,
-2011).
+2011). Between disks it pulls at two holes: `add_chords` of routing.py.
 
 A tendon is a spring that only pulls: T_0 = k max(0, u + l - l_0) + preload, u the displacement pulled in at the base. Because of
 friction only the share s_e T_0 arrives in element e. A tendon couples all elements that it passes; `newton_step` of
@@ -21,6 +21,7 @@ import math
 import numpy as np
 from numba import njit
 
+from gravcomp.virtual.routing import Routing, add_chords
 from gravcomp.virtual.se3 import inverse_jacobians
 
 
@@ -29,19 +30,20 @@ def assemble(
     orientation: np.ndarray,
     length: np.ndarray,
     strain: np.ndarray,
+    rest_strain: np.ndarray,
     linear: np.ndarray,
     constant: np.ndarray,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
     slip_strain: np.ndarray,
-    tendon_offset: np.ndarray,
-    tendon_start: np.ndarray,
-    tendon_end: np.ndarray,
+    routing: Routing,
     direction: np.ndarray,
+    chord: np.ndarray,
     path: np.ndarray,
     tension: np.ndarray,
     share: np.ndarray,
     force: np.ndarray,
+    centre: np.ndarray,
     gradient: np.ndarray,
     pull: np.ndarray,
     band: np.ndarray,
@@ -54,32 +56,32 @@ def assemble(
         Of the cross-sections.
     length : (n,) m
         Of the elements at rest.
-    strain : (n, 6)
-        Of the elements.
-    linear, constant : (n, 6)
-        Of the material's law: sigma = linear (epsilon - e_z) + constant + friction + tendons.
+    strain, rest_strain : (n, 6)
+        Of the elements; epsilon_0 is that of the unloaded rod.
+    linear, constant : (n, 6, 6), (n, 6)
+        Of the material's law: sigma = linear (epsilon - epsilon_0) + constant + friction + tendons.
     slip_stiffness, slip_moment, slip_strain : (n,) N m^2, (n,) N m, (n, 2) 1/m
         Of the material's friction, see material.py.
-    tendon_offset, tendon_start, tendon_end : (m, 3) m, (m,), (m,)
+    routing : Routing
         Of the `RodModel`.
-    direction, path : (m, n, 3), (m, n) m
+    direction, chord, path : (m, n, 3), (q, 4), (m, n) m
         From `tendon_lengths`.
     tension : (m,) N
         At the base.
     share : (m, n)
         Fraction of the tension that arrives in each element.
-    force : (n + 1, 3) N
-        On the cross-sections, in the fixed frame.
+    force, centre : (n + 1, 3) N, (n + 1, 3) m
+        On the cross-sections, in the fixed frame, and the point of the section where it acts.
     gradient : (6 n, m)
         Filled with d path / d eta.
     pull : (6 n, m)
         Filled with d residual / d tension.
-    band : (6 n, 23)
-        Filled with the tangent without the tendons' springs.
+    band : (6 n, 2 w + 1)
+        Filled with the tangent without the tendons' springs; w is `half_bandwidth` of the routing's reach.
 
     The first cross-section is clamped and has no rows in gradient, pull and band.
     """
-    n, m = length.shape[0], tendon_end.shape[0]
+    n, m = length.shape[0], tension.shape[0]
     residual = np.zeros((n + 1, 6))
     gradient[:] = 0.0
     pull[:] = 0.0
@@ -92,12 +94,14 @@ def assemble(
         for i in range(6):
             theta[i] = strain[e, i] * length[e]
         inverse_jacobians(theta, left, right)
-        _material(strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], sigma, tangent)
+        _material(
+            strain[e], rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], sigma, tangent
+        )
         for c in range(m):
-            if e < tendon_start[c] or e >= tendon_end[c]:
+            if not routing.inside[c, e]:
                 continue
             here = tension[c] * share[c, e]
-            _add_tendon(here, here * length[e] / path[c, e], tendon_offset[c], direction[c, e], unit, sigma, tangent)
+            _add_tendon(here, here * length[e] / path[c, e], routing.offset[c, e], direction[c, e], unit, sigma, tangent)
             _to_sections(left, right, unit, to_a, to_b)
             for i in range(6):
                 if e > 0:
@@ -112,13 +116,20 @@ def assemble(
             for j in range(6):
                 tangent[i, j] /= length[e]
         _add_to_band(e, left, right, sigma, tangent, product, band)
-    _add_load(orientation, force, residual, band)
+    add_chords(orientation, routing, chord, tension, share, residual, gradient, pull, band)
+    _add_load(orientation, force, centre, residual, band)
     return residual
+
+
+def half_bandwidth(reach: int) -> int:
+    """Return the diagonals on either side of the tangent of cross-sections that couple over `reach` elements."""
+    return 6 * reach + 5
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _material(
     strain: np.ndarray,
+    rest_strain: np.ndarray,
     linear: np.ndarray,
     constant: np.ndarray,
     slip_stiffness: float,
@@ -129,10 +140,10 @@ def _material(
 ) -> None:
     """Write stress (6,) and tangent (6, 6) d sigma / d epsilon of the material of one element."""
     for i in range(6):
-        sigma[i] = linear[i] * (strain[i] - (1.0 if i == 2 else 0.0)) + constant[i]
+        sigma[i] = constant[i]
         for j in range(6):
-            tangent[i, j] = 0.0
-        tangent[i, i] = linear[i]
+            sigma[i] += linear[i, j] * (strain[j] - rest_strain[j])
+            tangent[i, j] = linear[i, j]
     k0 = slip_stiffness * (strain[3] - slip_strain[0])
     k1 = slip_stiffness * (strain[4] - slip_strain[1])
     trial = math.sqrt(k0 * k0 + k1 * k1)
@@ -210,6 +221,7 @@ def _add_to_band(
     band: np.ndarray,
 ) -> None:
     """Add the tangent of element e, tangent (6, 6) being d sigma / d theta; product (6, 6) is scratch."""
+    middle = band.shape[1] // 2
     for side in range(2):  # columns: variation of A, then of B
         jacobian = left if side == 0 else right
         sign = -1.0 if side == 0 else 1.0
@@ -238,27 +250,40 @@ def _add_to_band(
                     to_b += right[k, i] * product[k, j]
                 if e > 0:
                     row = 6 * (e - 1) + i
-                    band[row, column + j - row + 11] += to_a
+                    band[row, column + j - row + middle] += to_a
                 row = 6 * e + i
-                band[row, column + j - row + 11] += to_b
+                band[row, column + j - row + middle] += to_b
 
 
 @njit(cache=True, error_model="numpy")
-def _add_load(orientation: np.ndarray, force: np.ndarray, residual: np.ndarray, band: np.ndarray) -> None:
+def _add_load(orientation: np.ndarray, force: np.ndarray, centre: np.ndarray, residual: np.ndarray, band: np.ndarray) -> None:
     """Subtract the forces on the cross-sections from the residual, and add how they change with the rotations to the band."""
+    middle = band.shape[1] // 2
     for k in range(orientation.shape[0]):
         r = orientation[k]
+        c0, c1 = centre[k, 0], centre[k, 1]
         f0 = r[0, 0] * force[k, 0] + r[1, 0] * force[k, 1] + r[2, 0] * force[k, 2]
         f1 = r[0, 1] * force[k, 0] + r[1, 1] * force[k, 1] + r[2, 1] * force[k, 2]
         f2 = r[0, 2] * force[k, 0] + r[1, 2] * force[k, 1] + r[2, 2] * force[k, 2]
         residual[k, 0] -= f0
         residual[k, 1] -= f1
         residual[k, 2] -= f2
+        residual[k, 3] -= c1 * f2
+        residual[k, 4] += c0 * f2
+        residual[k, 5] -= c0 * f1 - c1 * f0
         if k > 0:
             row = 6 * (k - 1)
-            band[row, 15] += f2
-            band[row, 16] -= f1
-            band[row + 1, 13] -= f2
-            band[row + 1, 15] += f0
-            band[row + 2, 12] += f1
-            band[row + 2, 13] -= f0
+            band[row, middle + 4] += f2
+            band[row, middle + 5] -= f1
+            band[row + 1, middle + 2] -= f2
+            band[row + 1, middle + 4] += f0
+            band[row + 2, middle + 1] += f1
+            band[row + 2, middle + 2] -= f0
+            # Rows of the moment c x f: the columns are those of the rotation.
+            band[row + 3, middle] += c1 * f1
+            band[row + 3, middle + 1] -= c1 * f0
+            band[row + 4, middle - 1] -= c0 * f1
+            band[row + 4, middle] += c0 * f0
+            band[row + 5, middle - 2] -= c0 * f2
+            band[row + 5, middle - 1] -= c1 * f2
+            band[row + 5, middle] += c0 * f0 + c1 * f1

@@ -20,7 +20,7 @@ from numba import njit
 
 from gravcomp.canbus.c610 import LARGEST_CURRENT
 from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
-from gravcomp.virtual.parameters import Motors
+from gravcomp.virtual.true_robot import TrueMotors
 
 TICK = 0.5e-3  # s
 _DRAWS = 4  # moves of a capstan in its backlash; one more than cables that become slack or taut on the way
@@ -29,10 +29,10 @@ _DRAWS = 4  # moves of a capstan in its backlash; one more than cables that beco
 class MotorBank:
     """The k motors of m cables."""
 
-    def __init__(self, parameters: Motors, hardware: Hardware, slack: np.ndarray, random: np.random.Generator):
-        """slack (m,) m: length of cable beyond the straight robot's at the start. Each rotor starts at a random angle."""
+    def __init__(self, true: TrueMotors, hardware: Hardware, slack: np.ndarray, random: np.random.Generator):
+        """slack (m,) m: length of cable beyond the unloaded robot's at the start. Each rotor starts at a random angle."""
         k = len(hardware.motors)
-        self._parameters, self._random = parameters, random
+        self._true, self._random = true, random
         self._ratio = hardware.drive.gear_ratio
         self._direction = np.array([motor.direction for motor in hardware.motors])
         self._start_count = random.integers(0, COUNTS_PER_TURN, k)
@@ -45,12 +45,12 @@ class MotorBank:
 
     @property
     def wound(self) -> np.ndarray:
-        """Length (m,) m of cable wound in; 0: the cable has exactly the length of its path in the straight robot."""
-        return self._matrix @ self._capstan * self._parameters.capstan_radius - self._longer
+        """Length (m,) m of cable wound in; 0: the cable has exactly the length of its path in the unloaded robot."""
+        return self._matrix @ (self._capstan * self._true.capstan_radius) - self._longer
 
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
         """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack up to displacements `shortened` (m,) m."""
-        p = self._parameters
+        true, p = self._true, self._true.common
         _step(
             ticks,
             self._rotor,
@@ -63,15 +63,15 @@ class MotorBank:
             shortened + self._longer,
             spring,
             self._matrix,
-            p.torque_constant / self._ratio,
+            true.torque_constant / self._ratio,
             p.rotor_inertia,
             p.friction_torque,
-            p.load_friction,
+            true.load_friction,
             p.viscous_friction,
             p.no_load_speed,
-            p.backlash,
+            true.backlash,
             p.capstan_drag,
-            p.capstan_radius,
+            true.capstan_radius,
             self._ratio,
             1.0 - math.exp(-TICK / p.current_lag),
         )
@@ -82,7 +82,7 @@ class MotorBank:
 
     def feedback(self) -> list[dict[str, float]]:
         """Return angle (counts), speed (rpm) and current (A) as the C610 of each motor sends them."""
-        noise = self._parameters.current_noise * self._random.standard_normal(len(self._rotor))
+        noise = self._true.common.current_noise * self._random.standard_normal(len(self._rotor))
         values = _feedback(self._rotor, self._speed, self._current, self._direction, self._start_count, noise)
         return [{"angle": int(angle), "speed": speed, "current": current} for angle, speed, current in values.tolist()]
 
@@ -114,26 +114,26 @@ def _step(
     offset: np.ndarray,
     spring: np.ndarray,
     matrix: np.ndarray,
-    torque_constant: float,
+    torque_constant: np.ndarray,
     inertia: float,
     friction: float,
-    load_friction: float,
+    load_friction: np.ndarray,
     viscous: float,
     no_load_speed: float,
-    backlash: float,
+    backlash: np.ndarray,
     drag: float,
-    radius: float,
+    capstan_radius: np.ndarray,
     ratio: float,
     current_gain: float,
 ) -> None:
-    half = 0.5 * backlash
     wound = np.empty(matrix.shape[0])
     for _ in range(ticks):
         for i in range(matrix.shape[0]):
             wound[i] = 0.0
             for j in range(matrix.shape[1]):
-                wound[i] += radius * matrix[i, j] * capstan[j]
+                wound[i] += capstan_radius[j] * matrix[i, j] * capstan[j]
         for c in range(rotor.shape[0]):
+            half, radius = 0.5 * backlash[c], capstan_radius[c]
             command = direction[c] * min(LARGEST_CURRENT, max(-LARGEST_CURRENT, commanded[c]))
             current[c] += current_gain * (command - current[c])
             # The back-EMF limits the current, the more the faster the rotor turns in the direction of the current.
@@ -147,9 +147,9 @@ def _step(
             if stalled[c]:
                 speed[c] = 0.0
             else:
-                drive = torque_constant * current[c] - viscous * speed[c] - load
+                drive = torque_constant[c] * current[c] - viscous * speed[c] - load
                 momentum = inertia * speed[c] + TICK * drive
-                loss = TICK * (friction + load_friction * abs(load))
+                loss = TICK * (friction + load_friction[c] * abs(load))
                 momentum = max(0.0, momentum - loss) if momentum > 0.0 else min(0.0, momentum + loss)
                 speed[c] = momentum / inertia
                 rotor[c] += TICK * speed[c]

@@ -23,6 +23,7 @@ from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
 from gravcomp.virtual.board import SAMPLE_PERIOD, STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
+from gravcomp.virtual.draw import draw
 from gravcomp.virtual.dynamics import MovingRod
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.faults import Fault
@@ -52,20 +53,21 @@ class VirtualRobot:
     ):
         """Start in the static equilibrium.
 
-        `seed` replaces the one of the parameters; without `motion` the base is at rest and the robot horizontal. Raises
-        ConfigError where the motors do not match the cables, and where the rod cannot represent the robot.
+        `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
+        the robot horizontal. Raises ConfigError where the motors do not match the cables, where the parameters describe no robot,
+        and where the rod cannot represent it.
         """
         if hardware.cables != robot.cable_names:
             raise ConfigError(f"motors for the cables {', '.join(hardware.cables)}; the robot has {', '.join(robot.cable_names)}")
+        self.true = true = draw(parameters, robot, hardware, seed)
         # One generator for each part: an additional fault does not change the noise of the IMU.
-        streams = np.random.SeedSequence(parameters.seed if seed is None else seed).spawn(4)
-        start, motors, board, faults = (np.random.default_rng(stream) for stream in streams)
+        streams = np.random.SeedSequence(true.seed).spawn(4)
+        motors, board, faults = (np.random.default_rng(stream) for stream in streams[1:])
         self._robot, self._hardware = robot, hardware
-        slack = parameters.tendons.slack + parameters.tendons.slack_spread * start.standard_normal(len(robot.cables))
-        self._model = build_rod(robot, parameters)
-        self._rod = MovingRod(self._model, build_material(self._model, parameters), build_friction(robot, parameters))
-        self._motors = MotorBank(parameters.motors, hardware, slack, motors)
-        self._board = VirtualBoard(parameters.board, board)
+        self._model = build_rod(true)
+        self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true))
+        self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
+        self._board = VirtualBoard(true.board, board)
         self._base = MovingBase(
             motion or StaticMotion(base_orientation(0.0)),
             robot.imu_mount.rotation,

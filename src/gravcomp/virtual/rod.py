@@ -1,21 +1,19 @@
-"""A geometrically exact rod with tendons: its data, its strains and the lengths of its tendons, compiled.
+"""A geometrically exact rod with tendons: its data and its strains, compiled.
 
 The rod is a chain of rigid cross-sections H_k = (R_k, p_k); the body axis is z. Between two of them the strain is constant
 (helicoidal interpolation on SE(3); Sonneville, Cardona, Bruls 2014), so there is no integration and no locking:
 
     theta = log(H_A^-1 H_B),  epsilon = theta / L = (v, w),  v = (shear, shear, stretch), w = (curvature, curvature, twist)
-
-A tendon at the offset d in the cross-section has the length l = L |v + w x d| in an element, exactly.
 """
 
 import functools
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from gravcomp.virtual.se3 import motion_log
+from gravcomp.virtual.routing import Routing, tendon_lengths
+from gravcomp.virtual.se3 import advance, copy_pose, motion_exp, motion_log
 
 
 @dataclass(frozen=True)
@@ -23,12 +21,12 @@ class RodModel:
     """Constant data of the rod; n elements, m tendons. SI units."""
 
     length: np.ndarray  # (n,) m, at rest
-    stiffness: np.ndarray  # (n, 6) shear, shear, stretch (N); bending, bending, torsion (N m^2)
+    stiffness: np.ndarray  # (n, 6, 6) symmetric; shear, shear, stretch (N); bending, bending, torsion (N m^2); couplings (N m)
+    rest_strain: np.ndarray  # (n, 6) of the unloaded rod: (0, 0, 1, curvature, curvature, 0)
     mass: np.ndarray  # (n + 1,) kg, lumped in the cross-sections
-    inertia: np.ndarray  # (n + 1, 3) kg m^2, about the body axes
-    tendon_offset: np.ndarray  # (m, 3) m, position of each tendon in the cross-section
-    tendon_start: np.ndarray  # (m,) int, first element of each tendon
-    tendon_end: np.ndarray  # (m,) int, the element after the last one of each tendon
+    centre: np.ndarray  # (n + 1, 3) m, centre of that mass in the cross-section
+    inertia: np.ndarray  # (n + 1, 3, 3) kg m^2, about the axis, along the body axes
+    routing: Routing  # of the tendons
     tendon_stiffness: np.ndarray  # (m,) N/m, from the capstan to the anchor
 
     @property
@@ -39,7 +37,7 @@ class RodModel:
     @property
     def tendons(self) -> int:
         """Number of tendons, m."""
-        return len(self.tendon_end)
+        return len(self.tendon_stiffness)
 
     @functools.cached_property
     def station(self) -> np.ndarray:
@@ -49,14 +47,38 @@ class RodModel:
 
     @functools.cached_property
     def tendon_length(self) -> np.ndarray:
-        """Lengths (m,) of the tendons inside the straight rod, m."""
-        return np.array([self.length[a:b].sum() for a, b in zip(self.tendon_start, self.tendon_end)])
+        """Lengths (m,) of the tendons inside the unloaded rod, m."""
+        path = np.empty((self.tendons, self.elements))
+        direction, chord = self.scratch()
+        tendon_lengths(*self.unloaded(), self.rest_strain, self.length, self.routing, direction, chord, path)
+        return path.sum(axis=1)
 
-    def straight(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return orientations (n + 1, 3, 3) and positions (n + 1, 3) of the unloaded rod along z."""
-        position = np.zeros((self.elements + 1, 3))
-        position[1:, 2] = np.cumsum(self.length)
-        return np.tile(np.eye(3), (self.elements + 1, 1, 1)), position
+    @functools.cached_property
+    def tolerances(self) -> np.ndarray:
+        """Force (N) and moment (N m) that stand for zero in a residual.
+
+        Small against the weight, or against a load that bends the rod by a thousandth of its length where it weighs next to
+        nothing, and above the rounding of its stiffest direction.
+        """
+        total = float(self.length.sum())
+        bending = float(self.stiffness[:, 3, 3].min())
+        load = max(9.81 * float(self.mass.sum()), 1e-3 * bending / total**2)
+        force = max(2e-7 * load, 1e-14 * float(self.stiffness[:, 2, 2].max()))
+        return np.array([force, 10.0 * force * total])
+
+    def unloaded(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return orientations (n + 1, 3, 3) and positions (n + 1, 3) of the unloaded rod, which leaves the base along z."""
+        orientation, position = np.tile(np.eye(3), (self.elements + 1, 1, 1)), np.zeros((self.elements + 1, 3))
+        turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+        for e in range(self.elements):
+            motion_exp(self.length[e] * self.rest_strain[e], turn, shift)
+            copy_pose(orientation[e], position[e], orientation[e + 1], position[e + 1])
+            advance(orientation[e + 1], position[e + 1], turn, shift, work)
+        return orientation, position
+
+    def scratch(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return arrays for the directions of `tendon_lengths`: (m, n, 3) in channels, (q, 4) of the chords."""
+        return np.zeros((self.tendons, self.elements, 3)), np.empty((len(self.routing.chord_tendon), 4))
 
 
 @njit(cache=True, error_model="numpy")
@@ -74,31 +96,3 @@ def strains(orientation: np.ndarray, position: np.ndarray, length: np.ndarray, o
         motion_log(relative, translation, out[e])
         for i in range(6):
             out[e, i] /= length[e]
-
-
-@njit(cache=True, error_model="numpy")
-def tendon_lengths(
-    strain: np.ndarray,
-    length: np.ndarray,
-    tendon_offset: np.ndarray,
-    tendon_start: np.ndarray,
-    tendon_end: np.ndarray,
-    direction: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    """Write the length of each tendon in each element to out (m, n), 0 where a tendon does not pass.
-
-    direction (m, n, 3) receives the unit vectors along the tendons there.
-    """
-    for c in range(tendon_end.shape[0]):
-        d0, d1 = tendon_offset[c, 0], tendon_offset[c, 1]
-        for e in range(length.shape[0]):
-            if e < tendon_start[c] or e >= tendon_end[c]:
-                out[c, e] = 0.0
-                continue
-            x = strain[e, 0] - strain[e, 5] * d1
-            y = strain[e, 1] + strain[e, 5] * d0
-            z = strain[e, 2] + strain[e, 3] * d1 - strain[e, 4] * d0
-            norm = math.sqrt(x * x + y * y + z * z)
-            direction[c, e, 0], direction[c, e, 1], direction[c, e, 2] = x / norm, y / norm, z / norm
-            out[c, e] = length[e] * norm

@@ -20,7 +20,8 @@ from numba import njit
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
-from gravcomp.virtual.rod import strains, tendon_lengths
+from gravcomp.virtual.rod import strains
+from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
 
@@ -32,7 +33,7 @@ _BETA = 0.25 * (_GAMMA + 0.5) ** 2
 MOST_ITERATIONS = 12
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
-_FORCE_TOLERANCE = 1e-7  # N and N m; one cross-section weighs 3e-3 N
+_LOOSER = 10.0  # than the static equilibrium, in force and moment
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,38 +59,42 @@ def time_step(
     compliance: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    rest_strain: np.ndarray,
     mass: np.ndarray,
+    centre: np.ndarray,
     inertia: np.ndarray,
-    tendon_offset: np.ndarray,
-    tendon_start: np.ndarray,
-    tendon_end: np.ndarray,
+    routing: Routing,
     tendon_rest: np.ndarray,
     spring: np.ndarray,
     branch_ratio: np.ndarray,
     branch_time: np.ndarray,
-    damping_time: float,
+    damping_time: np.ndarray,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
     mu: np.ndarray,
     guide_angle: np.ndarray,
     presliding: float,
+    tolerances: np.ndarray,
+    direction: np.ndarray,
+    chord: np.ndarray,
+    band: np.ndarray,
 ) -> tuple[bool, int]:
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step; compliance (m,) receives that of each tendon's path in one step, m/N. MOST_ITERATIONS iterations mean that the
-    iteration did not converge. If the state is not possible, pose and material keep their values from before the step, and the
-    caller sets the rest of the state.
+    of the step; compliance (m,) receives that of each tendon's path in one step, m/N; direction, chord and band are scratch.
+    MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
+    material keep their values from before the step, and the caller sets the rest of the state.
     """
-    n, m = length.shape[0], tendon_end.shape[0]
+    n, m = length.shape[0], tendon_rest.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
     gamma = _GAMMA / (dt * _BETA)
-    linear, constant = step_law(dt, stiffness, strain, branch_strain, branch_ratio, branch_time, damping_time)
+    linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
     force = np.empty((n + 1, 3))
     for k in range(n + 1):
         for i in range(3):
             force[k, i] = mass[k] * gravity[i]
-    share = tension_shares(strain, length, sliding, tendon_start, tendon_end, mu, guide_angle)
+    share = tension_shares(strain, length, sliding, routing.start, routing.end, mu, guide_angle)
 
     total_increment = _predict(dt, velocity, acceleration, velocity_rate)
     start_orientation, start_position = orientation.copy(), position.copy()
@@ -97,8 +102,8 @@ def time_step(
 
     path_before = path.copy()
     pulled, law = tension.copy(), np.empty(m)  # T, and k s where the tendon is taut
-    direction, active, work = np.zeros((m, n, 3)), np.empty(m), np.empty((3, 3))
-    gradient, pull, band = np.empty((6 * n, m)), np.empty((6 * n, m)), np.empty((6 * n, 23))
+    active, work, middle = np.empty(m), np.empty((3, 3)), band.shape[1] // 2
+    gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     new_strain = np.empty((n, 6))
     turn, shift = np.empty((3, 3)), np.empty(3)
     iterations = MOST_ITERATIONS
@@ -108,7 +113,7 @@ def time_step(
             copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
             advance(orientation[k], position[k], turn, shift, work)
         strains(orientation, position, length, new_strain)
-        tendon_lengths(new_strain, length, tendon_offset, tendon_start, tendon_end, direction, path)
+        tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
         slack = 0.0  # largest stretch of a taut tendon that has become too short
         for c in range(m):
             stretch = wound[c] + np.sum(path[c]) - tendon_rest[c]
@@ -121,19 +126,20 @@ def time_step(
             orientation,
             length,
             new_strain,
+            rest_strain,
             linear,
             constant,
             slip_stiffness,
             slip_moment,
             slip_strain,
-            tendon_offset,
-            tendon_start,
-            tendon_end,
+            routing,
             direction,
+            chord,
             path,
             pulled,
             share,
             force,
+            centre,
             gradient,
             pull,
             band,
@@ -143,11 +149,11 @@ def time_step(
             for i in range(6):
                 for c in range(m):
                     residual[k, i] += pull[6 * (k - 1) + i, c] * (law[c] - pulled[c])
-            _add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], inertia[k])
+            _add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], centre[k], inertia[k])
+            _add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
             for i in range(6):
-                worst = max(worst, abs(residual[k, i]))
-                band[6 * (k - 1) + i, 11] += beta * (mass[k] if i < 3 else inertia[k, i - 3])
-        if worst < _FORCE_TOLERANCE and slack < _FORCE_TOLERANCE:
+                worst = max(worst, abs(residual[k, i]) / tolerances[i // 3])
+        if worst < _LOOSER and slack < _LOOSER * tolerances[0]:
             iterations = iteration
             break
         increment = newton_step(band, residual, gradient, pull, active, compliance)
@@ -235,12 +241,47 @@ def _orthonormalise(rotation: np.ndarray, work: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _add_inertia(residual: np.ndarray, velocity: np.ndarray, rate: np.ndarray, mass: float, inertia: np.ndarray) -> None:
-    """Add M rate - ad_v^T M v of one cross-section to residual (6,); mass in kg, inertia (3,) kg m^2."""
+def _add_inertia(
+    residual: np.ndarray, velocity: np.ndarray, rate: np.ndarray, mass: float, centre: np.ndarray, inertia: np.ndarray
+) -> None:
+    """Add M rate - ad_v^T M v of one cross-section to residual (6,).
+
+    mass in kg, its centre (3,) m in the plane of the section, inertia (3, 3) kg m^2 about the axis. With the momenta
+    P = m (v + w x c) and L = m c x v + J w the force is M rate + (w x P, w x L + v x P).
+    """
     v0, v1, v2, w0, w1, w2 = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
-    residual[0] += mass * (rate[0] + w1 * v2 - w2 * v1)
-    residual[1] += mass * (rate[1] + w2 * v0 - w0 * v2)
-    residual[2] += mass * (rate[2] + w0 * v1 - w1 * v0)
-    residual[3] += inertia[0] * rate[3] + (inertia[2] - inertia[1]) * w1 * w2
-    residual[4] += inertia[1] * rate[4] + (inertia[0] - inertia[2]) * w2 * w0
-    residual[5] += inertia[2] * rate[5] + (inertia[1] - inertia[0]) * w0 * w1
+    c0, c1 = centre[0], centre[1]
+    p0, p1, p2 = mass * (v0 - w2 * c1), mass * (v1 + w2 * c0), mass * (v2 + w0 * c1 - w1 * c0)
+    q0 = mass * c1 * v2 + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
+    q1 = -mass * c0 * v2 + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
+    q2 = mass * (c0 * v1 - c1 * v0) + inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
+    residual[0] += mass * (rate[0] - rate[5] * c1) + w1 * p2 - w2 * p1
+    residual[1] += mass * (rate[1] + rate[5] * c0) + w2 * p0 - w0 * p2
+    residual[2] += mass * (rate[2] + rate[3] * c1 - rate[4] * c0) + w0 * p1 - w1 * p0
+    residual[3] += mass * c1 * rate[2] + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
+    residual[4] += -mass * c0 * rate[2] + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
+    residual[5] += mass * (c0 * rate[1] - c1 * rate[0]) + w0 * q1 - w1 * q0 + v0 * p1 - v1 * p0
+    for i in range(3):
+        for j in range(3):
+            residual[3 + i] += inertia[i, j] * rate[3 + j]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_inertia_to_band(
+    row: int, beta: float, mass: float, centre: np.ndarray, inertia: np.ndarray, middle: int, band: np.ndarray
+) -> None:
+    """Add beta M of one cross-section, whose first row is `row`, to the band."""
+    m, x, y = beta * mass, beta * mass * centre[0], beta * mass * centre[1]
+    for i in range(3):
+        band[row + i, middle] += m
+        for j in range(3):
+            band[row + 3 + i, middle + j - i] += beta * inertia[i, j]
+    # The upper right block is -m c^, the lower left one its transpose.
+    band[row, middle + 5] -= y
+    band[row + 1, middle + 4] += x
+    band[row + 2, middle + 1] += y
+    band[row + 2, middle + 2] -= x
+    band[row + 5, middle - 5] -= y
+    band[row + 5, middle - 4] += x
+    band[row + 3, middle - 1] += y
+    band[row + 4, middle - 2] -= x

@@ -39,6 +39,9 @@ class JudgeParameters:
     result_file: str = parameter(
         "", read_only=True, description="JSON file with the current state and figures, rewritten during the run; empty: none"
     )
+    seed: int = parameter(
+        -1, minimum=-1, maximum=2**31 - 1, read_only=True, description="seed of the virtual robot; -1: the one of the robot file"
+    )
     nodes: tuple[str, ...] = parameter((), read_only=True, description="nodes whose lifecycle states are reported")
     measure_delay: bool = parameter(
         True, read_only=True, description="measure the delay from IMU sample to motor current on the CAN bus"

@@ -56,18 +56,18 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
             raise
         raise RecordingError(f"{path}: is not a readable rosbag2 recording: {error}") from error
 
-    recorded, received, values = _arrays(rows[name], 6)
-    stamp, notes = usable_stamps(recorded, received, values)
+    recorded, receptions, values = _arrays(rows[name], 6)
+    samples, notes = usable_stamps(recorded, receptions, values)
     temperature = _arrays(rows[temperatures[0]], 1) if temperatures else None
     truth = _arrays(rows[truths[0]], 4) if truths else None
     return Recording(
         source=str(path),
-        stamp_ns=stamp,
+        stamp_ns=samples,
         gyro=values[:, :3].copy(),
         accel=values[:, 3:].copy(),
         temperature_stamp_ns=temperature[0] if temperature else None,
         temperature=temperature[2][:, 0] if temperature else None,
-        orientation=_nearest(stamp, truth[0], truth[2]) if truth and len(truth[0]) else None,
+        orientation=_nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
         notes=(*damage, *notes),
     )
 

@@ -58,7 +58,7 @@ def _unwrapped(stamp_ns: np.ndarray) -> tuple[np.ndarray, int]:
     spans = np.zeros(len(step), np.int64)
     for i in np.flatnonzero(step < 0).tolist():
         spans[i] = wrapped_counter(int(step[i]), period)
-    return stamp_ns + np.concatenate([[0], np.cumsum(spans)]), np.count_nonzero(spans)
+    return stamp_ns + np.concatenate([[0], np.cumsum(spans)]), int(np.count_nonzero(spans))
 
 
 def _spread_bursts(stamp_ns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, int]:

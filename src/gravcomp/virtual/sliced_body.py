@@ -1,0 +1,93 @@
+"""Cuts across a body from a file: the boundary of its section at a height."""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from gravcomp.config import ConfigError
+from gravcomp.description import Material, MeshBody
+from gravcomp.mesh.elements import edges, faces, reference_nodes, shape_values
+from gravcomp.mesh.mesh import MeshError
+from gravcomp.mesh_files.centreline import straightened
+from gravcomp.virtual.cross_section import CrossSection, sliced_section
+
+# Off the plane of a layer of nodes, relative to the length.
+_OFF_NODES = 1e-6
+_DIVISIONS = 4  # of the edges of a curved face
+
+
+def slice_of(body: MeshBody, part: float) -> CrossSection:
+    """Return the section constants at `part` of the length. Raises ConfigError for a body without a section there."""
+    triangles, length = _surface(dataclasses.replace(body, material=Material()))
+    height = length * min(max(part, 10 * _OFF_NODES), 1.0 - 10 * _OFF_NODES) + _OFF_NODES * length
+    segments = _cut(triangles, height)
+    section = sliced_section(segments) if len(segments) > 2 else None
+    if section is None or section.area <= 0.0:
+        raise ConfigError(f"{body.file}: no cross-section at {1e3 * height:g} mm; the virtual robot needs one everywhere")
+    return section
+
+
+@functools.lru_cache(maxsize=4)
+def _surface(body: MeshBody) -> tuple[np.ndarray, float]:
+    """Surface (t, 3, 3) in m of the straightened body, each triangle counter-clockwise from outside, and the length.
+
+    Curved faces are divided, so that the triangles follow them. Raises ConfigError.
+    """
+    try:
+        placed = body.placed()
+    except MeshError as error:
+        raise ConfigError(str(error)) from error
+    nodes = straightened(placed.axis, placed.nodes, placed.length) if placed.axis.bent else placed.nodes
+    if placed.kind == "tri3":
+        return nodes[placed.cells], placed.length
+    kind, elements = placed.kind, placed.cells
+    corner_faces = faces(kind)
+    corners, size = int(edges(kind).max()) + 1, corner_faces.shape[1]
+    key = np.sort(elements[:, corner_faces].reshape(-1, size), axis=1)
+    _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    outer = first[count == 1]
+    element, face = outer // len(corner_faces), outer % len(corner_faces)
+    weights, triangles = _divided(size, 1 if elements.shape[1] == corners else _DIVISIONS)
+    local = np.einsum("pc,fci->fpi", weights, reference_nodes(kind)[corner_faces])
+    points = np.einsum("fpn,fni->fpi", shape_values(kind, local)[face], nodes[elements[element]])
+    found = points[:, triangles]  # (f, t, 3, 3)
+    inside = nodes[elements[element, :corners]].mean(axis=1)
+    normal = np.cross(found[..., 1, :] - found[..., 0, :], found[..., 2, :] - found[..., 0, :])
+    # Of the face as a whole: a part of a curved face may look towards the middle of its element.
+    inward = np.einsum("fi,fi->f", normal.sum(axis=1), found.mean(axis=(1, 2)) - inside) < 0.0
+    found[inward] = found[inward][:, :, ::-1]
+    return found.reshape(-1, 3, 3), placed.length
+
+
+def _divided(corners: int, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a face with 3 or 4 corners as weights (p, corners), and triangles (t, 3) between them."""
+    steps = np.arange(parts + 1) / parts
+    place = {}
+    weights: list[list[float]] = []
+    for i, u in enumerate(steps):
+        for j, v in enumerate(steps):
+            if corners == 3 and i + j > parts:
+                continue
+            place[i, j] = len(weights)
+            weights.append([1 - u - v, u, v] if corners == 3 else [(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
+    triangles = []
+    for i, j in place:
+        for cell in (((i, j), (i + 1, j), (i, j + 1)), ((i + 1, j), (i + 1, j + 1), (i, j + 1))):
+            if all(corner in place for corner in cell):
+                triangles.append([place[corner] for corner in cell])
+    return np.array(weights), np.array(triangles)
+
+
+def _cut(triangles: np.ndarray, height: float) -> np.ndarray:
+    """Segments (k, 2, 2) in m where the plane z = height cuts the surface, with the body on their left."""
+    above = triangles[:, :, 2] > height
+    crossing = above.any(axis=1) & ~above.all(axis=1)
+    triangles, above = triangles[crossing], above[crossing]
+    # The corner that is alone on its side comes first; the order of the corners, and so the outside, is kept.
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    a, b, c = (triangles[np.arange(len(triangles)), (lone + k) % 3] for k in range(3))
+    part = ((height - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None], ((height - a[:, 2]) / (c[:, 2] - a[:, 2]))[:, None]
+    one, other = a[:, :2] + part[0] * (b - a)[:, :2], a[:, :2] + part[1] * (c - a)[:, :2]
+    upper = above[np.arange(len(above)), lone]
+    return np.stack([np.where(upper[:, None], one, other), np.where(upper[:, None], other, one)], axis=1)

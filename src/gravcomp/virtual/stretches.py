@@ -1,0 +1,47 @@
+"""The body as stretches between marks along its axis, each of one material: what the rod is made of.
+
+Segments, transitions and caps give their sections from outline and lumens. A body from a file is cut across its axis: the section
+constants are those of its surface there.
+"""
+
+import math
+from dataclasses import dataclass
+
+from gravcomp.description import Material, MeshBody, Piece, Robot
+from gravcomp.virtual.cross_section import CrossSection, cross_section
+from gravcomp.virtual.sliced_body import slice_of
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A piece of the segments, or the body from a file, from the arc length `start` on; both in m.
+
+    index: of its segment, by which material classes and drawn values are found.
+    """
+
+    index: int
+    start: float
+    length: float
+    material: Material
+    source: Piece | MeshBody
+
+    def section(self, s: float) -> CrossSection:
+        """Return the constants of the section at the arc length s (m). Raises ConfigError where a file's body has none."""
+        if isinstance(self.source, MeshBody):
+            return slice_of(self.source, (s - self.start) / self.length)
+        return cross_section(*self.source.section(s))
+
+    @property
+    def axial_modulus(self) -> float:
+        """Young's modulus (Pa) along the axis. Fibres at an angle add the part of their stiffness that lies along it."""
+        fibres = self.material.fibres
+        along = 0.0 if fibres is None else fibres.ratio * math.cos(fibres.angle) ** 4
+        return self.material.youngs_modulus * (1.0 + along)
+
+
+def stretches_of(robot: Robot) -> list[Stretch]:
+    """Return the stretches from base to tip."""
+    if robot.body is not None:
+        return [Stretch(0, 0.0, robot.length, robot.body.material, robot.body)]
+    index = {segment.name: number for number, segment in enumerate(robot.segments)}
+    return [Stretch(index[piece.segment], piece.start, piece.length, piece.material, piece) for piece in robot.pieces]
