@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimate, GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
+from gravcomp.stream_checks import StreamMonitor
 from gravcomp.thermal import HeaterControl
 from gravcomp_estimation import messages
 from gravcomp_estimation.status import Situation, evaluate
@@ -31,6 +32,7 @@ from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 STATUS_PERIOD = 0.1  # s, also of imu/heater: the board switches the heater off without commands
 FOLLOW_PERIOD = 0.5  # s
 SAVE_PERIOD = 60.0  # s
+CHECKS_MEMORY = 120.0  # s for which the checks of the stream remember
 BIAS_PERIOD_NS = 100_000_000  # of imu/bias, which changes over minutes
 LEVELS = {ImuStatus.OK: OK, ImuStatus.INITIALISING: OK, ImuStatus.UNCALIBRATED: WARN}
 
@@ -59,6 +61,7 @@ class ImuEstimator(ManagedNode):
     def activate(self) -> None:
         """Reset the estimator and subscribe."""
         self._estimator.reset()
+        self._monitor = StreamMonitor(CHECKS_MEMORY)
         self._estimate: GravityEstimate | None = None
         self._problem = Problem.NONE
         self._sample_time: float | None = None  # monotonic, s
@@ -128,6 +131,7 @@ class ImuEstimator(ManagedNode):
         self._sample_time = now
         stamp, gyro, accel = messages.sample_of(message)
         estimate = self._estimator.update(stamp, gyro, accel)
+        self._monitor.add(stamp, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
         problem = estimate if isinstance(estimate, Problem) else estimate.imu.problem
         if problem is not Problem.NONE:
             self._problem, self._problem_time = problem, now
@@ -167,6 +171,7 @@ class ImuEstimator(ManagedNode):
                 estimate=self._estimate,
                 heater=heater,
                 stale_time=self.parameters.stale_time,
+                findings=self._monitor.findings(),
             )
         )
         if code != self._code:
@@ -197,6 +202,7 @@ class ImuEstimator(ManagedNode):
             temperature_ready=heater.ready,
             rest=status.rest,
             rejected=status.rejected,
+            stream="; ".join(finding.text for finding in self._monitor.findings()),
         )
 
     def _follow_streams(self) -> None:
@@ -205,6 +211,7 @@ class ImuEstimator(ManagedNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._estimator.reset()
+        self._monitor.reset()
         self._heater.reset()
         self._estimate = None
         response.success, response.message = True, "orientation, bias and heater control restarted"

@@ -17,7 +17,7 @@ from sensor_msgs.msg import Imu, Temperature
 
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.imu_replay import ImuReplayParameters
-from gravcomp.recordings.imu import RecordingError, read_recording
+from gravcomp.recordings.imu import read_recording
 from gravcomp_estimation import messages
 from gravcomp_estimation.stream import LOSSLESS
 from gravcomp_node import ManagedNode, run
@@ -44,10 +44,9 @@ class ImuReplay(ManagedNode):
             raise ConfigError(
                 "imu_replay: the parameter file is empty; a rosbag2 folder or an .npz file in BROAD's layout is needed"
             )
-        try:
-            recording = read_recording(parameters.file, parameters.topic or None)
-        except RecordingError as error:
-            raise ConfigError(str(error)) from error
+        recording = read_recording(parameters.file, parameters.topic or None)
+        for note in recording.notes:
+            self.get_logger().warning(f"{parameters.file}: {note}")
         shift = max(0, EARLIEST_NS - int(recording.stamp_ns[0]))
         # In the order of the stamps; a temperature precedes the sample with the same stamp.
         self._events = [(s + shift, 1, i) for i, s in enumerate(recording.stamp_ns.tolist())]

@@ -1,9 +1,11 @@
 """IMU status: one code and one sentence, for the most severe of all current problems."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gravcomp.orientation import GravityEstimate, Problem
+from gravcomp.stream_checks import Finding
 from gravcomp.thermal import HeaterFault, HeaterState
 from gravcomp_msgs.msg import ImuStatus
 
@@ -21,6 +23,7 @@ class Situation:
     estimate: GravityEstimate | None
     heater: HeaterState
     stale_time: float
+    findings: Sequence[Finding] = ()  # of the stream, the worst first
 
 
 def evaluate(situation: Situation) -> tuple[int, str]:
@@ -31,6 +34,8 @@ def evaluate(situation: Situation) -> tuple[int, str]:
         return ImuStatus.NO_DATA, f"no sample on imu/data_raw for {situation.sample_age:.1f} s"
     if situation.problem_age is not None and situation.problem_age < PROBLEM_LASTS:
         return ImuStatus.BAD_DATA, situation.problem.value
+    if situation.findings and situation.findings[0].fatal:
+        return ImuStatus.BAD_DATA, situation.findings[0].text
     if situation.heater.fault is not HeaterFault.NONE:
         return ImuStatus.HEATER_FAULT, f"heater off: {situation.heater.fault.value}"
     estimate = situation.estimate
@@ -42,4 +47,5 @@ def evaluate(situation: Situation) -> tuple[int, str]:
             ImuStatus.UNCALIBRATED,
             f"the specific force at rest is {norm:.2f} m/s^2 and differs from gravity: calibrate the accelerometer",
         )
-    return ImuStatus.OK, "at rest" if estimate.imu.rest else "in motion"
+    state = "at rest" if estimate.imu.rest else "in motion"
+    return ImuStatus.OK, "; ".join([state, *(finding.text for finding in situation.findings)])

@@ -19,7 +19,6 @@ from std_msgs.msg import String
 from gravcomp.canbus.bus import BusError
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
-from gravcomp.recordings.imu import RecordingError
 from gravcomp.virtual.described import described
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import rotation_from_quaternion
@@ -47,10 +46,7 @@ class VirtualRobotNode(ManagedNode):
         if self.parameters.feedback_rate:
             motors = dataclasses.replace(parameters.motors, feedback_rate=self.parameters.feedback_rate)
             parameters = dataclasses.replace(parameters, motors=motors)
-        try:
-            motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
-        except RecordingError as error:
-            raise ConfigError(str(error)) from error
+        motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
         robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion)
         self.get_logger().info(robot.true.summary())

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag2 import Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 MESSAGES = Path(__file__).parents[2] / "gravcomp_msgs" / "msg"
@@ -16,7 +16,7 @@ class TopicBag:
     time: stamp and time of reception in s; `late`: delay of the reception after the stamp, s.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, storage: StoragePlugin = StoragePlugin.SQLITE3):
         self._store = get_typestore(Stores.ROS2_JAZZY)
         for name in OWN:
             self._store.register(get_types_from_msg((MESSAGES / f"{name}.msg").read_text(), f"gravcomp_msgs/msg/{name}"))
@@ -25,7 +25,7 @@ class TopicBag:
             for kind, made in self._store.types.items()
             if kind.startswith(("geometry_msgs/", "std_msgs/", "builtin", "gravcomp", "sensor_msgs/"))
         }
-        self._bag = Writer(path, version=9)
+        self._bag = Writer(path, version=9, storage_plugin=storage)
         self._topics: dict = {}
 
     def __enter__(self) -> "TopicBag":
@@ -99,12 +99,13 @@ class TopicBag:
             bend_plane=plane,
         )
 
-    def imu(self, topic: str, time: float, gyro, accel) -> None:
+    def imu(self, topic: str, time: float, gyro, accel, late: float = 0.0) -> None:
         vector, none = self._types["Vector3"], np.zeros(9)
         self._write(
             topic,
             "sensor_msgs/msg/Imu",
             time,
+            late,
             orientation=self._types["Quaternion"](0.0, 0.0, 0.0, 1.0),
             orientation_covariance=none,
             angular_velocity=vector(*map(float, gyro)),

@@ -97,6 +97,14 @@ ROWS = {
             "deg",
         ),
     ),
+    "streams": (
+        Row("false_reports", "clean trials: findings", "", 0.0),
+        Row("missed.*", "trials in which it is not reported", "", 0.0),
+        Row("beyond_limit_deg.*", "error beyond the limit", "deg", 0.0),
+        Row("excess_deg.gyro_spikes", "gyroscope spikes: error beyond the clean trial's, worst", "deg", 0.25),
+        Row("excess_deg.accel_spikes", "accelerometer spikes: error beyond the clean trial's, worst", "deg", 0.25),
+        Row("us_per_sample", "CPU time of the live checks, a sample", "us", 20.0),
+    ),
     "graph": (
         Row("delay_ms.median", "delay from IMU frame to the current frame that it caused, median", "ms", 8.0),
         Row("delay_ms.p99", "delay from IMU frame to the current frame that it caused, 99th percentile", "ms", 25.0),

@@ -16,6 +16,7 @@ BENCHMARKS = {
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
     "track": "a wrong model that a tracker of the tip corrects",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
+    "streams": "faulty IMU streams: what is reported, what is held",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
@@ -32,6 +33,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
+    "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
 }
@@ -51,6 +53,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "robots": {"every": 10},
     "track": {"seeds": 1},
     "estimator": {"every": 13},
+    "streams": {"every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},

@@ -45,8 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
     from gravcomp.orientation.calibration import calibrate
-    from gravcomp.orientation.errors import CalibrationError
-    from gravcomp.recordings.imu import RecordingError, read_recording
+    from gravcomp.recordings.imu import read_recording
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
@@ -54,11 +53,8 @@ def run(args: argparse.Namespace) -> int:
     for direction in args.up or ():
         if not np.isfinite(direction).all() or np.linalg.norm(direction) < 1e-6:
             raise ConfigError(f"--up is {direction}; a direction other than zero is needed")
-    try:
-        recording = read_recording(args.file, args.topic)
-        found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
-    except (RecordingError, CalibrationError) as error:
-        raise ConfigError(str(error)) from error
+    recording = read_recording(args.file, args.topic)
+    found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
     span = _learn_bias(recording, options, found, Path(args.bias_model)) if args.bias_model else None
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
     write_imu_calibration(file.source, target, found, Path(args.bias_model).expanduser() if args.bias_model else None)

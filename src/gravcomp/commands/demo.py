@@ -138,12 +138,9 @@ def _begin_of_motion(path: str) -> float:
     import numpy as np
 
     from gravcomp.config import ConfigError
-    from gravcomp.recordings.imu import RecordingError, read_recording
+    from gravcomp.recordings.imu import read_recording
 
-    try:
-        recording = read_recording(path)
-    except RecordingError as error:
-        raise ConfigError(str(error)) from error
+    recording = read_recording(path)
     if recording.orientation is None:
         raise ConfigError(
             f"{path}: has no ground truth of the orientation, which the virtual robot's base needs to turn like the recorded one"

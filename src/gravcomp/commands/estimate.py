@@ -22,6 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
     )
     parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument(
+        "--units",
+        choices=("si", "auto"),
+        default="si",
+        help="si: rad/s, m/s^2 and right-handed axes, anything else is refused or reported; auto: convert what is found",
+    )
     parser.add_argument("--average", type=int, default=1, metavar="N", help="average every N samples (3: 95.2 Hz in BROAD)")
     parser.add_argument(
         "--robot", default="article", help="shipped robot or robot file with the IMU's mount and the parameters of imu_estimator"
@@ -36,18 +42,20 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
     from gravcomp.orientation.inclination import inclination_rmse
-    from gravcomp.recordings.imu import RecordingError, read_recording
+    from gravcomp.recordings.imu import read_recording
+    from gravcomp.stream_checks import in_si
 
+    if args.average < 1:
+        raise ConfigError(f"--average is {args.average}; 1 or more is needed")
     try:
-        if args.average < 1:
-            raise RecordingError(f"--average is {args.average}; 1 or more is needed")
         recording = read_recording(args.file, args.topic)
+        recording, findings = in_si(recording, convert=args.units == "auto")
         if args.average > 1:
             recording = recording.averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         options, mount = _of_robot(args.robot)
         estimator = GravityEstimator(options, mount, model)
-    except (RecordingError, BiasModelError, ValueError) as error:
+    except (BiasModelError, ValueError) as error:
         raise ConfigError(str(error)) from error
 
     from rich.progress import Progress
@@ -68,7 +76,8 @@ def run(args: argparse.Namespace) -> int:
         "inclination_std_deg": float(np.degrees(np.nanmean(result.inclination_std))),
         "inclination_rmse_deg": None,
         "rejected": estimator.filter.rejected,
-        "problems": result.problems,
+        "problems": dict.fromkeys((*recording.notes, *(f.text for f in findings)), 1) | result.problems,
+        "findings": [finding.kind for finding in findings],
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
     if recording.orientation is not None:

@@ -60,17 +60,16 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.config import ConfigError
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph
-    from gravcomp.recordings.imu import RecordingError, read_recording
+    from gravcomp.recordings.imu import read_recording
 
     if not 0.0 <= args.speed <= 1000.0:
         raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as the graph processes it) to 1000")
     if args.out and Path(args.out).exists():
         raise ConfigError(f"{args.out}: exists and is not overwritten; name another folder")
     bag = _whole(args.bag)
-    try:
-        recording = read_recording(bag, args.topic or None)
-    except RecordingError as error:
-        raise ConfigError(str(error)) from error
+    recording = read_recording(bag, args.topic or None)
+    for note in recording.notes:
+        output.note(f"{args.bag}: {note}")
     builder = prepare(args.robot, virtual=False)
     graph = RobotGraph(args.robot, namespace=args.namespace)
     specs = [

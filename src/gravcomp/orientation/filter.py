@@ -20,6 +20,7 @@ from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.guard import REJECTED, RESTARTED, Problem, SampleGuard, Verdict
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector, agrees
+from gravcomp.orientation.spikes import SpikeGate
 
 START_TILT_STD = math.radians(5.0)  # of one accelerometer sample taken for gravity; larger where |a| differs from g
 START_YAW_STD = math.radians(0.1)  # yaw is zero by definition
@@ -30,6 +31,8 @@ UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer measures nothing
 CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those of a stuck sensor, not of a sensor at rest
 # Between the mean specific force at rest and the filter's gravity: a larger angle is more than a calibration error explains.
 CONTRADICTED_TILT = math.radians(2.0)
+# Of the threshold of a spike: an angle lacks for good what a wrong spike removes, a velocity is corrected all the time.
+SURE_GYRO, SURE_ACCEL = 1.5, 1.0
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -46,6 +49,10 @@ class OrientationFilter:
         self.rejected = 0  # samples not used, since construction
         self._guard = SampleGuard(self.options.sensor)
         self._rest = RestDetector(self.options.rest)
+        spikes = self.options.spikes
+        self._gyro_gate, self._accel_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO), SpikeGate(spikes.accel, spikes, SURE_ACCEL)
+        self._before_suspects: tuple | None = None  # state before the first sample that is not decided
+        self._undecided: list[list] = []  # arguments of the steps since then
         self._errors = ErrorCovariance()
         self.reset()
 
@@ -61,6 +68,7 @@ class OrientationFilter:
         self._gravity_norm = self.options.gravity
         self._accel_norm_at_rest: float | None = None
         self._errors.reset(np.zeros((9, 9)))
+        self._forget_suspects()
         self.reset_bias()
 
     def reset_bias(self, bias: Sequence[float] = (0.0, 0.0, 0.0), std: float | None = None) -> None:
@@ -91,10 +99,22 @@ class OrientationFilter:
             return verdict.problem
         if not self._started or verdict.problem in RESTARTED:
             self._start(rate, force, verdict.dt)
+            self._forget_suspects()
             return self._estimate(stamp_ns, rate, False, verdict.problem)
 
         dt = verdict.dt
         gyro_usable, accel_usable = self._usable(verdict)
+        rate, force = self._without_spikes(dt, rate, force, gyro_usable, accel_usable)
+        resting = self._advance(dt, rate, force, gyro_usable, accel_usable)
+        if resting is None:
+            self._forget_suspects()
+            return self._estimate(stamp_ns, rate, False, Problem.CONTRADICTED)
+        if self._before_suspects is not None:
+            self._undecided.append([dt, rate, force, gyro_usable, accel_usable])
+        return self._estimate(stamp_ns, rate if gyro_usable else self._bias, resting, verdict.problem)
+
+    def _advance(self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool) -> bool | None:
+        """Take a sample into the state. Return whether the sensor rests, None where its rest contradicts the inclination."""
         if gyro_usable and accel_usable:
             deviation = self._errors.bias_std()
             if self._bias_given:
@@ -106,7 +126,7 @@ class OrientationFilter:
                 self._errors.set_bias_std(self.options.bias_initial)
                 ax, ay, az = self._rest.mean_accel
                 self._start(rate, (ax, ay, az), dt)
-                return self._estimate(stamp_ns, rate, False, Problem.CONTRADICTED)
+                return None
         else:
             self._rest.reset()
             resting = False
@@ -115,7 +135,56 @@ class OrientationFilter:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
             self._learn_gravity(dt)
-        return self._estimate(stamp_ns, rate if gyro_usable else self._bias, resting, verdict.problem)
+        return resting
+
+    def _without_spikes(
+        self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool
+    ) -> tuple[quat.Vector, quat.Vector]:
+        """Return rate and specific force without spikes; repeat the steps of the suspects that this sample decides."""
+        before = max(self._gyro_gate.suspects, self._accel_gate.suspects)
+        decided = False
+        used = [rate, force]
+        for i, (gate, usable) in enumerate(((self._gyro_gate, gyro_usable), (self._accel_gate, accel_usable))):
+            if not usable:
+                gate.reset()
+                continue
+            used[i], counted = gate.take(dt, used[i])
+            if counted:
+                decided = True
+                for step, value in zip(self._undecided[-len(counted) :], counted):
+                    step[1 + i] = value
+        open_steps = max(0, max(self._gyro_gate.suspects, self._accel_gate.suspects) - 1)
+        if decided and self._before_suspects is not None:
+            self._restore(self._before_suspects)
+            last = len(self._undecided) - min(open_steps, before)
+            for step in self._undecided[:last]:
+                self._advance(*step)
+            self._before_suspects, self._undecided = self._saved(), self._undecided[last:]
+            for step in self._undecided:
+                self._advance(*step)
+        if not self._gyro_gate.suspects and not self._accel_gate.suspects:
+            self._before_suspects = None
+            self._undecided.clear()
+        elif self._before_suspects is None:
+            self._before_suspects = self._saved()
+        return used[0], used[1]
+
+    def _forget_suspects(self) -> None:
+        self._gyro_gate.reset()
+        self._accel_gate.reset()
+        self._before_suspects = None
+        self._undecided = []
+
+    def _saved(self) -> tuple:
+        """Return the state that steps change, for `_restore`."""
+        state = (self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period)
+        return *state, self._gravity_norm, self._accel_norm_at_rest, self._errors.matrix.copy(), self._rest.saved()
+
+    def _restore(self, state: tuple) -> None:
+        self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period = state[:6]
+        self._gravity_norm, self._accel_norm_at_rest = state[6:8]
+        self._errors.reset(state[8].copy())
+        self._rest.restore(state[9])
 
     def _contradicted_tilt(self) -> float:
         """Return the angle (rad) between the mean specific force and the vertical of the estimated orientation.
@@ -182,7 +251,6 @@ class OrientationFilter:
         else:
             self._period = dt if not self._period else self._period + 0.05 * (dt - self._period)
         self._last_gyro = gyro if gyro_usable else self._bias
-
         wx, wy, wz = x - self._bias[0], y - self._bias[1], z - self._bias[2]
         half = 0.5 * dt
         middle = quat.multiply(self._orientation, quat.exponential(wx * half, wy * half, wz * half))

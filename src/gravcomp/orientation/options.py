@@ -7,6 +7,7 @@ state receives the variance density^2 dt, at any rate.
 from dataclasses import dataclass, field
 
 from gravcomp.config import parameter
+from gravcomp.orientation.spikes import SpikeOptions
 
 
 @dataclass(frozen=True)
@@ -98,3 +99,4 @@ class FilterOptions:
     bias_estimation: bool = parameter(True, description="estimate the gyroscope's bias while running")
     rest: RestOptions = field(default_factory=RestOptions)
     sensor: SensorOptions = field(default_factory=SensorOptions)
+    spikes: SpikeOptions = field(default_factory=SpikeOptions)

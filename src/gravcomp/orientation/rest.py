@@ -40,6 +40,16 @@ class RestDetector:
         self._calm_reference: list[float] = []
         self._still = self._calm = 0.0
 
+    def saved(self) -> tuple:
+        """Return the state, for `restore`."""
+        lists = (self.mean_gyro, self.mean_accel, self._reference, self._calm_reference)
+        return *(list(values) for values in lists), self._still, self._calm
+
+    def restore(self, state: tuple) -> None:
+        """Set a saved state."""
+        self.mean_gyro, self.mean_accel, self._reference, self._calm_reference = (list(values) for values in state[:4])
+        self._still, self._calm = state[4:]
+
     @property
     def resting(self) -> bool:
         """Whether the sensor is at rest."""

@@ -6,7 +6,7 @@ from gravcomp.config import ConfigError
 from gravcomp.evaluation.recorded.run import RecordedRun
 from gravcomp.orientation import GravityEstimator, estimate_recording
 from gravcomp.orientation import quaternion as quat
-from gravcomp.recordings.imu import Recording, RecordingError, read_recording
+from gravcomp.recordings.imu import Recording, read_recording
 from gravcomp.report.drawing import MODEL, REAL, Drawing
 from gravcomp.report.result import Figure, Plot, Result
 
@@ -18,10 +18,7 @@ _WINDOW = 30.0  # s; the article reports 20 deg in this time
 
 def run(recorded: RecordedRun) -> Result:
     """Return the evaluation. Raises ConfigError for a recording that is too short or not at rest."""
-    try:
-        recording = read_recording(recorded.bag)
-    except RecordingError as error:
-        raise ConfigError(str(error)) from error
+    recording = read_recording(recorded.bag)
     if recording.duration < _SHORTEST:
         raise ConfigError(
             f"{recorded.bag}: has {recording.duration:.0f} s of IMU samples; at least {_SHORTEST:g} s at rest are needed"

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.config import ConfigError
 
-class RecordingError(ValueError):
+
+class RecordingError(ConfigError):
     """A recording that cannot be read or used; the text names what was found and what is needed."""
 
 
@@ -24,6 +26,7 @@ class Recording:
     temperature: np.ndarray | None = None  # (k,) degC
     orientation: np.ndarray | None = None  # (n, 4) true w x y z, sensor to earth; NaN where unknown
     movement: np.ndarray | None = None  # (n,) bool, samples that count in the evaluation
+    notes: tuple[str, ...] = ()  # what was repaired or lost on reading, a sentence each
 
     def __post_init__(self) -> None:
         count = len(self.stamp_ns)
@@ -33,6 +36,11 @@ class Recording:
             value = getattr(self, name)
             if value is not None and value.shape != (count, width):
                 raise RecordingError(f"{self.source}: {name} has the shape {value.shape}; ({count}, {width}) is needed")
+        if not (np.diff(self.stamp_ns) > 0).any():
+            raise RecordingError(
+                f"{self.source}: the stamps do not advance: all {count} are {self.stamp_ns[0]} ns or earlier;"
+                " stamps in the order of the samples are needed"
+            )
         for name in ("gyro", "accel"):
             if not np.isfinite(getattr(self, name)).all(axis=1).any():
                 raise RecordingError(f"{self.source}: {name} has no finite sample among its {count}")
@@ -49,11 +57,9 @@ class Recording:
 
     @property
     def rate(self) -> float:
-        """Sample rate in Hz, from the median difference of the stamps. Raises RecordingError where the stamps do not advance."""
-        step = float(np.median(np.diff(self.stamp_ns)))
-        if step <= 0:
-            raise RecordingError(f"{self.source}: the stamps do not advance (median step {step:g} ns)")
-        return 1e9 / step
+        """Sample rate in Hz, from the median of the steps by which the stamps advance."""
+        step = np.diff(self.stamp_ns)
+        return 1e9 / float(np.median(step[step > 0]))
 
     def averaged(self, count: int) -> "Recording":
         """Return the recording at 1/count of its rate: the mean of every `count` samples, with the stamp and truth of the last.
@@ -75,4 +81,5 @@ class Recording:
             temperature=self.temperature,
             orientation=None if self.orientation is None else self.orientation[last],
             movement=None if self.movement is None else self.movement[last],
+            notes=self.notes,
         )

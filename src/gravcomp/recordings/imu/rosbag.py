@@ -1,7 +1,8 @@
 """Reading of the IMU stream of a rosbag2 folder (MCAP or SQLite); a damaged one is recovered.
 
 It has one sensor_msgs/Imu topic (of several the one that ends with `imu/data_raw`), the sensor_msgs/Temperature of the same
-namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/QuaternionStamped). Stamps are those of the headers.
+namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/QuaternionStamped). Stamps are those of the headers;
+`stamps.py` repairs those that cannot be used.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gravcomp.recordings.imu.recording import Recording, RecordingError
+from gravcomp.recordings.imu.stamps import usable_stamps
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -32,38 +34,41 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
 
     path = Path(path)
     try:
-        whole = readable(path).path
+        whole = readable(path)
     except BagError as error:
         raise RecordingError(str(error)) from error
+    damage = (f"damaged ({whole.problem}): read up to the damage, {whole.messages} messages",) if whole.problem else ()
     try:
-        with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        with AnyReader([whole.path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             name = _choose(reader.connections, topic, path)
             prefix = name[: -len("imu/data_raw")] if name.endswith("imu/data_raw") else name.rsplit("/", 1)[0] + "/"
             temperatures = [c.topic for c in reader.connections if c.msgtype == TEMPERATURE and c.topic.startswith(prefix)]
             truths = [
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
-            rows: dict[str, list[tuple[int, tuple[float, ...]]]] = {t: [] for t in (name, *temperatures[:1], *truths)}
-            for connection, _, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
+            rows: dict[str, list[tuple[int, int, tuple[float, ...]]]] = {t: [] for t in (name, *temperatures[:1], *truths)}
+            for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-                rows[connection.topic].append((stamp, _values(message)))
+                rows[connection.topic].append((stamp, received, _values(message)))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
         if isinstance(error, RecordingError):
             raise
         raise RecordingError(f"{path}: is not a readable rosbag2 recording: {error}") from error
 
-    stamp, values = _arrays(rows[name], 6)
+    recorded, receptions, values = _arrays(rows[name], 6)
+    samples, notes = usable_stamps(recorded, receptions, values)
     temperature = _arrays(rows[temperatures[0]], 1) if temperatures else None
     truth = _arrays(rows[truths[0]], 4) if truths else None
     return Recording(
         source=str(path),
-        stamp_ns=stamp,
+        stamp_ns=samples,
         gyro=values[:, :3].copy(),
         accel=values[:, 3:].copy(),
         temperature_stamp_ns=temperature[0] if temperature else None,
-        temperature=temperature[1][:, 0] if temperature else None,
-        orientation=_nearest(stamp, *truth) if truth and len(truth[0]) else None,
+        temperature=temperature[2][:, 0] if temperature else None,
+        orientation=_nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
+        notes=(*damage, *notes),
     )
 
 
@@ -93,9 +98,10 @@ def _values(message: Any) -> tuple[float, ...]:
     return q.w, q.x, q.y, q.z
 
 
-def _arrays(rows: list[tuple[int, tuple[float, ...]]], width: int) -> tuple[np.ndarray, np.ndarray]:
-    stamp = np.array([row[0] for row in rows], dtype=np.int64)
-    return stamp, np.array([row[1] for row in rows], dtype=float).reshape(len(rows), width)
+def _arrays(rows: list[tuple[int, int, tuple[float, ...]]], width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
+    stamp, received = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
+    return stamp, received, np.array([row[2] for row in rows], dtype=float).reshape(len(rows), width)
 
 
 def _nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:

@@ -1,0 +1,153 @@
+"""Gyroscope against accelerometer: unit, sign, axes and time scale of the rates.
+
+With the right rates, the specific force turned back into the frame at the begin of a stretch of some seconds is gravity
+plus linear acceleration, and the latter nearly vanishes in means over two seconds. With rates in other units or axes these
+means scatter. Every signed permutation of the axes with every usual scale is tried; the one with the smallest scatter is
+that of the stream. A stream of which both sensors are left-handed looks like one with all rates negated, because the cross
+product in d(a)/dt = -w x a changes its sign.
+"""
+
+import itertools
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gravcomp.stream_checks.finding import Block, Finding
+
+STRETCH = 8.0  # s
+WINDOWS = 4  # of a stretch
+STEP = 0.03  # s between the rotations; rates are averaged over it
+LONGEST_STEP = 0.2  # s: with a longer gap a stretch is left out
+LIVE_PAUSE = 16.0  # s between two stretches of a live stream
+ALIKE = 1.1  # ratio of scatters that says nothing
+CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
+OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
+FEWEST = 3  # stretches: one that hardly turns says nothing
+LEAST = 0.005  # mean scatter of a stretch, of gravity squared, of a stream that turns too little
+SCALES = {"": 1.0, "half": 0.5, "double": 2.0, "deg/s": math.pi / 180.0, "millideg/s": math.pi / 180e3}
+
+
+def _candidates() -> list[tuple[np.ndarray, str]]:
+    """Return matrix (3, 3) and scale of each candidate, the likelier ones first: correct, other unit, negated, other axes."""
+    matrices = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = signs
+            matrices.append(matrix)
+    unity = np.eye(3)
+    matrices.sort(key=lambda m: (not (m == unity).all(), not (m == -unity).all(), np.linalg.det(m) < 0.0, -np.trace(m)))
+    return [(matrix, scale) for matrix in matrices for scale in SCALES]
+
+
+CANDIDATES = _candidates()
+_MATRICES = np.array([matrix * SCALES[scale] for matrix, scale in CANDIDATES])
+
+
+class Axes:
+    """Scatter of each candidate, summed over the stretches."""
+
+    def __init__(self) -> None:
+        self._scatter, self._stretches = np.zeros(len(CANDIDATES)), 0.0
+        self._blocks: list[Block] = []
+        self._length = self._pause = 0.0
+        self._live = False
+        self._bias, self._steadiest = np.zeros(3), math.inf  # mean rate of the block in which it changes least
+
+    def forget(self, keep: float) -> None:
+        """Multiply the sums by `keep`; the stream is live, so that stretches are taken with pauses."""
+        self._live = True
+        self._scatter *= keep
+        self._stretches *= keep
+
+    def take(self, block: Block) -> None:
+        """Take a block; every few seconds they make a stretch."""
+        length = len(block.stamp_ns) * block.period
+        steadiness = float(block.gyro.std(axis=0).max())
+        if steadiness < self._steadiest:
+            self._steadiest, self._bias = steadiness, block.gyro.mean(axis=0)
+        if self._pause > 0.0:
+            self._pause -= length
+            return
+        self._blocks.append(block)
+        self._length += length
+        if self._length >= STRETCH:
+            self._take_stretch(self._blocks)
+            self._blocks, self._length = [], 0.0
+            self._pause = LIVE_PAUSE if self._live else 0.0
+
+    def findings(self) -> list[Finding]:
+        """Return what is odd."""
+        if self._stretches < FEWEST or self._scatter.max() < LEAST * self._stretches:
+            return []
+        best, same_axes = self._likeliest(len(CANDIDATES)), self._likeliest(len(SCALES))
+        if self._scatter[best] > OTHER_AXES * self._scatter[same_axes]:
+            best = same_axes
+        if best == 0 or self._scatter[best] > CLEAR * self._scatter[0]:
+            return []
+        matrix, scale = CANDIDATES[best]
+        unit = scale if scale in ("deg/s", "millideg/s") else ""
+        correction = matrix * (SCALES[unit] if unit else 1.0)
+        found = []
+        if (matrix == -np.eye(3)).all():
+            text = "the axes are left-handed, or the signs of all rates are wrong"
+            found.append(Finding("left_handed", text, gyro_matrix=correction))
+        elif np.linalg.det(matrix) < 0.0:
+            text = f"the axes of gyroscope and accelerometer differ in handedness: {_named(matrix)}"
+            found.append(Finding("left_handed", text, gyro_matrix=correction))
+        elif (matrix != np.eye(3)).any():
+            text = f"gyroscope and accelerometer are in different frames: {_named(matrix)}"
+            found.append(Finding("frames", text, gyro_matrix=correction))
+        if unit:
+            found.append(Finding("gyro_unit", f"the gyroscope is in {unit}: rad/s is needed", fatal=True, gyro_matrix=correction))
+        elif scale and self._scatter[best] <= CLEAR * self._scatter[best - list(SCALES).index(scale)]:
+            text = f"the turns by the gyroscope are {'twice' if scale == 'half' else 'half'} those by the accelerometer"
+            found.append(Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2"))
+        return found
+
+    def _likeliest(self, count: int) -> int:
+        """Return the first of the first `count` candidates whose scatter is about the smallest of theirs."""
+        scatter = self._scatter[:count]
+        return int(np.argmax(scatter <= ALIKE * scatter.min()))
+
+    def _take_stretch(self, blocks: list[Block]) -> None:
+        stamp = np.concatenate([block.stamp_ns for block in blocks])
+        gyro = _median(np.concatenate([block.gyro for block in blocks]))
+        accel = _median(np.concatenate([block.accel for block in blocks]))
+        steps = np.diff(stamp) * 1e-9
+        count = max(1, round(STEP / blocks[-1].period))
+        whole = len(gyro) // (count * WINDOWS) * count * WINDOWS
+        if steps.min() < 0.0 or steps.max() > LONGEST_STEP or whole < 2 * WINDOWS * count:
+            return
+        length = np.median(np.linalg.norm(accel, axis=1))
+        if not length > 0.0:
+            return
+        duration = (stamp[whole - 1] - stamp[0]) * 1e-9 / (whole - 1) * count
+        rate = gyro[:whole].reshape(-1, count, 3).mean(axis=1) - self._bias  # (m, 3)
+        force = accel[:whole].reshape(-1, count, 3).mean(axis=1) / length
+        turns = np.einsum("cij,mj->mci", _MATRICES, rate) * duration
+        matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(CANDIDATES), 3, 3)
+        orientation = np.broadcast_to(np.eye(3), (len(CANDIDATES), 3, 3))
+        turned = np.empty((len(rate), len(CANDIDATES), 3))
+        for m in range(len(rate)):
+            orientation = orientation @ matrices[m]
+            turned[m] = orientation @ force[m]
+        means = turned.reshape(WINDOWS, -1, len(CANDIDATES), 3).mean(axis=1)
+        self._scatter = self._scatter + np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=2), axis=0)
+        self._stretches += 1.0
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """Return the values (n, 3) without single spikes: the median of three neighbours."""
+    inner = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
+    return np.concatenate([values[:1], inner, values[-1:]])
+
+
+def _named(matrix: np.ndarray) -> str:
+    """Return a signed permutation (3, 3) in words."""
+    words = []
+    for axis, row in zip("xyz", matrix):
+        j = int(np.argmax(np.abs(row)))
+        words.append(f"{axis} = {'-' if row[j] < 0 else ''}{'xyz'[j]} of the gyroscope")
+    return "in the accelerometer's frame " + ", ".join(words)

@@ -1,0 +1,65 @@
+"""The checks over a whole recording, and its conversion by what they found."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gravcomp.recordings.imu import Recording, RecordingError
+from gravcomp.stream_checks.finding import Finding
+from gravcomp.stream_checks.monitor import BLOCK, StreamMonitor
+
+
+def check_recording(recording: Recording) -> list[Finding]:
+    """Return what is odd in the recording, the worst first.
+
+    The sign of the accelerometer cannot be found from the samples alone: with it the whole world is mirrored. It is found from
+    a known orientation; without one, a first rest upside down is reported as possible.
+    """
+    monitor = StreamMonitor()
+    for begin in range(0, len(recording), BLOCK):
+        part = slice(begin, begin + BLOCK)
+        monitor.add_block(recording.stamp_ns[part], recording.gyro[part], recording.accel[part])
+    return [*_of_sign(recording, monitor), *monitor.findings()]
+
+
+def in_si(recording: Recording, *, convert: bool) -> tuple[Recording, list[Finding]]:
+    """Return the recording in rad/s, m/s^2 and right-handed axes, and what is odd; `convert`: as far as the findings say how.
+
+    Raises RecordingError for wrong units without `convert`, and for those that cannot be converted.
+    """
+    findings = check_recording(recording)
+    for finding in findings:
+        if finding.fatal and not convert and finding.convertible:
+            raise RecordingError(f"{recording.source}: {finding.text}; convert the recording, or let --units auto do it")
+        if finding.fatal and not finding.convertible:
+            raise RecordingError(f"{recording.source}: {finding.text}")
+    return (converted(recording, findings) if convert else recording), findings
+
+
+def converted(recording: Recording, findings: list[Finding]) -> Recording:
+    """Return the recording in rad/s, m/s^2 and right-handed axes, as far as the findings say how."""
+    gyro, accel = recording.gyro, recording.accel
+    for finding in findings:
+        if finding.accel_factor is not None:
+            accel = accel * finding.accel_factor
+    matrices = [finding.gyro_matrix for finding in findings if finding.gyro_matrix is not None]
+    if matrices:
+        gyro = gyro @ matrices[0].T
+    return replace(recording, gyro=gyro, accel=accel)
+
+
+def _of_sign(recording: Recording, monitor: StreamMonitor) -> list[Finding]:
+    if recording.orientation is None:
+        if monitor.starts_upside_down:
+            text = (
+                "the first rest is upside down (-z up): so it is mounted, or gravity is reported in place of the specific force"
+            )
+            return [Finding("upside_down", text)]
+        return []
+    w, x, y, z = recording.orientation.T
+    up = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)  # in the sensor's frame
+    along = np.sum(up * recording.accel, axis=1) / np.linalg.norm(recording.accel, axis=1)
+    if np.isfinite(along).any() and np.nanmedian(along) < -0.5:
+        text = "the accelerometer is negated: it reports gravity, and the specific force (up at rest) is needed"
+        return [Finding("accel_negated", text, accel_factor=-1.0)]
+    return []

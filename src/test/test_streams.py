@@ -1,0 +1,109 @@
+"""Faults of IMU streams on real recordings: each is reported, and held where it can be. A clean recording has no finding."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gravcomp.bench.stream_faults import FAULTS
+from gravcomp.bench.streams import outcome
+from gravcomp.orientation import estimate_recording
+from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
+from gravcomp.recordings.imu import RecordingError, read_recording
+from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
+from gravcomp.stream_checks import StreamMonitor, check_recording, in_si
+
+TRIAL = "05_undisturbed_slow_rotation_with_breaks_B"
+LENGTH = 45.0  # s of motion
+
+
+def shortened(recording):
+    begin = int(np.argmax(recording.movement)) - int(8.0 * recording.rate)
+    part = slice(max(0, begin), begin + int((8.0 + LENGTH) * recording.rate))
+    rows = {name: getattr(recording, name)[part] for name in ("stamp_ns", "gyro", "accel", "orientation", "movement")}
+    return replace(recording, **rows)
+
+
+@pytest.fixture(scope="module")
+def trial():
+    files = {file.stem: file for file in broad_files()}
+    if TRIAL not in files:
+        pytest.skip(f"the BROAD trial {TRIAL} is missing. {WHERE}")
+    return read_recording(files[TRIAL]).averaged(3)
+
+
+@pytest.fixture(scope="module")
+def short(trial):
+    return shortened(trial)
+
+
+@pytest.fixture(scope="module")
+def clean_deg(short):
+    return math.degrees(inclination_rmse(estimate_recording(short).orientation, short.orientation, short.movement))
+
+
+def test_a_clean_recording_has_no_finding(trial):
+    assert check_recording(trial) == []
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_reported_and_held(name, trial, short, clean_deg):
+    fault = FAULTS[name]
+    # The drift needs the rest at the end; the others are shown by any part with motion.
+    kinds, error = outcome(fault, trial if name == "bias_drift" else short, seed=2)
+    assert set(kinds) & set(fault.kinds)
+    if error is not None:
+        assert error <= clean_deg + fault.excess_deg
+
+
+def test_a_wrong_unit_is_refused_unless_it_is_to_be_converted(short):
+    in_g = replace(short, accel=short.accel / 9.80665)
+    with pytest.raises(RecordingError, match=r"in g .* --units auto"):
+        in_si(in_g, convert=False)
+    recording, findings = in_si(in_g, convert=True)
+    np.testing.assert_allclose(recording.accel, short.accel)
+    assert [finding.kind for finding in findings] == ["accel_unit"]
+
+
+def test_the_live_checks_find_what_the_offline_checks_find(short):
+    faulty = FAULTS["gyro_spikes"].apply(short, np.random.default_rng(1))
+    monitor = StreamMonitor(memory=120.0)
+    for sample in zip(faulty.stamp_ns.tolist(), faulty.gyro.tolist(), faulty.accel.tolist()):
+        monitor.add(*sample)
+    assert [finding.kind for finding in monitor.findings()] == ["gyro_spikes"]
+
+
+def gated(values):
+    """Return what a gate counts of a signal of one axis in the end, and how many spikes it held."""
+    gate = SpikeGate(math.radians(20.0), SpikeOptions(), 1.0)
+    counted = []
+    for value in values:
+        used, right = gate.take(0.01, (value, 0.0, 0.0))
+        if right:
+            counted[-len(right) :] = [x for x, _, _ in right]
+        counted.append(used[0])
+    return np.array(counted), gate.count
+
+
+@pytest.mark.parametrize("spikes", [{60: 7.0}, {60: 7.0, 61: -5.0}, {60: -3.0, 90: 4.0}])
+def test_spikes_are_replaced_by_the_straight_line(spikes):
+    signal = np.sin(0.1 * np.arange(200))
+    spiky = signal.copy()
+    for place, value in spikes.items():
+        spiky[place] += value
+    counted, count = gated(spiky)
+    assert count == len(spikes) and np.abs(counted - signal).max() < 0.03
+
+
+def test_a_jump_that_stays_counts_in_full():
+    signal = np.where(np.arange(200) < 100, 0.0, 5.0)
+    counted, count = gated(signal)
+    assert count == 0 and (counted == signal).all()
+
+
+def test_fast_motion_is_not_taken_for_spikes():
+    signal = 10.0 * np.sin(2.0 * np.pi * 8.0 * 0.01 * np.arange(400))  # 8 Hz, 570 deg/s, at 100 Hz
+    counted, count = gated(signal)
+    assert count == 0 and (counted[20:] == signal[20:]).all()
