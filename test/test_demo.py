@@ -78,6 +78,13 @@ def test_a_robot_drawn_by_a_seed_is_compensated(gravcomp):
     assert answer.json["residual_lateral_mm"] < answer.json["sag_mm"] / 3.0
 
 
+@pytest.mark.graph
+def test_a_tracker_of_the_tip_corrects_the_model(gravcomp):
+    answer = gravcomp(*documented("./gravcomp demo --tracker 5")[1:], "--headless", "--duration", "14", "--json")
+    assert answer.code == 0, answer.err
+    assert answer.json["residual_lateral_mm"] < answer.json["sag_mm"] / 5.0
+
+
 @pytest.mark.rates
 def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.environment.end_with_parent import end_with_parent
+from gravcomp.environment.give_way import give_way
 from gravcomp.inverse.target import Target
-
-_PRIORITY = 19
 
 
 class Verdict(NamedTuple):
@@ -83,5 +82,5 @@ def answer(question: dict) -> Verdict:
 
 
 if __name__ == "__main__":
-    os.nice(_PRIORITY)
+    give_way()
     print(json.dumps(answer(json.loads(sys.argv[1]))._asdict()), flush=True)
