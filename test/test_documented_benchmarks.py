@@ -13,7 +13,7 @@ pytestmark = pytest.mark.timeout(1600)
         ("./gravcomp bench engine --write src/README.md", "closed-loop"),
         ("./gravcomp bench estimator", "CPU time of a sample"),
         ("./gravcomp bench estimator --write src/doc/figures.md", "CPU time of a sample"),
-        ("./gravcomp bench streams --json", "missed"),
+        ("./gravcomp bench streams --json", "bench streams"),
         ("./gravcomp bench track", "with a tracker"),
         ("./gravcomp bench track --write src/doc/figures.md", "with a tracker"),
         pytest.param("./gravcomp bench graph", "two robots", marks=pytest.mark.graph),

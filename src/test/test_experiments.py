@@ -212,9 +212,9 @@ def test_the_loop_lets_the_robot_sag_and_straightens_it(setup):
 
 def test_a_free_fall_begins_straight_and_ends_where_the_robot_hangs(setup):
     fall = free_fall((setup, 0.0, 0.0, 1.0, 0))
-    # A camera's noise is 0.1 mm a coordinate.
+    # A tracker's noise is 0.1 mm a coordinate, and half a degree of the direction.
     assert np.linalg.norm(fall.tip_position[0] - [0.0, 0.0, 0.1]) < 0.6e-3
-    assert fall.tip_direction[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert fall.tip_direction[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
     # In free fall at first: g t^2 / 2 is 0.5 mm after 10 ms, one and a half times that at the tip.
     assert 0.3e-3 < -fall.tip_position[1, 0] < 1.2e-3
     assert fall.tip_position[:, 0].min() < -40e-3 < fall.tip_position[-1, 0] < -20e-3

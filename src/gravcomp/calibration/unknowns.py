@@ -15,7 +15,7 @@ _TAUT = 1e-4  # of the largest tension: a cable with more counts as taut
 
 @dataclass(frozen=True)
 class Priors:
-    """Standard deviations of what is believed before the measurement, without a unit, so that they suit a robot of any size."""
+    """Standard deviations that are assumed before the measurement, without a unit, so that they suit a robot of any size."""
 
     offset_share: float = parameter(0.01, minimum=1e-6, maximum=1.0, description="zero of a cable, over the robot's length")
     stretch: float = parameter(

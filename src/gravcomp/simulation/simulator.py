@@ -36,7 +36,7 @@ class Simulator:
     >>> simulator = Simulator(load_robot_file("article").robot, reduced=False)
     >>> shape = simulator.solve(np.array([-9.81, 0.0, 0.0]))  # m/s^2 in soft_base: the robot is horizontal
     >>> bool(shape.is_equilibrium), float((1e3 * shape.tip_position[0]).round(1))  # mm
-    (True, -27.8)
+    (True, -27.9)
     """
 
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
