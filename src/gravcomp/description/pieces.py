@@ -74,7 +74,7 @@ def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
     for segment in segments:
         first = 0.0
         if pieces:
-            check_joint(pieces[-1], segment)
+            _check_joint(pieces[-1], segment)
             if segment.transition is not None or (not steps and _differ(pieces[-1], segment)):
                 pieces.append(_transition(pieces[-1], segment, start))
                 first = pieces[-1].length / segment.length
@@ -89,7 +89,7 @@ def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
     return pieces
 
 
-def check_joint(before: Piece, segment: Segment) -> None:
+def _check_joint(before: Piece, segment: Segment) -> None:
     """Raise ValueError when a segment does not touch the piece before it, so that nothing holds it."""
     name = before.segment
     one, other = before.outer[1], segment.outline(0.0)
