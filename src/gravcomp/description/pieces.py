@@ -21,7 +21,6 @@ from gravcomp.description.segment import Segment, require_room
 _SLOPE, _PART = 2.0, 0.25
 # In a layer of elements in a transition the areas of outline, wall and lumens change by about this factor at most.
 _AREA_IN_LAYER = 1.5
-_SAME = 1e-9  # m
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,11 +125,11 @@ def _round_throughout(segment: Segment) -> bool:
 def _differ(before: Piece, segment: Segment) -> bool:
     """Whether the outlines differ where they meet, as many lumens lie elsewhere, or lumens that end touch others that begin."""
     ending, beginning = [pair[1] for pair in before.lumens], segment.lumen_outlines(0.0)
-    if not before.outer[1].alike(segment.outline(0.0), _SAME):
+    if not before.outer[1].alike(segment.outline(0.0)):
         return True
     if len(ending) == len(beginning):
-        return not all(one.alike(other, _SAME) for one, other in zip(ending, beginning))
-    others = [lumen for lumen in beginning if not any(lumen.alike(one, _SAME) for one in ending)]
+        return not all(one.alike(other) for one, other in zip(ending, beginning))
+    others = [lumen for lumen in beginning if not any(lumen.alike(one) for one in ending)]
     try:
         require_room(before.outer[1], [*ending, *others])
     except ValueError:
@@ -159,7 +158,7 @@ def _transition(before: Piece, segment: Segment, start: float) -> Piece:
     base, tip = [pair[1] for pair in before.lumens], list(segment.lumen_outlines(part))
     if len(base) != len(tip):  # those that coincide go on, the others end
         own = segment.lumen_outlines(0.0)
-        pairs = [(one, other) for one in base for before_taper, other in zip(own, tip) if one.alike(before_taper, _SAME)]
+        pairs = [(one, other) for one in base for before_taper, other in zip(own, tip) if one.alike(before_taper)]
         base, tip = [one for one, _ in pairs], [other for _, other in pairs]
     outer = before.outer[1], segment.outline(part)
     lumens = tuple(zip(base, tip))
