@@ -15,7 +15,7 @@ _PLANE_TOLERANCE = 1e-4
 
 
 def body_mesh(robot: Robot) -> Mesh:
-    """Return the mesh: graded hexahedra for tubes, quadratic tetrahedra for a body from a file. Raises MeshError."""
+    """Return the mesh: graded hexahedra for tubes, quadratic elements for a body from a file. Raises MeshError."""
     if robot.body is not None:
         return _from_file(robot.body)
     mesh = tube_mesh(robot)

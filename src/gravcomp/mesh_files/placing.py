@@ -45,8 +45,7 @@ class Placement:
 class PlacedBody:
     """A surface (kind tri3, facing outward) or a volume (tet4, tet10, hex20) in soft_base.
 
-    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; flat_tip: whether it ends in a face across the
-    axis; notes: sentences on what was found and repaired.
+    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; notes: sentences on what was found and repaired.
     """
 
     kind: str
