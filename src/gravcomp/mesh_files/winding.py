@@ -17,15 +17,14 @@ def edge_pairs(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return owner[one], owner[other], forward[one] != forward[other]
 
 
-def wound_alike(faces: np.ndarray) -> np.ndarray | None:
+def wound_alike(faces: np.ndarray, one: np.ndarray, other: np.ndarray, alike: np.ndarray) -> np.ndarray | None:
     """Return the triangles of one connected surface, those turned over that face another way than the first.
 
-    None if they cannot all face alike.
+    one, other and alike (e,) are their `edge_pairs`. None if they cannot all face alike.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order
 
-    one, other, alike = edge_pairs(faces)
     if alike.all():
         return faces
     value = np.where(alike, 1, 2)
