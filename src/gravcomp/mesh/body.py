@@ -7,8 +7,8 @@ from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.quadratic import raised_to_quadratic
 from gravcomp.mesh.refusal import require_well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
-from gravcomp.mesh_files.centreline import straightened
 from gravcomp.mesh_files.filling import filled
+from gravcomp.rest_axis import straightened
 
 # Relative to the length: distance of a node from the plane of base or tip up to which it is put onto the plane.
 _PLANE_TOLERANCE = 1e-4
