@@ -4,6 +4,7 @@ import numpy as np
 
 from gravcomp.mesh_files.errors import MeshError
 from gravcomp.mesh_files.plane_section import plane_section
+from gravcomp.mesh_files.repair_surface import enclosed_volume
 from gravcomp.rest_axis import STRAIGHT, Arc, RestAxis, straightened
 
 _PIECES, _SECTIONS, _ROUNDS = 4, 40, 4
@@ -24,8 +25,7 @@ def fitted_axis(nodes: np.ndarray, triangles: np.ndarray, name: str) -> tuple[Re
     from scipy.optimize import least_squares
 
     top = float(nodes[:, 2].max())
-    a, b, c = (nodes[triangles[:, i]] for i in range(3))
-    thickness = float(np.sqrt(4.0 * np.einsum("ki,ki->", np.cross(a, b), c) / 6.0 / (np.pi * top)))
+    thickness = float(np.sqrt(4.0 * enclosed_volume(nodes, triangles) / (np.pi * top)))
     direction = nodes[np.argmax(np.linalg.norm(nodes, axis=1))]
     length = float(np.linalg.norm(direction))
     upright = _section_places(STRAIGHT, direction, top)
