@@ -22,8 +22,8 @@ import numpy as np
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
+from gravcomp.mesh.layers import least_layers
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.pieces import pieces_of
 from gravcomp.mesh.refusal import well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
 
@@ -192,7 +192,7 @@ class _Tips:
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    parts = least_layers(robot.pieces)
     disks = any(segment.disks for segment in robot.segments)
     around = 4 if coarse_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
@@ -219,7 +219,7 @@ def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
         return _with(robot, elements, "around", min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
     if direction == "radial":
         return _with(robot, elements, "radial", min(elements.radial + 1, 8))
-    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    parts = least_layers(robot.pieces)
     disks = any(segment.disks for segment in robot.segments)
     return _with(robot, elements, "along", min(elements.along + parts if disks else math.ceil(1.4 * elements.along), 500))
 

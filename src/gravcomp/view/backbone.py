@@ -64,7 +64,7 @@ def rest_backbone(robot: Robot) -> Backbone:
     """Return the robot at rest, without load."""
     from scipy.spatial.transform import Rotation
 
-    from gravcomp.mesh.pieces import rest_axis
+    from gravcomp.mesh.robot_axis import rest_axis
 
     station = np.linspace(0.0, 1.0, _REST_POINTS)
     position, rotation = rest_axis(robot).frames(station * robot.length)
