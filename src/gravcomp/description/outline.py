@@ -124,7 +124,7 @@ class Outline:
         return text if self.x == 0.0 == self.y else f"{text} at ({self.x * 1e3:g}, {self.y * 1e3:g}) mm"
 
 
-def encloses(outer: "HasGauge", inner: Outline, gap: float) -> bool:
+def encloses(outer: HasGauge, inner: Outline, gap: float) -> bool:
     """Return whether `inner` lies inside `outer` with at least `gap` (m) between them."""
     for x, y in inner.boundary(np.linspace(0.0, 2 * math.pi, 48, endpoint=False)):
         reach = math.hypot(x - outer.x, y - outer.y)
