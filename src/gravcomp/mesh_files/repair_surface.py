@@ -14,7 +14,7 @@ from gravcomp.mesh_files.raw_mesh import RawMesh
 from gravcomp.mesh_files.repair_volume import require_numbers, require_one_body
 from gravcomp.mesh_files.self_intersection import intersecting_triangles
 from gravcomp.mesh_files.welding import components, welded
-from gravcomp.mesh_files.winding import edge_pairs, wound_alike
+from gravcomp.mesh_files.winding import directed_edges, edge_pairs, wound_alike
 
 # Points on both sides of a gap up to this part of the diagonal are joined.
 _GAP = 1e-4
@@ -99,7 +99,7 @@ def _stitched(nodes: np.ndarray, faces: np.ndarray, notes: list[str]) -> tuple[n
 
 
 def _refuse_branches(nodes: np.ndarray, faces: np.ndarray, path: Path) -> None:
-    edges = np.sort(faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(faces), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     branched = unique[count > 2]
     if len(branched):
