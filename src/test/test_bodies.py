@@ -19,9 +19,9 @@ from gravcomp.full_model.wrench import Wrench
 from gravcomp.mesh import Mesh, MeshError, tube_mesh
 from gravcomp.mesh.elements import shape_gradients, stiffness_quadrature
 from gravcomp.mesh.embedding import embed
-from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.quality import mesh_quality
 from gravcomp.mesh.refusal import well_shaped
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.tube import coarse_elements
 from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
 

@@ -109,9 +109,7 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     return PlacedBody(mesh.kind, nodes, mesh.cells, length, axis, tuple(notes))
 
 
-def _unit(
-    fixed: float | None, nodes: np.ndarray, length: float, placement: Placement, name: str
-) -> tuple[float, str]:
+def _unit(fixed: float | None, nodes: np.ndarray, length: float, placement: Placement, name: str) -> tuple[float, str]:
     """The unit, and why it is that one; a body that lies on its side is named before its unit is doubted. Raises MeshError."""
     size = np.ptp(nodes, axis=0)
     lying = placement.axis == "given" and max(size[:2]) > _LYING * size[2]
