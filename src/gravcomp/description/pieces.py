@@ -4,6 +4,7 @@ A segment is one piece, or one between each two of its stations; its cap is anot
 different sections a transition joins them, unless all sections of the robot are round and concentric: these may change in a step.
 """
 
+import bisect
 import dataclasses
 import itertools
 import math
@@ -60,6 +61,12 @@ class Piece:
     def moments(self, s: float) -> SectionMoments:
         """Return area, centroid and second moments of the section there."""
         return section_moments(*self.section(s))
+
+
+def piece_at(pieces: Sequence[Piece], s: float) -> Piece:
+    """Return the piece at the arc length s (m), the later one where two meet."""
+    ends = [piece.start + piece.length for piece in pieces[:-1]]
+    return pieces[bisect.bisect_right(ends, s)]
 
 
 def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
