@@ -54,6 +54,7 @@ NINE = [{"cable": f"c{i}", "can_id": i % 8 + 1} for i in range(9)]
         ({"buses": [{"name": " "}, {"name": "far"}]}, r"buses\[0\].name is empty"),
         ({"buses": [{"name": "near"}, {"name": "far"}]}, "interface and channel .* is given to more than one bus"),
         ({"buses": [{"name": "near", "channel": "can0"}] * 2}, "name 'near' is given to more than one bus"),
+        ({"can": {"channel": "can2"}}, "hardware.can and hardware.buses are both given; allowed: one of them"),
         ({"imu_bus": "middle"}, "imu_bus is 'middle'; allowed: near, far"),
         (
             {"motors": [{"cable": "a", "can_id": 2, "bus": "near"}, {"cable": "b", "can_id": 2, "bus": "near"}]},

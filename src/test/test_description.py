@@ -66,6 +66,7 @@ def change(path, value):
     return apply
 
 
+VIA_AND_START = {"name": "s1c2", "via_points_mm": [[0, 2, 5], [0, 2, 50]], "start_mm": 5}
 MISTAKES = [
     (change(["segments", 0, "length_mm"], -5), ["robot.segments[0].length_mm", "-5", "1 to 5000 mm"]),
     (change(["segments", 1, "lumen_diameter_mm"], 9.5), ["robot.segments[1]", "lumen_diameter_mm is 9.5", "8.82"]),
@@ -78,6 +79,7 @@ MISTAKES = [
     (change(["cables", 1, "angle_deg"], None), ["cables[1]", "angle_deg"]),
     (change(["cables", 1, "name"], "s1c1"), ["cables", "'s1c1'", "2 times"]),
     (change(["limits", "tension_min"], 9.0), ["robot.limits", "tension_min is 9 N", "below tension_max = 5 N"]),
+    (change(["cables", 1], VIA_AND_START), ["cables[1]", "via_points_mm and also", "start_mm"]),
     (change(["cables", 1, "via_points_mm"], [[0, 2, 0], [0, 2, 50]]), ["cables[1]", "via_points_mm and also"]),
     (change(["body"], {"file": "a.stl", "length_mm": 100.0}), ["both of segments and body"]),
     (change(["segments"], None), ["neither of segments and body"]),

@@ -46,12 +46,13 @@ class Cable(CableLine):
                 or self.radius is not None
                 or self.tip_radius is not None
                 or self.follow_taper
+                or self.start
                 or self.segment is not None
                 or self.end is not None
             ):
                 raise ValueError(
                     f"cable '{self.name}' has via_points_mm and also angle_deg, radius_mm, tip_radius_mm, follow_taper,"
-                    " segment or end_mm; give one form only"
+                    " start_mm, segment or end_mm; give one form only"
                 )
             if len(self.via_points) < 2:
                 raise ValueError(f"cable '{self.name}' has {len(self.via_points)} via_points_mm; at least 2 are needed")

@@ -18,6 +18,7 @@ Cable displacement [m] is positive when pulled in:  displacement = direction x r
 import dataclasses
 import functools
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -256,6 +257,8 @@ def parse_hardware(section: Any, *, source: str, cables: tuple[str, ...] | None 
     `cables` are the names of the robot's cables in their order; None skips the comparison with the motors.
     Raises ConfigError when a value is wrong or the motors do not have these cables; with one motor a cable, in this order.
     """
+    if isinstance(section, Mapping) and "can" in section and section.get("buses"):
+        raise ConfigError(f"{source}: hardware.can and hardware.buses are both given; allowed: one of them")
     hardware = from_mapping(Hardware, section, source=source, key="hardware")
     if cables is None:
         return hardware
