@@ -64,9 +64,10 @@ class Axes:
     def take(self, block: Block) -> None:
         """Take a block; every few seconds they make a stretch."""
         length = len(block.stamp_ns) * block.period
-        steadiness = float(block.gyro.std(axis=0).max())
+        gyro = _median(block.gyro)[1:-1]  # a spike at either end would remain
+        steadiness = float(gyro.std(axis=0).max())
         if steadiness < self._steadiest:
-            self._steadiest, self._bias = steadiness, block.gyro.mean(axis=0)
+            self._steadiest, self._bias = steadiness, gyro.mean(axis=0)
         if self._pause > 0.0:
             self._pause -= length
             return
