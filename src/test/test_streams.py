@@ -1,5 +1,6 @@
 """Faults of IMU streams on real recordings: each is reported, and held where it can be. A clean recording has no finding."""
 
+import functools
 import math
 from dataclasses import replace
 
@@ -26,12 +27,17 @@ def shortened(recording):
     return replace(recording, **rows)
 
 
+@functools.cache
+def averaged_trial(stem):
+    files = {file.stem: file for file in broad_files()}
+    if stem not in files:
+        pytest.skip(f"the BROAD trial {stem} is missing. {WHERE}")
+    return read_recording(files[stem]).averaged(3)
+
+
 @pytest.fixture(scope="module")
 def trial():
-    files = {file.stem: file for file in broad_files()}
-    if TRIAL not in files:
-        pytest.skip(f"the BROAD trial {TRIAL} is missing. {WHERE}")
-    return read_recording(files[TRIAL]).averaged(3)
+    return averaged_trial(TRIAL)
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +52,20 @@ def clean_deg(short):
 
 def test_a_clean_recording_has_no_finding(trial):
     assert check_recording(trial) == []
+
+
+@pytest.mark.parametrize("fault", [None, "gyro_spikes"])
+@pytest.mark.parametrize(("begin", "end"), [(0.25, 0.45), (0.45, 0.65), (0.65, 0.85), (0.0, 1.0)])
+@pytest.mark.parametrize("stem", ["12_undisturbed_slow_translation_C", "27_disturbed_phone_vibration_B"])
+def test_a_stream_that_hardly_turns_keeps_its_unit_with_spikes_and_without_rest(stem, begin, end, fault):
+    recording = averaged_trial(stem)
+    part = slice(int(begin * len(recording)), int(end * len(recording)))
+    if fault is not None:
+        recording = FAULTS[fault].apply(recording, np.random.default_rng(3))
+    monitor = StreamMonitor()
+    for block in np.array_split(np.arange(len(recording))[part], max(1, (part.stop - part.start) // 256)):
+        monitor.add_block(recording.stamp_ns[block], recording.gyro[block], recording.accel[block])
+    assert [finding.kind for finding in monitor.findings()] == ([] if fault is None else [fault])
 
 
 @pytest.mark.parametrize("name", FAULTS)

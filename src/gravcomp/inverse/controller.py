@@ -45,6 +45,8 @@ class InverseController:
         self.options = options or InverseOptions()
         self._transmission = None if transmission is None or transmission.direct else transmission
         self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
+        rows = self._couplings.rows
+        self._coupled = rows.any(axis=0) if len(rows) else np.zeros(len(robot.cables), bool)  # (m,)
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length, robot.limits.tension_max)
@@ -98,10 +100,10 @@ class InverseController:
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
         last = previous
-        if len(self._couplings.rows):
+        if self._coupled.any():
             # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
             path = response.compliance_aa @ tension + response.displacement_free
-            previous = np.where(self._couplings.rows.any(axis=0), np.maximum(previous, path), previous)
+            previous = np.where(self._coupled, np.maximum(previous, path), previous)
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
@@ -193,8 +195,7 @@ class InverseController:
         """
         limits, option = self.robot.limits, self.options.pretension
         own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
-        least = np.maximum(own, limits.tension_min)
-        return np.where(self._couplings.rows.any(axis=0), 0.0, least) if len(self._couplings.rows) else least
+        return np.where(self._coupled, 0.0, np.maximum(own, limits.tension_min))
 
     def _recovery_command(
         self,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 _NO_DIRECTION = np.zeros(3)
-_REACH = 1.5  # of the robot's length
+REACH = 1.5  # of the robot's length
 _DIRECTION_SHARE = 0.1  # of the square of the robot's length
 
 
@@ -74,9 +74,9 @@ class Target:
         points |= {f"backbone_position {k}": p for k, p in enumerate(self.backbone_position) if self.backbone_weight[k] > 0.0}
         for name, point in points.items():
             distance = float(np.linalg.norm(point))
-            if distance > _REACH * length:
+            if distance > REACH * length:
                 raise TargetError(
-                    f"{name} is {distance:.3g} m from the base; allowed for a robot of {length:g} m: up to {_REACH * length:g} m"
+                    f"{name} is {distance:.3g} m from the base; allowed for a robot of {length:g} m: up to {REACH * length:g} m"
                 )
 
     @property

@@ -3,8 +3,9 @@
 A sample far from both the last good one and its extrapolation is a suspect; the extrapolation stands in for it. The following
 samples decide. If they return to where the signal was, the suspect was a spike, and the straight line across it counts. If they
 stay near the suspect, the sensor did turn that fast, and the suspect counts after all. In both cases the filter repeats the steps
-since then, so a wrong suspicion costs a sample of delay, not an error. What is far follows the signal: a
-multiple of its mean innovation. (The test of an innovation by its scale is that of F. R. Hampel, JASA 1974, 69(346), 383-393.)
+since then, so a wrong suspicion costs a sample of delay (after a very large jump `longest` samples), not an error. What is far
+follows the signal: a multiple of its mean innovation. (The test of an innovation by its scale is that of F. R. Hampel, JASA 1974,
+69(346), 383-393.)
 """
 
 from dataclasses import dataclass, field

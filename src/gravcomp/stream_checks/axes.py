@@ -4,7 +4,8 @@ With the right rates, the specific force turned back into the frame at the begin
 plus linear acceleration, and the latter nearly vanishes in means over two seconds. With rates in other units or axes these
 means scatter. Every signed permutation of the axes with every usual scale is tried; the one with the smallest scatter is
 that of the stream. A stream of which both sensors are left-handed looks like one with all rates negated, because the cross
-product in d(a)/dt = -w x a changes its sign.
+product in d(a)/dt = -w x a changes its sign. The bias of the rates is the mean rate at rest; before the first rest it counts as
+zero, and a factor of 2 is not reported, because a bias would look like it where the sensor hardly turns.
 """
 
 import itertools
@@ -20,6 +21,7 @@ WINDOWS = 4  # of a stretch
 STEP = 0.03  # s between the rotations; rates are averaged over it
 LONGEST_STEP = 0.2  # s: with a longer gap a stretch is left out
 LIVE_PAUSE = 16.0  # s between two stretches of a live stream
+QUIET = 0.01  # largest deviation of the specific force in a block at rest, of its length: elsewhere a mean rate is no bias
 ALIKE = 1.1  # ratio of scatters that says nothing
 CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
 OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
@@ -53,7 +55,7 @@ class Axes:
         self._blocks: list[Block] = []
         self._length = self._pause = 0.0
         self._live = False
-        self._bias, self._steadiest = np.zeros(3), math.inf  # mean rate of the block in which it changes least
+        self._bias, self._steadiest = np.zeros(3), math.inf  # mean rate of the quiet block in which it changes least
 
     def forget(self, keep: float) -> None:
         """Multiply the sums by `keep`; the stream is live, so that stretches are taken with pauses."""
@@ -64,9 +66,7 @@ class Axes:
     def take(self, block: Block) -> None:
         """Take a block; every few seconds they make a stretch."""
         length = len(block.stamp_ns) * block.period
-        steadiness = float(block.gyro.std(axis=0).max())
-        if steadiness < self._steadiest:
-            self._steadiest, self._bias = steadiness, block.gyro.mean(axis=0)
+        self._find_bias(block)
         if self._pause > 0.0:
             self._pause -= length
             return
@@ -101,10 +101,20 @@ class Axes:
             found.append(Finding("frames", text, gyro_matrix=correction))
         if unit:
             found.append(Finding("gyro_unit", f"the gyroscope is in {unit}: rad/s is needed", fatal=True, gyro_matrix=correction))
-        elif scale and self._scatter[best] <= CLEAR * self._scatter[best - list(SCALES).index(scale)]:
+        elif scale and self._rested and self._scatter[best] <= CLEAR * self._scatter[best - list(SCALES).index(scale)]:
             text = f"the turns by the gyroscope are {'twice' if scale == 'half' else 'half'} those by the accelerometer"
             found.append(Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2"))
         return found
+
+    @property
+    def _rested(self) -> bool:
+        return math.isfinite(self._steadiest)
+
+    def _find_bias(self, block: Block) -> None:
+        gyro, accel = _median(block.gyro)[1:-1], _median(block.accel)[1:-1]  # a spike at either end would remain
+        steadiness = float(gyro.std(axis=0).max())
+        if steadiness < self._steadiest and accel.std(axis=0).max() <= QUIET * np.linalg.norm(accel.mean(axis=0)):
+            self._steadiest, self._bias = steadiness, gyro.mean(axis=0)
 
     def _likeliest(self, count: int) -> int:
         """Return the first of the first `count` candidates whose scatter is about the smallest of theirs."""

@@ -29,9 +29,8 @@ class Resting:
 
     def forget(self, keep: float) -> None:
         """Keep the newest windows only."""
-        if keep < 1.0:
-            self._norms, self._quiet = self._norms[-KEPT:], self._quiet[-KEPT:]
-            self._bias = self._bias[:10] + self._bias[10:][-KEPT:]
+        self._norms, self._quiet = self._norms[-KEPT:], self._quiet[-KEPT:]
+        self._bias = self._bias[:10] + self._bias[10:][-KEPT:]
 
     def take(self, block: Block) -> None:
         """Look at the windows of a block."""

@@ -29,10 +29,9 @@ def in_si(recording: Recording, *, convert: bool) -> tuple[Recording, list[Findi
     """
     findings = check_recording(recording)
     for finding in findings:
-        if finding.fatal and not convert and finding.convertible:
-            raise RecordingError(f"{recording.source}: {finding.text}; convert the recording, or let --units auto do it")
-        if finding.fatal and not finding.convertible:
-            raise RecordingError(f"{recording.source}: {finding.text}")
+        if finding.fatal and not (convert and finding.convertible):
+            way = "; convert the recording, or let --units auto do it" if finding.convertible else ""
+            raise RecordingError(f"{recording.source}: {finding.text}{way}")
     return (converted(recording, findings) if convert else recording), findings
 
 

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gravcomp.inverse.target import REACH
+
 _SINCE_BOOT = 1e8  # s, three years: a clock that counts from the start of a machine is below, one that counts from 1970 above
 _AHEAD = 0.05  # s: synchronised clocks differ by less
 _UNIT = 1000.0
-_REACH = 1.5  # of the robot's length, as for targets
 
 
 class _Axes(NamedTuple):
@@ -62,7 +63,7 @@ def wild(measured: np.ndarray, modelled: np.ndarray, length: float, allowed: flo
     for axes in _AXES:
         if np.linalg.norm(axes.matrix @ measured - modelled) <= 0.5 * allowed:
             return f"{found}: its frame may be {axes.name}"
-    if np.linalg.norm(measured) > _REACH * length:
+    if np.linalg.norm(measured) > REACH * length:
         return f"{found}: out of reach of a robot of {1e3 * length:.0f} mm, it is in another frame"
     return found
 
