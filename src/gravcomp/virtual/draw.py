@@ -95,12 +95,7 @@ def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn
             density=density * material.density if body.density is None else body.density,
         )
 
-    if robot.body is not None:
-        return dataclasses.replace(robot, body=dataclasses.replace(robot.body, material=true(robot.body.material, ratio[0])))
-    segments = tuple(
-        dataclasses.replace(segment, material=true(segment.material, factor)) for segment, factor in zip(robot.segments, ratio)
-    )
-    return dataclasses.replace(robot, segments=segments)
+    return robot.with_materials([true(material, factor) for material, factor in zip(described, ratio)])
 
 
 def _materials(robot: Robot, body: Body, random: np.random.Generator) -> tuple[TrueMaterial, ...]:
