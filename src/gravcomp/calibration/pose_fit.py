@@ -94,14 +94,13 @@ def fit_poses(
     *,
     noise: float = NOISE,
     start: np.ndarray | None = None,
-    predictor: PosePredictor | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> PoseFit:
     """Fit the unknowns to the poses. Raises MeasurementError if the described robot has no equilibrium in a pose."""
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
-    predictor = predictor or PosePredictor(robot, poses)
+    predictor = PosePredictor(robot, poses)
     initial = predictor.initial()
     prior = np.array([not unknown.free for unknown in unknowns])
     count = 0
@@ -155,7 +154,6 @@ def held_out(
     unknowns: Sequence[PoseUnknown],
     folds: Sequence[np.ndarray],
     *,
-    noise: float = NOISE,
     start: np.ndarray | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> np.ndarray:
@@ -167,7 +165,7 @@ def held_out(
         def show(sentence: str, number: int = number) -> None:
             progress(f"fold {number + 1} of {len(folds)}, {sentence}")
 
-        fit = fit_poses(robot, poses.rows(rest), unknowns, noise=noise, start=start, progress=show)
+        fit = fit_poses(robot, poses.rows(rest), unknowns, start=start, progress=show)
         predicted[fold] = PosePredictor(robot, poses.rows(fold)).predict(fit.parameters)
     return predicted
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.poses import PoseParameters, Poses
-from gravcomp.description import Cable, Elements, PointLoad, Robot
+from gravcomp.description import Cable, PointLoad, Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import RobotModel
@@ -30,12 +30,9 @@ class _Model:
 class PosePredictor:
     """Predicts the markers of poses by the full model of a robot."""
 
-    def __init__(self, robot: Robot, poses: Poses, elements: Elements | None = None):
-        """elements: mesh of the segments, instead of the robot's."""
-        self.robot = robot if elements is None else dataclasses.replace(robot, elements=elements)
-        self.poses = poses
-        material = robot.materials[0]
-        self.modulus = material.youngs_modulus
+    def __init__(self, robot: Robot, poses: Poses):
+        self.robot, self.poses = robot, poses
+        self.modulus = robot.materials[0].youngs_modulus
         self._models: dict[tuple, _Model] = {}
 
     def initial(self) -> PoseParameters:
@@ -78,11 +75,8 @@ class PosePredictor:
         key = (loads, parameters.angle.tobytes(), parameters.tip_radius.tobytes())
         found = self._models.pop(key, None)
         if found is None:
-            cables = tuple(
-                moved(cable, float(angle), float(radius))
-                for cable, angle, radius in zip(self.robot.cables, parameters.angle, parameters.tip_radius)
-            )
-            model = RobotModel(dataclasses.replace(self.robot, cables=cables, loads=(*self.robot.loads, *loads)))
+            robot = with_moved_cables(self.robot, parameters)
+            model = RobotModel(dataclasses.replace(robot, loads=(*robot.loads, *loads)))
             found = _Model(StaticSolver(model), Markers(model, self.poses.at), self._carried(model, loads))
             while len(self._models) >= _MODELS:
                 self._models.pop(next(iter(self._models)))
@@ -101,7 +95,16 @@ class PosePredictor:
         return {}
 
 
-def moved(cable: Cable, angle: float, radius: float) -> Cable:
+def with_moved_cables(robot: Robot, parameters: PoseParameters) -> Robot:
+    """Return the robot with its cables where the parameters say. Raises ValueError for cables that cannot be moved."""
+    cables = tuple(
+        _moved(cable, float(angle), float(radius))
+        for cable, angle, radius in zip(robot.cables, parameters.angle, parameters.tip_radius)
+    )
+    return dataclasses.replace(robot, cables=cables)
+
+
+def _moved(cable: Cable, angle: float, radius: float) -> Cable:
     """Return a cable turned about the axis by `angle` in rad, and at its end farther from the axis by `radius` in m."""
     if not angle and not radius:
         return cable
