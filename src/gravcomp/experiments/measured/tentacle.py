@@ -40,10 +40,8 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     poses = read_poses(folder / "poses.csv", mapping, cone.cable_names)
     unknowns = unknowns_of(mapping.fit, cone)
     fit = fit_poses(cone, poses, unknowns, progress=progress)
-    folds = [
-        np.arange(poses.count)[k :: poses.count // 2 if brief else poses.count]
-        for k in range(poses.count // 2 if brief else poses.count)
-    ]
+    count = poses.count // 2 if brief else poses.count
+    folds = [np.arange(poses.count)[k::count] for k in range(count)]
     left_out = held_out(cone, poses, unknowns, folds, start=fit.x, progress=progress)
     inside, outside = fit.predicted - poses.measured, left_out - poses.measured
     by_marker = 1e3 * np.sqrt((inside**2).sum(axis=2).mean(axis=0))
