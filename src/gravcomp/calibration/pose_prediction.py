@@ -40,16 +40,20 @@ class PosePredictor:
         return PoseParameters.of(self.modulus, len(self.robot.cables))
 
     def predict(self, parameters: PoseParameters) -> np.ndarray:
-        """Return (k, p, 3) the markers in m; NaN for poses that have no equilibrium."""
+        """Return (k, p, 3) the markers in m; NaN for poses that have no equilibrium, and where cables would leave the body."""
         from scipy.spatial.transform import Rotation
 
+        try:
+            robot = with_moved_cables(self.robot, parameters)
+        except ValueError:
+            return np.full_like(self.poses.measured, np.nan)
         turn = Rotation.from_rotvec(parameters.base_rotation)
-        places = np.array([self._pose(k, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
+        places = np.array([self._pose(k, robot, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
         return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + parameters.base_position
 
-    def _pose(self, k: int, parameters: PoseParameters, gravity: np.ndarray) -> np.ndarray:
+    def _pose(self, k: int, robot: Robot, parameters: PoseParameters, gravity: np.ndarray) -> np.ndarray:
         """Return the markers (p, 3) of pose k in the frame of the base, under gravity (3,) there."""
-        model, poses = self._model(parameters, self.poses.loads[k]), self.poses
+        model, poses = self._model(robot, parameters, self.poses.loads[k]), self.poses
         similarity = self.modulus / parameters.youngs_modulus
         cables = CableInput()
         if poses.tension is not None:
@@ -70,12 +74,11 @@ class PosePredictor:
         model.states[k] = state
         return model.markers.positions(state.u)
 
-    def _model(self, parameters: PoseParameters, loads: tuple[PointLoad, ...]) -> _Model:
+    def _model(self, robot: Robot, parameters: PoseParameters, loads: tuple[PointLoad, ...]) -> _Model:
         """Return the model with these loads and cable places."""
         key = (loads, parameters.angle.tobytes(), parameters.tip_radius.tobytes())
         found = self._models.pop(key, None)
         if found is None:
-            robot = with_moved_cables(self.robot, parameters)
             model = RobotModel(dataclasses.replace(robot, loads=(*robot.loads, *loads)))
             found = _Model(StaticSolver(model), Markers(model, self.poses.at), self._carried(model, loads))
             while len(self._models) >= _MODELS:
@@ -96,7 +99,7 @@ class PosePredictor:
 
 
 def with_moved_cables(robot: Robot, parameters: PoseParameters) -> Robot:
-    """Return the robot with its cables where the parameters say. Raises ValueError for cables that cannot be moved."""
+    """Return the robot with its cables where the parameters say. Raises ValueError where one leaves the body."""
     cables = tuple(
         _moved(cable, float(angle), float(radius))
         for cable, angle, radius in zip(robot.cables, parameters.angle, parameters.tip_radius)
@@ -108,10 +111,7 @@ def _moved(cable: Cable, angle: float, radius: float) -> Cable:
     """Return a cable turned about the axis by `angle` in rad, and at its end farther from the axis by `radius` in m."""
     if not angle and not radius:
         return cable
-    if cable.angle is None or cable.radius is None:
-        raise ValueError(f"cable '{cable.name}' has via points; only cables with angle_deg and radius_mm can be moved by a fit")
-    if radius and cable.follow_taper:
-        raise ValueError(f"cable '{cable.name}' has follow_taper; a fit of its radius needs tip_radius_mm instead")
+    assert cable.angle is not None and cable.radius is not None  # pose_unknowns.unknowns_of
     tip = cable.radius if cable.tip_radius is None else cable.tip_radius
     return dataclasses.replace(
         cable, angle=cable.angle + angle, tip_radius=max(tip + radius, 0.0) if radius else cable.tip_radius
