@@ -89,6 +89,19 @@ def test_a_fit_finds_the_modulus_and_the_base_and_predicts_a_pose_it_has_not_see
     assert np.isnan(left_out[:2]).all() and np.isfinite(left_out[2]).all()
 
 
+def test_a_fit_leaves_cables_inside_the_body_and_refuses_those_that_it_cannot_move():
+    predictor = PosePredictor(ROBOT, known_poses(np.zeros(3)))
+    outside = dataclasses.replace(predictor.initial(), tip_radius=np.array([4e-3]))
+    assert np.isnan(predictor.predict(outside)).all()
+    through = dataclasses.replace(ROBOT, cables=(Cable("c", via_points=((3e-3, 0.0, 0.0), (3e-3, 0.0, 0.1))),))
+    assert unknowns_of(("modulus", "zeros"), through)
+    with pytest.raises(MeasurementError, match="'c' has via_points_mm; a fit moves only"):
+        unknowns_of(("angles",), through)
+    tapered = dataclasses.replace(ROBOT, cables=(dataclasses.replace(CABLE, follow_taper=True),))
+    with pytest.raises(MeasurementError, match="'c' has follow_taper"):
+        unknowns_of(("tip_radius",), tapered)
+
+
 MAPPING = """
 pose: case
 gravity_columns: [gx, gy, gz]

@@ -51,19 +51,22 @@ def holes(places: np.ndarray, rows: np.ndarray) -> Embedding:
     return Embedding(np.where(weights != 0.0, order, order[:, :1]), weights, np.zeros(len(places)))
 
 
-def disk_weights(robot: Robot, mesh: Mesh) -> DiskWeights | None:
-    """Return what the disks weigh; None for a robot without disks that weigh anything."""
-    mass, inertia, heights, base = [], [], [], 0.0
+def disk_masses(robot: Robot) -> list[tuple[float, float, float, float]]:
+    """Return the arc length (m), the mass (kg) and the moments of inertia about a diameter and the axis (kg m^2) of each disk."""
+    found, base = [], 0.0
     for segment in robot.segments:
         if segment.disks:
+            diameter, thickness = segment.disks.outer_diameter, segment.disks.thickness
             for height in segment.disks.heights(segment.length):
-                outline = segment.outline(height / segment.length)
-                one = segment.disks.mass_of(outline.area)
-                mass.append(one)
-                inertia.append(one * (segment.disks.outer_diameter**2 / 16 + segment.disks.thickness**2 / 12))
-                heights.append(base + height)
+                mass = segment.disks.mass_of(segment.outline(height / segment.length).area)
+                found.append((base + height, mass, mass * (diameter**2 / 16 + thickness**2 / 12), mass * diameter**2 / 8))
         base += segment.full_length
-    if not any(mass):
+    return found
+
+
+def disk_weights(robot: Robot, mesh: Mesh) -> DiskWeights | None:
+    """Return what the disks weigh; None for a robot without disks that weigh anything."""
+    heights, mass, inertia, _ = np.array(disk_masses(robot)).reshape(-1, 4).T.copy()
+    if not mass.any():
         return None
-    rows = section_functionals(mesh, np.array(heights)).reshape(len(heights), 3, -1)
-    return DiskWeights(np.array(mass), np.array(inertia), rows)
+    return DiskWeights(mass, inertia, section_functionals(mesh, heights).reshape(len(heights), 3, -1))

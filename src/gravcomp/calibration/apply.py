@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.calibration.motion import MotionFit
-from gravcomp.calibration.pose_prediction import moved
+from gravcomp.calibration.pose_prediction import with_moved_cables
 from gravcomp.calibration.poses import PoseParameters
 from gravcomp.calibration.statics import StaticParameters, with_moduli
 from gravcomp.config import ConfigError
@@ -54,11 +54,7 @@ def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Har
 
 def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
     """Return the robot with the modulus and the places of the cables that were fitted to poses."""
-    cables = tuple(
-        moved(cable, float(angle), float(radius))
-        for cable, angle, radius in zip(robot.cables, parameters.angle, parameters.tip_radius)
-    )
-    return dataclasses.replace(robot.with_material(youngs_modulus=parameters.youngs_modulus), cables=cables)
+    return with_moved_cables(robot.with_material(youngs_modulus=parameters.youngs_modulus), parameters)
 
 
 def write_calibrated(

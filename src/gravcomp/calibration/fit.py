@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from gravcomp.calibration.estimates import Estimate, estimate, unfit, warnings
-from gravcomp.calibration.measured import MeasurementError, StillWindows
+from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
 from gravcomp.calibration.statics import StaticParameters, StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_rows, unknowns_of
 from gravcomp.config import parameter
@@ -120,7 +120,7 @@ def fit_statics(
                 "no modulus describes these data: the best one is at the bound of its range. Are they of another robot, in"
                 " other units, in another frame than soft_base, or mirrored?"
             )
-    rms_before, rms_after = (_rms(found.tip[:, :3] - windows.tip_position) for found in (before, after))
+    rms_before, rms_after = (rms_distance(found.tip[:, :3] - windows.tip_position) for found in (before, after))
     if problem.misfit(x) > problem.misfit(np.zeros(len(x))):
         raise MeasurementError(
             f"no values describe these data better than the robot file does (tip error {1e3 * rms_before:.2f} mm before,"
@@ -179,7 +179,7 @@ class _Problem:
         if key not in self._known:
             self.evaluations += 1
             self._known[key] = self._predictor.predict(parameters_at(x, self._unknowns, self._initial))
-            error = _rms(self._known[key].tip[:, :3] - self._measured[:, :3])
+            error = rms_distance(self._known[key].tip[:, :3] - self._measured[:, :3])
             self._progress(f"evaluation {self.evaluations}: {1e3 * error:.3f} mm RMS")
         return self._known[key]
 
@@ -242,8 +242,3 @@ class _Problem:
     def _scaled(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (k, 3 or 6) of positions and directions over their deviations."""
         return rows / np.repeat(self.sigma, 3)[: rows.shape[1]]
-
-
-def _rms(error: np.ndarray) -> float:
-    """Return the root mean square length of errors (k, 3)."""
-    return float(np.sqrt((error**2).sum(axis=1).mean()))

@@ -99,3 +99,8 @@ def _is_still(window: Measured, still: Standstill, limit: float) -> bool:
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     turned = np.ptp(direction, axis=0).max() <= still.gravity
     return bool(spread and same and cables and turned)
+
+
+def rms_distance(error: np.ndarray) -> float:
+    """Return the root mean square length of errors (..., 3)."""
+    return float(np.sqrt((error**2).sum(axis=-1).mean()))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gravcomp.calibration.course import predict_course
-from gravcomp.calibration.measured import Measured
+from gravcomp.calibration.measured import Measured, rms_distance
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
 
@@ -115,16 +115,11 @@ def fit_motion(
         creep_time=final.creep_time,
         creep_time_interval=half.get("creep_time", np.nan),
         evaluations=int(np.ceil(sum(simulated) / sum(len(course.time) for course in courses))),
-        rms_before=_rms(before),
-        rms_after=_rms(whole.error(x)),
+        rms_before=rms_distance(before),
+        rms_after=rms_distance(whole.error(x)),
         predicted=whole.tips(x),
         damping_seen=bool(deviation[0] < 0.5),
     )
-
-
-def _rms(error: np.ndarray) -> float:
-    """Return the root mean square length of errors (t, 3)."""
-    return float(np.sqrt((error**2).sum(axis=1).mean()))
 
 
 class _Parameters:
@@ -154,7 +149,7 @@ class _Courses:
         # The solver needs the derivatives at x next: computed together, all predictions run in parallel.
         self._predict([x, *(x + step for step in _DIFFERENCE * np.eye(len(x)))])
         error = self.error(x)
-        self._progress(f"evaluation {self.count}: {1e3 * np.sqrt((error**2).sum(axis=1).mean()):.3f} mm RMS")
+        self._progress(f"evaluation {self.count}: {1e3 * rms_distance(error):.3f} mm RMS")
         return 1e3 * error.ravel()
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:

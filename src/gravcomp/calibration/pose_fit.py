@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import PoseParameters, Poses
 from gravcomp.description import Robot
@@ -94,14 +94,13 @@ def fit_poses(
     *,
     noise: float = NOISE,
     start: np.ndarray | None = None,
-    predictor: PosePredictor | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> PoseFit:
     """Fit the unknowns to the poses. Raises MeasurementError if the described robot has no equilibrium in a pose."""
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
-    predictor = predictor or PosePredictor(robot, poses)
+    predictor = PosePredictor(robot, poses)
     initial = predictor.initial()
     prior = np.array([not unknown.free for unknown in unknowns])
     count = 0
@@ -116,7 +115,7 @@ def fit_poses(
         nonlocal count
         count += 1
         error = predictor.predict(at(x)) - poses.measured
-        progress(f"evaluation {count}: {1e3 * distance(error):.3f} mm RMS")
+        progress(f"evaluation {count}: {1e3 * rms_distance(error):.3f} mm RMS")
         return np.concatenate([error.ravel() / noise, x[prior]])
 
     def jacobian(x: np.ndarray) -> np.ndarray:
@@ -145,8 +144,8 @@ def fit_poses(
         _estimate(unknown, initial, parameters, float(value), float(width))
         for unknown, value, width in zip(unknowns, solution.x, half)
     )
-    rms_before = distance(before[: poses.measured.size].reshape(poses.measured.shape) * noise)
-    return PoseFit(solution.x, parameters, estimates, predicted, rms_before, distance(predicted - poses.measured), count)
+    rms_before = rms_distance(before[: poses.measured.size].reshape(poses.measured.shape) * noise)
+    return PoseFit(solution.x, parameters, estimates, predicted, rms_before, rms_distance(predicted - poses.measured), count)
 
 
 def held_out(
@@ -155,7 +154,6 @@ def held_out(
     unknowns: Sequence[PoseUnknown],
     folds: Sequence[np.ndarray],
     *,
-    noise: float = NOISE,
     start: np.ndarray | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> np.ndarray:
@@ -167,14 +165,9 @@ def held_out(
         def show(sentence: str, number: int = number) -> None:
             progress(f"fold {number + 1} of {len(folds)}, {sentence}")
 
-        fit = fit_poses(robot, poses.rows(rest), unknowns, noise=noise, start=start, progress=show)
+        fit = fit_poses(robot, poses.rows(rest), unknowns, start=start, progress=show)
         predicted[fold] = PosePredictor(robot, poses.rows(fold)).predict(fit.parameters)
     return predicted
-
-
-def distance(error: np.ndarray) -> float:
-    """Return the root mean square length of errors (..., 3)."""
-    return float(np.sqrt((error**2).sum(axis=-1).mean()))
 
 
 def _estimate(unknown: PoseUnknown, initial: PoseParameters, final: PoseParameters, x: float, half: float) -> PoseEstimate:

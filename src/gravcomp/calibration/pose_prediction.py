@@ -10,7 +10,7 @@ import numpy as np
 
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.poses import PoseParameters, Poses
-from gravcomp.description import Cable, Elements, PointLoad, Robot
+from gravcomp.description import Cable, PointLoad, Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.robot_model import RobotModel
@@ -30,12 +30,9 @@ class _Model:
 class PosePredictor:
     """Predicts the markers of poses by the full model of a robot."""
 
-    def __init__(self, robot: Robot, poses: Poses, elements: Elements | None = None):
-        """elements: mesh of the segments, instead of the robot's."""
-        self.robot = robot if elements is None else dataclasses.replace(robot, elements=elements)
-        self.poses = poses
-        material = robot.materials[0]
-        self.modulus = material.youngs_modulus
+    def __init__(self, robot: Robot, poses: Poses):
+        self.robot, self.poses = robot, poses
+        self.modulus = robot.materials[0].youngs_modulus
         self._models: dict[tuple, _Model] = {}
 
     def initial(self) -> PoseParameters:
@@ -43,16 +40,20 @@ class PosePredictor:
         return PoseParameters.of(self.modulus, len(self.robot.cables))
 
     def predict(self, parameters: PoseParameters) -> np.ndarray:
-        """Return (k, p, 3) the markers in m; NaN for poses that have no equilibrium."""
+        """Return (k, p, 3) the markers in m; NaN for poses that have no equilibrium, and where cables would leave the body."""
         from scipy.spatial.transform import Rotation
 
+        try:
+            robot = with_moved_cables(self.robot, parameters)
+        except ValueError:
+            return np.full_like(self.poses.measured, np.nan)
         turn = Rotation.from_rotvec(parameters.base_rotation)
-        places = np.array([self._pose(k, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
+        places = np.array([self._pose(k, robot, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
         return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + parameters.base_position
 
-    def _pose(self, k: int, parameters: PoseParameters, gravity: np.ndarray) -> np.ndarray:
+    def _pose(self, k: int, robot: Robot, parameters: PoseParameters, gravity: np.ndarray) -> np.ndarray:
         """Return the markers (p, 3) of pose k in the frame of the base, under gravity (3,) there."""
-        model, poses = self._model(parameters, self.poses.loads[k]), self.poses
+        model, poses = self._model(robot, parameters, self.poses.loads[k]), self.poses
         similarity = self.modulus / parameters.youngs_modulus
         cables = CableInput()
         if poses.tension is not None:
@@ -73,16 +74,12 @@ class PosePredictor:
         model.states[k] = state
         return model.markers.positions(state.u)
 
-    def _model(self, parameters: PoseParameters, loads: tuple[PointLoad, ...]) -> _Model:
+    def _model(self, robot: Robot, parameters: PoseParameters, loads: tuple[PointLoad, ...]) -> _Model:
         """Return the model with these loads and cable places."""
         key = (loads, parameters.angle.tobytes(), parameters.tip_radius.tobytes())
         found = self._models.pop(key, None)
         if found is None:
-            cables = tuple(
-                moved(cable, float(angle), float(radius))
-                for cable, angle, radius in zip(self.robot.cables, parameters.angle, parameters.tip_radius)
-            )
-            model = RobotModel(dataclasses.replace(self.robot, cables=cables, loads=(*self.robot.loads, *loads)))
+            model = RobotModel(dataclasses.replace(robot, loads=(*robot.loads, *loads)))
             found = _Model(StaticSolver(model), Markers(model, self.poses.at), self._carried(model, loads))
             while len(self._models) >= _MODELS:
                 self._models.pop(next(iter(self._models)))
@@ -101,14 +98,20 @@ class PosePredictor:
         return {}
 
 
-def moved(cable: Cable, angle: float, radius: float) -> Cable:
+def with_moved_cables(robot: Robot, parameters: PoseParameters) -> Robot:
+    """Return the robot with its cables where the parameters say. Raises ValueError where one leaves the body."""
+    cables = tuple(
+        _moved(cable, float(angle), float(radius))
+        for cable, angle, radius in zip(robot.cables, parameters.angle, parameters.tip_radius)
+    )
+    return dataclasses.replace(robot, cables=cables)
+
+
+def _moved(cable: Cable, angle: float, radius: float) -> Cable:
     """Return a cable turned about the axis by `angle` in rad, and at its end farther from the axis by `radius` in m."""
     if not angle and not radius:
         return cable
-    if cable.angle is None or cable.radius is None:
-        raise ValueError(f"cable '{cable.name}' has via points; only cables with angle_deg and radius_mm can be moved by a fit")
-    if radius and cable.follow_taper:
-        raise ValueError(f"cable '{cable.name}' has follow_taper; a fit of its radius needs tip_radius_mm instead")
+    assert cable.angle is not None and cable.radius is not None  # pose_unknowns.unknowns_of
     tip = cable.radius if cable.tip_radius is None else cable.tip_radius
     return dataclasses.replace(
         cable, angle=cable.angle + angle, tip_radius=max(tip + radius, 0.0) if radius else cable.tip_radius

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.pose_fit import BASE, MODULUS, PoseUnknown, tension_gain
 from gravcomp.description import Robot
 
@@ -13,8 +14,18 @@ ANGLE_PRIOR = np.radians(4.0)
 
 
 def unknowns_of(fit: Sequence[str], robot: Robot) -> tuple[PoseUnknown, ...]:
-    """Return the unknowns of the entries of `fit`, in the order of `mapping.FITTED`."""
+    """Return the unknowns of the entries of `fit`, in the order of `mapping.FITTED`.
+
+    Raises MeasurementError for cables that a fit cannot move.
+    """
     names = robot.cable_names
+    for cable in robot.cables:
+        if cable.via_points is not None and ("angles" in fit or "tip_radius" in fit):
+            raise MeasurementError(
+                f"cable '{cable.name}' has via_points_mm; a fit moves only cables with angle_deg and radius_mm"
+            )
+        if cable.follow_taper and "tip_radius" in fit:
+            raise MeasurementError(f"cable '{cable.name}' has follow_taper; a fit of its radius needs tip_radius_mm instead")
     found: list[PoseUnknown] = []
     if "modulus" in fit:
         found.append(MODULUS)

@@ -52,13 +52,9 @@ class StaticPrediction:
 
 def with_moduli(robot: Robot, moduli: np.ndarray) -> Robot:
     """Return the robot with these moduli (s,) in Pa of its segments, or of its body from a file; caps keep theirs."""
-    if robot.body is not None:
-        return robot.with_material(youngs_modulus=float(moduli[0]))
-    segments = tuple(
-        dataclasses.replace(segment, material=dataclasses.replace(segment.material, youngs_modulus=float(modulus)))
-        for segment, modulus in zip(robot.segments, moduli)
+    return robot.with_materials(
+        [dataclasses.replace(material, youngs_modulus=float(modulus)) for material, modulus in zip(robot.materials, moduli)]
     )
-    return dataclasses.replace(robot, segments=segments)
 
 
 class StaticPredictor:

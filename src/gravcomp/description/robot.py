@@ -166,10 +166,13 @@ class Robot:
 
     def with_material(self, **changes: Any) -> "Robot":
         """Return the robot with these fields of every segment's (or the body's) material changed; caps keep theirs."""
+        return self.with_materials([dataclasses.replace(material, **changes) for material in self.materials])
+
+    def with_materials(self, materials: Sequence[Material]) -> "Robot":
+        """Return the robot with other materials, in the order of `materials`; caps keep theirs."""
         if self.body is not None:
-            material = dataclasses.replace(self.body.material, **changes)
-            return dataclasses.replace(self, body=dataclasses.replace(self.body, material=material))
-        segments = tuple(dataclasses.replace(s, material=dataclasses.replace(s.material, **changes)) for s in self.segments)
+            return dataclasses.replace(self, body=dataclasses.replace(self.body, material=materials[0]))
+        segments = tuple(dataclasses.replace(s, material=material) for s, material in zip(self.segments, materials))
         return dataclasses.replace(self, segments=segments)
 
 

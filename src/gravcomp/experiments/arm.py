@@ -13,11 +13,11 @@ from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
 from gravcomp.trials.holding import GROUND, Case, errors_to, target_of
+from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
 
-INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
 HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest

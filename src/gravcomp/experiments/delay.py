@@ -19,7 +19,6 @@ from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
 TITLE = "Latency, and prediction of gravity"
 
 DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
-ARTICLE_DELAY = 3.0  # s
 _START, _DURATION = 3.0, 12.0  # s
 _WARM_UP, _LISTEN, _BRIEF_LISTEN = 5.0, 15.0, 4.0  # s
 _LONGEST_HORIZON = 0.5  # s, limit of the estimator

@@ -12,11 +12,11 @@ from gravcomp.report.drawing import MODEL, REAL, REST, Drawing, draw_robot, equa
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
 from gravcomp.trials.free_fall import SAMPLE, falling_rod, free_fall
+from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Real to simulation: free fall"
 
-INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)  # deg
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
 _DURATION, _BRIEF_DURATION = 4.0, 1.2  # s, of a fall
 _REST = 1.0  # s: the last part of a fall, which counts as rest

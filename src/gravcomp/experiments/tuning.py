@@ -134,8 +134,8 @@ def _recovery_table(recovered: list[Recovered]) -> Table:
         "Known parameters of virtual robots, and their fit",
         ("parameter", "known", "fitted, interval at 95 %", "error"),
         rows,
-        "At rest: tips in up to three poses, released and with each cable pulled in twice, with noise of 0.1 mm per coordinate"
-        " and image. In motion: two free falls.",
+        "At rest: tips in up to three poses, released and with each cable pulled in twice, with a tracker's noise in every"
+        " image. In motion: two free falls.",
     )
 
 

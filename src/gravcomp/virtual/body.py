@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from gravcomp.cables.disks import disk_masses
 from gravcomp.config import ConfigError
 from gravcomp.description import PointLoad, Robot
 from gravcomp.mesh.mesh import MeshError
@@ -51,7 +52,10 @@ def build_rod(true: TrueRobot) -> RodModel:
             moment[k, :2] += half * np.array(section.centroid)
             inertia[k] += section.inertia(material.density) * length[e] / 2 + across
     _stiffen_clamp(stretches[0], length, stiffness)
-    _add_disks(robot, ends, mass, inertia)
+    for s, one, about_diameter, about_axis in disk_masses(robot):
+        k = _nearest(ends, s)
+        mass[k] += one
+        inertia[k] += np.diag([about_diameter, about_diameter, about_axis])
     for load, s, offset in loads:
         k = _nearest(ends, s)
         mass[k] += load.mass
@@ -153,19 +157,6 @@ def _stiffen_clamp(stretch: Stretch, length: np.ndarray, stiffness: np.ndarray) 
         rows = stiffness[:count]
         rows[:, axis, :] *= scale[axis]
         rows[:, :, axis] *= scale[axis]
-
-
-def _add_disks(robot: Robot, ends: np.ndarray, mass: np.ndarray, inertia: np.ndarray) -> None:
-    base = 0.0
-    for segment in robot.segments:
-        if segment.disks:
-            for height in segment.disks.heights(segment.length):
-                k = _nearest(ends, base + height)
-                one = segment.disks.mass_of(segment.outline(height / segment.length).area)
-                across = one * (segment.disks.outer_diameter**2 / 16 + segment.disks.thickness**2 / 12)
-                mass[k] += one
-                inertia[k] += np.diag([across, across, one * segment.disks.outer_diameter**2 / 8])
-        base += segment.full_length
 
 
 def _place(robot: Robot, axis: RestAxis, load: PointLoad) -> tuple[float, np.ndarray]:

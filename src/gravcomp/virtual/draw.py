@@ -30,8 +30,8 @@ from gravcomp.virtual.material_classes import class_of
 from gravcomp.virtual.parameters import Board, Body, Tendons, VirtualRobotParameters
 from gravcomp.virtual.true_robot import TrueCables, TrueMaterial, TrueMotors, TrueRobot
 
-MODULUS_SPREAD, DENSITY_SPREAD = 0.08, 0.02
-RADIUS_SPREAD, ANGLE_SPREAD = 0.01, math.radians(1.0)
+_MODULUS_SPREAD, _DENSITY_SPREAD = 0.08, 0.02
+_RADIUS_SPREAD, _ANGLE_SPREAD = 0.01, math.radians(1.0)
 _LINE_SPREAD, _LINE_STRETCH = 0.1, (1e-3, 3e-3)
 _FREE_LENGTH, _FREE_SPREAD = 2.0, 0.1
 _FRICTION_SPREAD, _FRICTION, _GUIDE_ANGLE = 0.2, (0.05, 0.11), (math.radians(15.0), math.radians(25.0))
@@ -73,8 +73,8 @@ def draw(given: VirtualRobotParameters, robot: Robot, hardware: Hardware, seed: 
 def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn: dict[str, str]) -> Robot:
     described = robot.materials
     count = len(described)
-    ratio = 1.0 + random.uniform(-MODULUS_SPREAD, MODULUS_SPREAD, count)
-    density = 1.0 + random.uniform(-DENSITY_SPREAD, DENSITY_SPREAD)
+    ratio = 1.0 + random.uniform(-_MODULUS_SPREAD, _MODULUS_SPREAD, count)
+    density = 1.0 + random.uniform(-_DENSITY_SPREAD, _DENSITY_SPREAD)
     if body.modulus_ratio is not None:
         if len(body.modulus_ratio) not in (1, count):
             raise ConfigError(
@@ -95,12 +95,7 @@ def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn
             density=density * material.density if body.density is None else body.density,
         )
 
-    if robot.body is not None:
-        return dataclasses.replace(robot, body=dataclasses.replace(robot.body, material=true(robot.body.material, ratio[0])))
-    segments = tuple(
-        dataclasses.replace(segment, material=true(segment.material, factor)) for segment, factor in zip(robot.segments, ratio)
-    )
-    return dataclasses.replace(robot, segments=segments)
+    return robot.with_materials([true(material, factor) for material, factor in zip(described, ratio)])
 
 
 def _materials(robot: Robot, body: Body, random: np.random.Generator) -> tuple[TrueMaterial, ...]:
@@ -131,12 +126,12 @@ def _with_true_cables(robot: Robot, given: VirtualRobotParameters, random: np.ra
     tendons, count = given.tendons, len(robot.cables)
     radius, angle = random.uniform(-1.0, 1.0, (2, count))
     if tendons.radius_offset is None and count:
-        drawn["cable radii"] = f"+-{100 * RADIUS_SPREAD:g} %"
+        drawn["cable radii"] = f"+-{100 * _RADIUS_SPREAD:g} %"
     if tendons.angle_offset is None and count:
-        drawn["cable angles"] = f"+-{math.degrees(ANGLE_SPREAD):g} deg"
+        drawn["cable angles"] = f"+-{math.degrees(_ANGLE_SPREAD):g} deg"
     for index in range(count):
-        turn = ANGLE_SPREAD * angle[index] if tendons.angle_offset is None else tendons.angle_offset
-        robot = _with_moved_cable(robot, index, RADIUS_SPREAD * radius[index], turn, tendons)
+        turn = _ANGLE_SPREAD * angle[index] if tendons.angle_offset is None else tendons.angle_offset
+        robot = _with_moved_cable(robot, index, _RADIUS_SPREAD * radius[index], turn, tendons)
     return robot
 
 

@@ -30,7 +30,7 @@ def routing_of(robot: Robot, ends: np.ndarray) -> Routing:
     for c, cable in enumerate(robot.cables):
         first = cable.via_points[0][2] if cable.via_points else cable.start
         start[c], end[c] = _node(ends, first), _node(ends, robot.cable_end(cable))
-        at = np.array([_place(robot, cable, s) for s in ends])
+        at = np.array([(*robot.cable_place(cable, s), 0.0) for s in ends])
         passes = np.arange(start[c], end[c])
         inside[c, passes] = ~free[passes]
         offset[c], slope[c] = (at[1:] + at[:-1]) / 2, (at[1:] - at[:-1]) / np.diff(ends)[:, None]
@@ -64,12 +64,3 @@ def _stops(cable: Cable, guides: np.ndarray, ends: np.ndarray, free: np.ndarray,
 
 def _node(ends: np.ndarray, s: float) -> int:
     return int(np.argmin(np.abs(ends - s)))
-
-
-def _place(robot: Robot, cable: Cable, s: float) -> np.ndarray:
-    """The place (3,) m of the cable in the section at the arc length s (m)."""
-    if cable.via_points is None:
-        x, y = robot.cable_place(cable, s)
-        return np.array([x, y, 0.0])
-    x, y, z = np.array(cable.via_points).T
-    return np.array([np.interp(s, z, x), np.interp(s, z, y), 0.0])

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_fit import PoseEstimate
 from gravcomp.calibration.pose_report import error_bars, fitted_table
 from gravcomp.description import Elements, Material, PointLoad, Robot, Section, Segment
@@ -229,7 +229,7 @@ def motion_error(recording: Recording, predicted: np.ndarray) -> tuple[float, fl
         within = (recording.time >= shift) & (recording.time <= shift + clock[-1])
         model = np.array([np.interp(recording.time[within] - shift, clock, column) for column in flat.T]).T.reshape(-1, 3, 3)
         error = recording.markers[within] - model
-        best = min(best, (float(np.sqrt((error**2).sum(axis=2).mean())), float(shift)))
+        best = min(best, (rms_distance(error), float(shift)))
     return best
 
 

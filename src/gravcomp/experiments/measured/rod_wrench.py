@@ -66,7 +66,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     figures, data = [], {}
     for rows, kind, key in ((free, "gravity alone", "rod_error_pct"), (loaded, "gravity and wrenches", "rod_wrench_error_pct")):
         if rows:
-            worst = max((row[2] for row in rows), key=lambda e: np.inf if np.isnan(e) else e)
+            worst = float(np.max([row[2] for row in rows]))
             data[key], data[key.replace("error", "median")] = worst, float(np.nanmedian([row[2] for row in rows]))
             figures.append(Figure(f"rod, {kind}: tip error, worst, share of the length", worst, "%", "", 0.3))
             figures.append(

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.calibration.chain import Chain
-from gravcomp.calibration.measured import MeasurementError
-from gravcomp.calibration.pose_fit import PoseEstimate, distance
+from gravcomp.calibration.measured import MeasurementError, rms_distance
+from gravcomp.calibration.pose_fit import PoseEstimate
 from gravcomp.calibration.pose_report import error_bars, fitted_table, views
 from gravcomp.experiments.measured.part import Part
 from gravcomp.report.result import Figure
@@ -124,8 +124,9 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         other, _ = fit(pulls.rows(fold != number), x)
         predicted[fold == number] = predict(other, pulls.displacement[fold == number])
     several, left_out = pulls.rows(~pulls.single), predicted[~pulls.single]
+    wrong = left_out - several.tip
     inside = predict(x, several.displacement)
-    alone = distance((predicted - pulls.tip)[pulls.single]) if pulls.single.any() else float("nan")
+    alone = rms_distance((predicted - pulls.tip)[pulls.single]) if pulls.single.any() else float("nan")
     same = repeatability(several)
     groups = sorted({pattern.split("_")[1] for pattern in several.pattern})
     group = np.array([pattern.split("_")[1] for pattern in several.pattern])
@@ -142,12 +143,12 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         figures=[
             Figure(
                 "tdcr: tip, without pulls of single tendons, five-fold, RMSE",
-                1e3 * distance(left_out - several.tip),
+                1e3 * rms_distance(wrong),
                 "mm",
                 f"{CONSTANT_CURVATURE:g} mm, fitted constant curvature",
                 4.0,
             ),
-            Figure("tdcr: tip, fitted, RMSE", 1e3 * distance(inside - several.tip), "mm"),
+            Figure("tdcr: tip, fitted, RMSE", 1e3 * rms_distance(inside - several.tip), "mm"),
             Figure("tdcr: pulls of single tendons, five-fold, RMSE", 1e3 * alone, "mm"),
             Figure("tdcr: repeatability, tips of equal commands, standard deviation", 1e3 * same, "mm"),
         ],
@@ -161,7 +162,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
             error_bars(
                 "Nine tendons: error by pattern",
                 groups,
-                {"left out of the fit": np.array([1e3 * distance((left_out - several.tip)[group == name]) for name in groups])},
+                {"left out of the fit": np.array([1e3 * rms_distance(wrong[group == name]) for name in groups])},
                 "Root mean square over the poses of each kind of pattern.",
             ),
             fitted_table("Nine tendons: fitted", estimates),
@@ -173,7 +174,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
             "tdcr: the fit uses a chain of constant curvatures with elastic tendons that only pull, not the full model.",
         ],
         data={
-            "tdcr_mm": 1e3 * distance(left_out - several.tip),
+            "tdcr_mm": 1e3 * rms_distance(wrong),
             "tdcr_single_mm": 1e3 * alone,
             "tdcr_repeatability_mm": 1e3 * same,
         },

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.calibration.mapping import load_mapping
-from gravcomp.calibration.pose_fit import distance, fit_poses, held_out
+from gravcomp.calibration.measured import rms_distance
+from gravcomp.calibration.pose_fit import fit_poses, held_out
 from gravcomp.calibration.pose_report import error_bars, fitted_table, views
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
@@ -39,10 +40,8 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     poses = read_poses(folder / "poses.csv", mapping, cone.cable_names)
     unknowns = unknowns_of(mapping.fit, cone)
     fit = fit_poses(cone, poses, unknowns, progress=progress)
-    folds = [
-        np.arange(poses.count)[k :: poses.count // 2 if brief else poses.count]
-        for k in range(poses.count // 2 if brief else poses.count)
-    ]
+    count = poses.count // 2 if brief else poses.count
+    folds = [np.arange(poses.count)[k::count] for k in range(count)]
     left_out = held_out(cone, poses, unknowns, folds, start=fit.x, progress=progress)
     inside, outside = fit.predicted - poses.measured, left_out - poses.measured
     by_marker = 1e3 * np.sqrt((inside**2).sum(axis=2).mean(axis=0))
@@ -50,7 +49,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         figures=[
             Figure("tentacle: markers, fitted, RMSE", 1e3 * fit.rms, "mm", f"{THEIRS:g} mm, the authors' model", 8.0),
             Figure(
-                "tentacle: markers, each pose predicted by a fit to the others, RMSE", 1e3 * distance(outside), "mm", "", 12.0
+                "tentacle: markers, each pose predicted by a fit to the others, RMSE", 1e3 * rms_distance(outside), "mm", "", 12.0
             ),
         ],
         parts=[
@@ -74,5 +73,5 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
                 + " mm; the authors' model 11.3, 18.4, 19.2, 35.6 mm.",
             ),
         ],
-        data={"tentacle_mm": 1e3 * fit.rms, "tentacle_held_mm": 1e3 * distance(outside)},
+        data={"tentacle_mm": 1e3 * fit.rms, "tentacle_held_mm": 1e3 * rms_distance(outside)},
     )
