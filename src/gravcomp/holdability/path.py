@@ -75,8 +75,7 @@ class HoldPath:
         """Return the points of the path from no gravity to `most` times gravity (3,) in m/s^2, or to where it ends.
 
         limits: of tension and displacement, without rates (`limits.unlimited_rates`). first (m,): tensions in N that hold about
-        the whole gravity, of a linear estimate. No point at all: the target is out of
-        reach of the weightless robot.
+        the whole gravity, of a linear estimate. No point at all: the target is out of reach of the weightless robot.
         """
         self._tracker.reset()
         self._solver.reset()
