@@ -100,6 +100,11 @@ class HoldPath:
                 break
         return points
 
+    def lateral(self, state: Equilibrium) -> float:
+        """Return the lateral error of the tip in m at a state of the model."""
+        effector = observed(self.model, state).effector
+        return float(tip_errors(effector, self.target.tip_position, self.target.direction_or_zeros).lateral)
+
     def _settled(self, gravity: np.ndarray, tension: np.ndarray, limits: Limits) -> Equilibrium | None:
         """Return the equilibrium under gravity (3,) nearest to the target, from the tensions (m,) on; None if there is none."""
         model, damping = self.model, StepDamping(self.model.length)
@@ -140,7 +145,7 @@ class HoldPath:
             last = change
             state = self._moved(gravity, state, wanted)
         # Where the equilibria end, the steps become shorter and shorter and do not settle.
-        return state if state is not None and self._lateral(state) <= self.options.tolerance * model.length else None
+        return state if state is not None and self.lateral(state) <= self.options.tolerance * model.length else None
 
     def _moved(self, gravity: np.ndarray, state: Equilibrium, wanted: np.ndarray) -> Equilibrium | None:
         """Return the equilibrium at the tensions `wanted` (m,), or part of the way to them; None if there is none."""
@@ -155,11 +160,6 @@ class HoldPath:
     def _tracked(self, gravity: np.ndarray, tension: np.ndarray) -> Equilibrium | None:
         state = self._tracker.track(gravity, CableInput(tension=tension), iterations=_NEWTON)
         return state if state.converged else None
-
-    def _lateral(self, state: Equilibrium) -> float:
-        """Return the lateral error of the tip in m."""
-        effector = observed(self.model, state).effector
-        return float(tip_errors(effector, self.target.tip_position, self.target.direction_or_zeros).lateral)
 
     def _point(self, share: float, state: Equilibrium) -> PathPoint:
         seen = observed(self.model, state)
