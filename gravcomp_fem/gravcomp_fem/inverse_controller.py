@@ -20,7 +20,7 @@ from gravcomp.description.hardware import parse_hardware
 from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.holdability.background import HoldProcess
-from gravcomp.inverse import Command, ControllerCode, Target, TargetError, direction_weight, straight_target, warm_up
+from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
 from gravcomp_fem.tracker_input import TrackerInput, seconds
@@ -30,7 +30,6 @@ from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 # The status is for the user, not for the loop. A change of the code is published immediately.
 _STATUS_PERIOD = 0.1  # s
 _REFUSAL_SHOWN = 5.0  # s
-_UNKNOWN, _HELD, _NOT_HELD = 0, 1, 2  # ControllerStatus.holdable
 _INACTIVE = "the node is not active: activate it first"
 _LEVELS = {
     ControllerCode.INACTIVE: OK,
@@ -71,7 +70,7 @@ class InverseController(ManagedNode):
         self._published_code, self._published_at = None, 0.0
         self._refusal, self._refused_at = "", -math.inf
         self._last_arrival = self.get_clock().now()
-        self._holdable, self._hold_message = _UNKNOWN, ""
+        self._holdable, self._hold_message = Holdable.NOT_KNOWN, ""
         self._question: HoldProcess | None = None
         self._asked = not self.parameters.check_hold
         self._inputs = [
@@ -189,7 +188,7 @@ class InverseController(ManagedNode):
         self._question = None
         if verdict is None:
             return
-        self._holdable, self._hold_message = (_HELD if verdict.held else _NOT_HELD), verdict.sentence
+        self._holdable, self._hold_message = (Holdable.YES if verdict.held else Holdable.NO), verdict.sentence
         log = self.get_logger()
         (log.info if verdict.held else log.warning)(f"in the direction of gravity at start {verdict.sentence}")
 
@@ -268,7 +267,7 @@ class InverseController(ManagedNode):
                 axial=float(command.axial),
                 tilt=float(command.tilt),
                 solve_time=float(command.solve_time),
-                holdable=self._holdable,
+                holdable=int(self._holdable),
                 hold_message=self._hold_message,
             )
         )
@@ -283,7 +282,7 @@ class InverseController(ManagedNode):
 
     def _publish_code(self, code: ControllerCode, sentence: str, header: Header | None = None) -> None:
         code, sentence = self._with_refusal(code, sentence)
-        status = ControllerStatus(code=int(code), message=sentence, holdable=self._holdable, hold_message=self._hold_message)
+        status = ControllerStatus(code=int(code), message=sentence, holdable=int(self._holdable), hold_message=self._hold_message)
         status.header.stamp = header.stamp if header else self.get_clock().now().to_msg()
         self._published_code = None
         self._status.publish(status)

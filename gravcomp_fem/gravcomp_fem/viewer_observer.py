@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 
-from gravcomp.inverse import TargetError
+from gravcomp.inverse import Holdable, TargetError
 from gravcomp.view.backbone import arc_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target
@@ -31,7 +31,6 @@ _MOTOR_STATES = {
 _STALE = 1.0  # s
 # A stamp that differs more from this clock comes from another clock: that of a replay or of another machine.
 _CLOCK_TOLERANCE = 10.0  # s
-_NOT_HOLDABLE = 2  # ControllerStatus.holdable
 
 
 class GraphObserver:
@@ -145,6 +144,6 @@ class GraphObserver:
 
 def _status_text(status: ControllerStatus) -> str:
     """Return the sentence of the controller; if the target cannot be held, with the reason."""
-    if status.holdable != _NOT_HOLDABLE or status.code not in (ControllerStatus.AT_LIMIT, ControllerStatus.UNREACHABLE):
+    if status.holdable != Holdable.NO or status.code not in (ControllerStatus.AT_LIMIT, ControllerStatus.UNREACHABLE):
         return status.message
     return f"{status.message}; at start {status.hold_message}"

@@ -26,12 +26,12 @@ from gravcomp.evaluation.bus_delay import DelayListener
 from gravcomp.evaluation.released import released_tip_error
 from gravcomp.evaluation.track import Track
 from gravcomp.graph.parameters.judge import JudgeParameters
+from gravcomp.inverse import Holdable
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
 from gravcomp_node import LATCHED, ManagedNode, run
 
 # Messages that the middleware keeps between two reads, which are 0.1 s apart.
 _KEPT = 100
-_NOT_HELD = 2  # ControllerStatus.holdable
 _STRAIGHT = np.array([0.0, 0.0, 1.0])
 
 
@@ -126,7 +126,7 @@ class Judge(ManagedNode):
                 track.add(_seconds(received.message), *values(received.message))
         status = self._status.take()
         if status is not None and status.message.holdable:
-            self._unholdable = status.message.hold_message if status.message.holdable == _NOT_HELD else None
+            self._unholdable = status.message.hold_message if status.message.holdable == Holdable.NO else None
         if self._begin is None and len(self._truth_tip):
             self._begin = self._now()
 

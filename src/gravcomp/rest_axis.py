@@ -61,6 +61,23 @@ STRAIGHT = RestAxis()
 """The axis of a robot that is straight at rest."""
 
 
+def straightened(axis: RestAxis, points: np.ndarray, length: float) -> np.ndarray:
+    """Return places in the sections and arc lengths (n, 3) of points (n, 3): the inverse of `RestAxis.points`."""
+    s = np.linspace(-0.02, 1.02, 105) * length
+    line = axis.frames(s)[0]
+    at = s[np.argmin(((points[:, None] - line[None]) ** 2).sum(axis=2), axis=1)]
+    for _ in range(200):
+        position, rotation = axis.frames(at)
+        offset = points - position
+        change = np.einsum("ni,ni->n", offset, rotation[:, :, 2])
+        at = at + change
+        if np.abs(change).max() < 1e-14 * length:
+            break
+    position, rotation = axis.frames(at)
+    place = np.einsum("ni,nij->nj", points - position, rotation[:, :, :2])
+    return np.column_stack([place, at])
+
+
 def _along(arc: Arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) and orientations (n, 3, 3) at the arc lengths s (n,) of an arc that starts at the origin along z."""
     angle = arc.angle * s / arc.length

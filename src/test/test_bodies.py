@@ -3,8 +3,6 @@
 import contextlib
 import csv
 import dataclasses
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +10,7 @@ import pytest
 from gravcomp.cables.disks import disk_heights
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Cable, Cap, Disks, Elements, Lumen, Material, RestShape, Robot, Section, Segment, Station
+from gravcomp.experiments.measured import default_folder
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.mesh_choice import chosen_mesh
 from gravcomp.full_model.mesh_error import error_of_mesh
@@ -20,9 +19,9 @@ from gravcomp.full_model.wrench import Wrench
 from gravcomp.mesh import Mesh, MeshError, tube_mesh
 from gravcomp.mesh.elements import shape_gradients, stiffness_quadrature
 from gravcomp.mesh.embedding import embed
-from gravcomp.mesh.pieces import rest_axis
 from gravcomp.mesh.quality import mesh_quality
 from gravcomp.mesh.refusal import well_shaped
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.tube import coarse_elements
 from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
 
@@ -179,10 +178,10 @@ def disk_robot(case: dict, along: int) -> Robot:
 def disk_cases():
     """Rows of tips that others computed (P. Rao et al., "How to model tendon-driven continuum robots and benchmark modelling
     performance", Front. Robot. AI 2021), from the folder of measurements; none where it is missing."""
-    folder = Path(os.environ.get("GRAVCOMP_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
-    if not (folder / "disks" / "tips.csv").exists():
+    tips = default_folder() / "disks" / "tips.csv"
+    if not tips.exists():
         return []
-    with (folder / "disks" / "tips.csv").open() as file:
+    with tips.open() as file:
         return [row for row in csv.DictReader(file) if row["model"] == "straight_between_disks"][:3]
 
 

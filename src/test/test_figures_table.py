@@ -22,6 +22,15 @@ def test_a_figure_is_found_below_its_key_and_a_list_counts():
     assert [f.reached for f in figures] == [False, False, True]
 
 
+def test_every_value_of_a_mapping_is_a_figure():
+    figures = limits.figures("streams", {"missed": {"jitter": 0, "gaps": 2}, "excess_deg": {"gyro_spikes": 0.1, "gaps": 0.4}})
+    assert [(f.name.partition(":")[0], f.value, f.reached) for f in figures] == [
+        ("jitter", 0, True),
+        ("gaps", 2, False),
+        ("gyroscope spikes", 0.1, True),
+    ]
+
+
 def test_a_missed_limit_is_said():
     text = markdown_table(
         [Figure("error", 0.3, "mm", limit=0.2), Figure("rate", 5.0, "Hz", limit=5.0, at_least=True), Figure("length", 1.0, "m")]

@@ -8,7 +8,7 @@ import pytest
 
 from gravcomp.commands.__main__ import main
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability import Binding, HoldOptions, holdability
 from gravcomp.holdability.background import answer as background_answer
 from gravcomp.holdability.directions import angles, sphere

@@ -1,16 +1,14 @@
 """Meshes that other projects publish: a finger, a trunk and a tentacle, neither at the origin nor along z."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from gravcomp.description import Cable, Material, MeshBody, Robot
+from gravcomp.experiments.measured import default_folder
 from gravcomp.mesh_files import Placement, placed_body
 from gravcomp.simulation import Simulator
 
-FOLDER = Path(os.environ.get("GRAVCOMP_DATA") or Path(__file__).parents[3] / "shared" / "data") / "mesh"
+FOLDER = default_folder() / "mesh"
 pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason=f"no meshes in {FOLDER} (GRAVCOMP_DATA names the folder above it)")
 
 

@@ -8,7 +8,7 @@ from virtual_article import GRAVITY
 
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file, shipped_robots
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.quality import mesh_quality
 from gravcomp.simulation import Simulator
 from gravcomp.virtual.motion import StaticMotion, base_orientation

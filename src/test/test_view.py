@@ -9,7 +9,7 @@ import pytest
 
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
-from gravcomp.view.backbone import Backbone, arc_backbone, straight_backbone
+from gravcomp.view.backbone import Backbone, arc_backbone, rest_backbone
 from gravcomp.view.colours import tension_colour
 from gravcomp.view.graphics import chosen
 from gravcomp.view.history import History
@@ -54,7 +54,7 @@ def test_quaternions_of_opposite_sign_are_the_same_frame():
 
 
 def test_walls_at_rest_have_the_robots_dimensions(robot):
-    straight = straight_backbone(robot.length)
+    straight = rest_backbone(robot)
     vertices = np.concatenate([skin.on(straight) for skin in wall_skins(robot)])
     assert np.hypot(vertices[:, 0], vertices[:, 1]).max() == pytest.approx(0.0045, rel=1e-5)
     assert vertices[:, 2].min() == pytest.approx(0.0, abs=1e-9) and vertices[:, 2].max() == pytest.approx(0.1, rel=1e-6)
@@ -72,7 +72,7 @@ def test_a_bent_wall_keeps_its_distance_from_the_backbone(robot):
 
 
 def test_surfaces_face_outward(robot):
-    straight = straight_backbone(robot.length)
+    straight = rest_backbone(robot)
     for skin in wall_skins(robot):
         v = skin.on(straight).astype(float)
         a, b, c = (v[skin.faces[:, i]] for i in range(3))
@@ -83,7 +83,7 @@ def test_surfaces_face_outward(robot):
 
 def test_a_cable_runs_at_its_angle_to_the_end_of_its_segment(robot):
     for cable in robot.cables:
-        vertices = cable_skin(robot, cable).on(straight_backbone(robot.length))
+        vertices = cable_skin(robot, cable).on(rest_backbone(robot))
         middle = vertices.reshape(-1, 8, 3).mean(axis=1)
         np.testing.assert_allclose(
             middle[:, :2],
@@ -168,7 +168,7 @@ def test_a_time_that_goes_back_clears_the_history():
 
 def test_errors_are_distances_to_the_target(robot):
     target = TargetView(np.array([0.0, 0.0, 0.1]))
-    snapshot = Snapshot(time=0.0, backbone=arc_backbone(0.1, 0.5, 0.0), truth=straight_backbone(0.1), target=target)
+    snapshot = Snapshot(time=0.0, backbone=arc_backbone(0.1, 0.5, 0.0), truth=arc_backbone(0.1, 0.0, 0.0), target=target)
     assert snapshot.tip_error == pytest.approx(np.linalg.norm(arc_backbone(0.1, 0.5, 0.0).tip - [0, 0, 0.1]))
     assert snapshot.true_tip_error == pytest.approx(0.0, abs=1e-12)
     assert math.isnan(Snapshot(time=0.0).tip_error)

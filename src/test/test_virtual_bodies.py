@@ -9,7 +9,7 @@ from virtual_article import GRAVITY
 from gravcomp.config import from_mapping
 from gravcomp.description import Outline, Robot, load_robot_file
 from gravcomp.description.hardware import Hardware, Motor
-from gravcomp.mesh.pieces import rest_axis
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.simulation import Simulator
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.cross_section import cross_section

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from gravcomp.description import Robot, load_robot_file
-from gravcomp.inverse import Command, InverseController, Target, bend_target, straight_target
+from gravcomp.inverse import Command, InverseController, Target, bend_target, direction_weight, straight_target
 from gravcomp.reduction import load
 from gravcomp.reduction.motion import ReducedDynamicSolver
 from gravcomp.simulation import RobotModel, Shape, Simulator
@@ -16,8 +16,6 @@ Progress = Callable[[str], None]
 
 _GRAVITY, _RATE = 9.81, 100.0  # m/s^2, steps per second
 _DIRECTIONS, _SETTLING = 200, 80
-# Weight of the tip's direction over the square of the length: 0.1 rad of tilt count like 3 % of the length.
-_DIRECTION_SHARE = 0.1
 
 
 def reduced_model(progress: Progress, every: int = 1, law: str = "svk") -> dict:
@@ -35,7 +33,7 @@ def reduced_model(progress: Progress, every: int = 1, law: str = "svk") -> dict:
 def reduced_figures(model: RobotModel, progress: Progress, every: int = 1) -> dict:
     """Return the figures of `reduced_model`, without the time of the build, for a robot whose reduced model is built."""
     robot = model.robot
-    target = straight_target(robot.length, tip_direction_weight=_DIRECTION_SHARE * robot.length**2)
+    target = straight_target(robot.length, tip_direction_weight=direction_weight(robot.length))
     steps, solves, served = [], [], []
     errors: dict[int, float] = {}
     for rate in (10, 90):
@@ -81,7 +79,7 @@ def compensation(progress: Progress, every: int = 1) -> dict:
     tilt, shortening, least = [], [], []
     for number, gravity in list(enumerate(_directions(_DIRECTIONS)))[::every]:
         progress(f"compensation, direction {number + 1} of {_DIRECTIONS}")
-        for weight in (0.0, _DIRECTION_SHARE * robot.length**2):
+        for weight in (0.0, direction_weight(robot.length)):
             target = straight_target(robot.length, tip_direction_weight=weight)
             *_, (_, command) = closed_loop(simulator, [gravity] * _SETTLING, target)
             shape = full.step(gravity, command.displacement)
@@ -106,7 +104,7 @@ def extreme_targets(progress: Progress, every: int = 1) -> dict:
     run with the straight target only.
     """
     robot = load_robot_file("article").robot
-    simulator, straight = Simulator(robot), straight_target(robot.length, tip_direction_weight=_DIRECTION_SHARE * robot.length**2)
+    simulator, straight = Simulator(robot), straight_target(robot.length, tip_direction_weight=direction_weight(robot.length))
     targets = [bend_target(robot.length, angle, 0.7 * k) for k, angle in enumerate((2.6, 3.5, 4.5, 5.5, 6.2))]
     targets += [
         Target(robot.length * np.array(tip)) for tip in ([0.0, 0.0, 0.0], [0.0, 0.2, -0.5], [0.9, 0.0, 0.0], [0.0, 0.0, 1.4])

@@ -175,14 +175,15 @@ def figures(benchmark: str, measured: Mapping[str, Any]) -> list[Figure]:
 
 def _values(row: Row, measured: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Names and values of the row's figures."""
-    before, star, after = row.key.partition(".*.")
+    before, star, after = row.key.partition(".*")
     if not star:
         value = _value(measured, row.key)
         return [] if value is None else [(row.name, value)]
-    found = []
+    found, own = [], after.removeprefix(".")
     for key, entry in (_value(measured, before) or {}).items():
-        if after in entry:
-            found.append((f"{key}: {row.name}", math.nan if entry[after] is None else entry[after]))
+        if not own or own in entry:
+            value = entry[own] if own else entry
+            found.append((f"{key}: {row.name}", math.nan if value is None else value))
     return found
 
 

@@ -41,7 +41,7 @@ def run(
     wanted = [name for name in robot_figures.FIGURES if not figures or name in figures]
     result: dict[str, Any] = {"robots": {}}
     if wanted:
-        for file in files or _all_files(progress):
+        for file in files or _all_files():
             name, measured = _of(str(file), wanted, progress, every)
             result["robots"][name] = measured
     whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
@@ -54,7 +54,7 @@ def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, eve
     if unknown:
         raise ConfigError(f"--figures has '{unknown[0]}'; allowed with --loop: {', '.join(robot_loop.FIGURES)}")
     found = {}
-    for file in files or _all_files(progress):
+    for file in files or _all_files():
         try:
             name = load_robot_file(str(file)).robot.name
             progress(f"{name}: loop")
@@ -66,7 +66,7 @@ def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, eve
     return found
 
 
-def _all_files(progress: Progress) -> list[str]:
+def _all_files() -> list[str]:
     """Return the shipped robots, and the robot files next to the measurements of others."""
     folder = default_folder().parent / "robots"
     others = sorted(folder.glob("*.yaml"))

@@ -7,10 +7,10 @@ fixed rigidly to the nearest cross-section of the axis: x = p + R (X - P), where
 
 import numpy as np
 
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.embedding import locate
-from gravcomp.mesh.pieces import rest_axis
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.sections import section_functionals
 
 _SEARCHED = 400  # stations along the axis between which the nearest section is found

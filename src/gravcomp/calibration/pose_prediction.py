@@ -13,7 +13,7 @@ from gravcomp.calibration.poses import PoseParameters, Poses
 from gravcomp.description import Cable, Elements, PointLoad, Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 
 _MODELS = 8  # models that are kept

@@ -123,7 +123,7 @@ class CanBuses:
 
         def attempt() -> None:
             while not self.links[name].is_open and not self._closed.wait(_REOPEN_PERIOD):
-                self.links[name].reopen()
+                self.links[name].ensure_open()
 
         self._reopening[name] = threading.Thread(target=attempt, name=f"reopen {name}", daemon=True)
         self._reopening[name].start()

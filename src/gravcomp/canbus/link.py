@@ -90,9 +90,20 @@ class CanLink:
                 self._failing_since, self.status = None, "open"
                 self.counters.opened += 1
 
-    def reopen(self) -> bool:
-        """Open a lost bus, unless its back-off is not over. Return whether it is open."""
-        return self._ensure_open()
+    def ensure_open(self) -> bool:
+        """Open the bus if it is not open and its back-off is over. Return whether it is open."""
+        if self._bus is not None:
+            return True
+        with self._lock:
+            if self._clock() < self._next_attempt:
+                return False
+            try:
+                self.open()
+            except BusError as error:
+                self.status = str(error)
+                self._schedule()
+                return False
+            return True
 
     def receive(self, timeout: float) -> list[can.Message]:
         """Return all waiting frames, or wait for the first one up to `timeout` (s); empty when none comes or there is no bus.
@@ -101,7 +112,7 @@ class CanLink:
         """
         deadline = self._clock() + timeout
         frames: list[can.Message] = []
-        if not self._ensure_open():
+        if not self.ensure_open():
             time.sleep(max(0.0, min(timeout, _FIRST_WAIT)))
             return frames
         bus = self._bus
@@ -125,7 +136,7 @@ class CanLink:
 
     def send(self, frames: Iterable[can.Message]) -> bool:
         """Send the frames in order. Return False when one was not accepted (no bus, full queue, adapter unplugged)."""
-        if not self._ensure_open():
+        if not self.ensure_open():
             return False
         with self._lock:
             try:
@@ -152,20 +163,6 @@ class CanLink:
             self._next_attempt = float("inf")
             self.status = "closed"
         _shut(bus)
-
-    def _ensure_open(self) -> bool:
-        if self._bus is not None:
-            return True
-        with self._lock:
-            if self._clock() < self._next_attempt:
-                return False
-            try:
-                self.open()
-            except BusError as error:
-                self.status = str(error)
-                self._schedule()
-                return False
-            return True
 
     def _lose(self, why: str) -> None:
         with self._lock:

@@ -1,17 +1,15 @@
 """The checks that a cable runs inside the body or through the disks, and crosses no other."""
 
+import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from gravcomp.description.cable import Cable
-from gravcomp.description.pieces import Piece
+from gravcomp.description.pieces import Piece, piece_at
 from gravcomp.description.segment import Segment
-
-if TYPE_CHECKING:
-    from gravcomp.description.robot import Robot
 
 # Places in every piece and every stretch between two via points at which a cable is checked.
 _PLACES = 9
@@ -19,16 +17,29 @@ _PLACES = 9
 _CROSSING = 2e-3
 
 
-def check_path(key: str, cable: Cable, robot: "Robot") -> None:
+@dataclasses.dataclass(frozen=True)
+class CableRun:
+    """A cable in the robot: its start and end as arc lengths in m, and `place`, which gives (x, y) in m at an arc length."""
+
+    cable: Cable
+    end: float
+    place: Callable[[float], tuple[float, float]]
+
+    @property
+    def start(self) -> float:
+        """Arc length in m of the first point."""
+        return self.cable.start if self.cable.via_points is None else self.cable.via_points[0][2]
+
+
+def check_path(key: str, run: CableRun, pieces: Sequence[Piece], segments: Sequence[Segment], length: float) -> None:
     """Raise ValueError, naming `key`, when the cable leaves the robot's length, the wall of a segment or its disks."""
-    end = robot.cable_end(cable)
-    if end > robot.length * (1 + 1e-9):
-        raise ValueError(f"{key} ends at {end * 1e3:g} mm; allowed: up to the robot's length {robot.length * 1e3:g} mm")
-    if cable.via_points is None and cable.start >= end:
-        raise ValueError(f"{key}.start_mm is {cable.start * 1e3:g}; allowed: below its end at {end * 1e3:g}")
-    for piece in robot.pieces:
-        segment = robot.segments[[s.name for s in robot.segments].index(piece.segment)]
-        points = _points(cable, robot, piece)
+    if run.end > length * (1 + 1e-9):
+        raise ValueError(f"{key} ends at {run.end * 1e3:g} mm; allowed: up to the robot's length {length * 1e3:g} mm")
+    if run.cable.via_points is None and run.start >= run.end:
+        raise ValueError(f"{key}.start_mm is {run.start * 1e3:g}; allowed: below its end at {run.end * 1e3:g}")
+    for piece in pieces:
+        segment = segments[[s.name for s in segments].index(piece.segment)]
+        points = _points(run, piece)
         for x, y, s in points[-1:] + points:  # most tapers are narrowest at the tip
             if segment.disks is None:
                 _check_wall(key, piece, x, y, s)
@@ -36,31 +47,29 @@ def check_path(key: str, cable: Cable, robot: "Robot") -> None:
                 _check_disks(key, piece, segment, x, y, s)
 
 
-def check_crossings(robot: "Robot") -> None:
+def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
     """Raise ValueError where two cables cross; cables that share a channel or only begin or end together do not."""
-    if robot.body is not None:
-        return
     # A path that turns back is not known from its arc length alone.
-    onward = [c for c in robot.cables if not c.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(c.via_points))]
+    onward = [r for r in runs if not r.cable.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(r.cable.via_points))]
     for one, other in itertools.combinations(onward, 2):
-        heights = sorted({s for cable in (one, other) for piece in robot.pieces for s in _places(cable, robot, piece)})
-        low, high = (f(_ends(one, robot)[i], _ends(other, robot)[i]) for i, f in ((0, max), (1, min)))
+        heights = sorted({s for run in (one, other) for piece in pieces for s in _places(run, piece)})
+        low, high = max(one.start, other.start), min(one.end, other.end)
         s = np.array([height for height in heights if low <= height <= high])
         if len(s) < 2:
             continue
-        apart = np.array([robot.cable_place(one, height) for height in s])
-        apart -= [robot.cable_place(other, height) for height in s]
-        place = _crossing(s, apart, robot)
+        apart = np.array([one.place(height) for height in s])
+        apart -= [other.place(height) for height in s]
+        place = _crossing(s, apart, pieces)
         if place is not None:
             raise ValueError(
-                f"the cables '{one.name}' and '{other.name}' cross at {place * 1e3:.4g} mm along the robot;"
+                f"the cables '{one.cable.name}' and '{other.cable.name}' cross at {place * 1e3:.4g} mm along the robot;"
                 " let their channels keep a distance"
             )
 
 
-def _crossing(s: np.ndarray, apart: np.ndarray, robot: "Robot") -> float | None:
+def _crossing(s: np.ndarray, apart: np.ndarray, pieces: Sequence[Piece]) -> float | None:
     """The arc length at which the distance vectors (k, 2) at the arc lengths s (k,) pass through zero; None where none do."""
-    near = np.array([_CROSSING * 2 * robot.piece_at(height).section(height)[0].half_width for height in s])
+    near = np.array([_CROSSING * 2 * piece_at(pieces, height).section(height)[0].half_width for height in s])
     distance = np.hypot(*apart.T)
     for k in range(len(s) - 1):
         step = apart[k + 1] - apart[k]
@@ -73,25 +82,21 @@ def _crossing(s: np.ndarray, apart: np.ndarray, robot: "Robot") -> float | None:
     return None
 
 
-def _ends(cable: Cable, robot: "Robot") -> tuple[float, float]:
-    return (cable.start if cable.via_points is None else cable.via_points[0][2]), robot.cable_end(cable)
-
-
-def _points(cable: Cable, robot: "Robot", piece: Piece) -> list[tuple[float, float, float]]:
+def _points(run: CableRun, piece: Piece) -> list[tuple[float, float, float]]:
     """Points (x, y, s) in m of a cable in a piece, via points among them."""
-    if cable.via_points is None:
-        return [(*robot.cable_place(cable, s), s) for s in _places(cable, robot, piece)]
-    via, parts = np.array(cable.via_points), np.linspace(0.0, 1.0, _PLACES)[:, None]
+    if run.cable.via_points is None:
+        return [(*run.place(s), s) for s in _places(run, piece)]
+    via, parts = np.array(run.cable.via_points), np.linspace(0.0, 1.0, _PLACES)[:, None]
     legs = np.concatenate([a + parts * (b - a) for a, b in itertools.pairwise(via)])
     inside = (legs[:, 2] >= piece.start) & (legs[:, 2] <= piece.start + piece.length)
     return [(x, y, s) for x, y, s in legs[inside].tolist()]
 
 
-def _places(cable: Cable, robot: "Robot", piece: Piece) -> list[float]:
+def _places(run: CableRun, piece: Piece) -> list[float]:
     """Arc lengths (m) of the points of a cable in a piece."""
-    if cable.via_points is not None:
-        return [s for _, _, s in _points(cable, robot, piece)]
-    low, high = max(piece.start, cable.start), min(piece.start + piece.length, robot.cable_end(cable))
+    if run.cable.via_points is not None:
+        return [s for _, _, s in _points(run, piece)]
+    low, high = max(piece.start, run.start), min(piece.start + piece.length, run.end)
     return [] if high - low <= 1e-9 else np.linspace(low, high, _PLACES).tolist()
 
 

@@ -168,7 +168,7 @@ class Hardware:
             if not name.strip():
                 raise ValueError(f"buses[{index}].name is empty; every bus needs a name")
         _refuse_twice("bus", "name", names)
-        _refuse_twice("bus", "interface and channel", [CanInterface.label.fget(bus) for bus in self.buses])  # type: ignore[attr-defined]
+        _refuse_twice("bus", "interface and channel", [f"{bus.interface} {bus.channel}" for bus in self.buses])
         allowed = ", ".join(names) or "none (hardware.buses is not given)"
         if self.imu_bus is not None and self.imu_bus not in names:
             raise ValueError(f"imu_bus is '{self.imu_bus}'; allowed: {allowed}")

@@ -60,8 +60,8 @@ class MeshBody:
     @property
     def placement(self) -> Placement:
         """How the body is put into soft_base."""
-        move = self.transform
-        return Placement(self.axis, self.file_unit, self.length, move.scale, move.rotate, move.move, self.elements_max)
+        put = self.transform
+        return Placement(self.axis, self.file_unit, self.length, put.scale, put.rotate, put.move, self.elements_max)
 
     def placed(self) -> PlacedBody:
         """Return the body in soft_base, read when it is asked for first. Raises MeshError."""

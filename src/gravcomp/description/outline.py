@@ -6,6 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
+_SAME = 1e-9  # m
+
 
 class HasGauge(Protocol):
     """A closed curve around its middle."""
@@ -93,10 +95,10 @@ class Outline:
             to_top = (1.0 - v * np.sign(dv)) / np.abs(dv)
         return np.minimum(to_side, to_top)
 
-    def alike(self, other: "Outline", slack: float) -> bool:
-        """Return whether the other outline is the same within `slack` (m)."""
+    def alike(self, other: "Outline") -> bool:
+        """Return whether the other outline is the same but for rounding."""
         pairs = zip(dataclasses.astuple(self)[1:], dataclasses.astuple(other)[1:])
-        return self.shape == other.shape and all(abs(a - b) < slack for a, b in pairs)
+        return self.shape == other.shape and all(abs(a - b) < _SAME for a, b in pairs)
 
     @property
     def area(self) -> float:
@@ -122,7 +124,7 @@ class Outline:
         return text if self.x == 0.0 == self.y else f"{text} at ({self.x * 1e3:g}, {self.y * 1e3:g}) mm"
 
 
-def encloses(outer: "HasGauge", inner: Outline, gap: float) -> bool:
+def encloses(outer: HasGauge, inner: Outline, gap: float) -> bool:
     """Return whether `inner` lies inside `outer` with at least `gap` (m) between them."""
     for x, y in inner.boundary(np.linspace(0.0, 2 * math.pi, 48, endpoint=False)):
         reach = math.hypot(x - outer.x, y - outer.y)

@@ -4,6 +4,7 @@ A segment is one piece, or one between each two of its stations; its cap is anot
 different sections a transition joins them, unless all sections of the robot are round and concentric: these may change in a step.
 """
 
+import bisect
 import dataclasses
 import itertools
 import math
@@ -21,7 +22,6 @@ from gravcomp.description.segment import Segment, require_room
 _SLOPE, _PART = 2.0, 0.25
 # In a layer of elements in a transition the areas of outline, wall and lumens change by about this factor at most.
 _AREA_IN_LAYER = 1.5
-_SAME = 1e-9  # m
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +63,12 @@ class Piece:
         return section_moments(*self.section(s))
 
 
+def piece_at(pieces: Sequence[Piece], s: float) -> Piece:
+    """Return the piece at the arc length s (m), the later one where two meet."""
+    ends = [piece.start + piece.length for piece in pieces[:-1]]
+    return pieces[bisect.bisect_right(ends, s)]
+
+
 def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
     """Return the pieces from base to tip.
 
@@ -74,7 +80,7 @@ def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
     for segment in segments:
         first = 0.0
         if pieces:
-            check_joint(pieces[-1], segment)
+            _check_joint(pieces[-1], segment)
             if segment.transition is not None or (not steps and _differ(pieces[-1], segment)):
                 pieces.append(_transition(pieces[-1], segment, start))
                 first = pieces[-1].length / segment.length
@@ -89,7 +95,7 @@ def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
     return pieces
 
 
-def check_joint(before: Piece, segment: Segment) -> None:
+def _check_joint(before: Piece, segment: Segment) -> None:
     """Raise ValueError when a segment does not touch the piece before it, so that nothing holds it."""
     name = before.segment
     one, other = before.outer[1], segment.outline(0.0)
@@ -126,11 +132,11 @@ def _round_throughout(segment: Segment) -> bool:
 def _differ(before: Piece, segment: Segment) -> bool:
     """Whether the outlines differ where they meet, as many lumens lie elsewhere, or lumens that end touch others that begin."""
     ending, beginning = [pair[1] for pair in before.lumens], segment.lumen_outlines(0.0)
-    if not before.outer[1].alike(segment.outline(0.0), _SAME):
+    if not before.outer[1].alike(segment.outline(0.0)):
         return True
     if len(ending) == len(beginning):
-        return not all(one.alike(other, _SAME) for one, other in zip(ending, beginning))
-    others = [lumen for lumen in beginning if not any(lumen.alike(one, _SAME) for one in ending)]
+        return not all(one.alike(other) for one, other in zip(ending, beginning))
+    others = [lumen for lumen in beginning if not any(lumen.alike(one) for one in ending)]
     try:
         require_room(before.outer[1], [*ending, *others])
     except ValueError:
@@ -159,7 +165,7 @@ def _transition(before: Piece, segment: Segment, start: float) -> Piece:
     base, tip = [pair[1] for pair in before.lumens], list(segment.lumen_outlines(part))
     if len(base) != len(tip):  # those that coincide go on, the others end
         own = segment.lumen_outlines(0.0)
-        pairs = [(one, other) for one in base for before_taper, other in zip(own, tip) if one.alike(before_taper, _SAME)]
+        pairs = [(one, other) for one in base for before_taper, other in zip(own, tip) if one.alike(before_taper)]
         base, tip = [one for one, _ in pairs], [other for _, other in pairs]
     outer = before.outer[1], segment.outline(part)
     lumens = tuple(zip(base, tip))

@@ -3,7 +3,6 @@
 Frame `soft_base`: z runs along the straight robot from base to tip; the base is at z = 0.
 """
 
-import bisect
 import dataclasses
 import functools
 import math
@@ -16,11 +15,11 @@ from gravcomp.config import parameter
 from gravcomp.description.body import Elements, Material
 from gravcomp.description.cable import Cable
 from gravcomp.description.cable_line import CableLine
-from gravcomp.description.cable_path import check_crossings, check_path
+from gravcomp.description.cable_path import CableRun, check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
 from gravcomp.description.mesh_body import MeshBody
-from gravcomp.description.pieces import Piece, pieces_of_segments
+from gravcomp.description.pieces import Piece, piece_at, pieces_of_segments
 from gravcomp.description.point_load import PointLoad
 from gravcomp.description.segment import Segment
 
@@ -59,7 +58,7 @@ class Robot:
     )
     elements: Elements | None = parameter(
         None,
-        description="mesh of the segments; well-shaped when not given",
+        description="mesh of the segments; chosen by its estimated error when not given",
     )
     effectors: Effectors = parameter(default_factory=Effectors, description="observed points")
     limits: Limits = parameter(default_factory=Limits, description="limits of every cable")
@@ -76,13 +75,16 @@ class Robot:
         self._fill_cables()
         _ = self.pieces  # refuses segments that do not meet
         segment_names = [s.name for s in self.segments]
+        runs = []
         for index, cable in enumerate(self.cables):
             key = f"cables[{index}] ('{cable.name}')"
             if cable.segment is not None and cable.segment not in segment_names:
                 allowed = ", ".join(segment_names) or "none (the robot has a body)"
                 raise ValueError(f"{key}.segment is '{cable.segment}'; allowed: {allowed}")
-            check_path(key, cable, self)
-        check_crossings(self)
+            runs.append(CableRun(cable, self.cable_end(cable), functools.partial(self.cable_place, cable)))
+            check_path(key, runs[-1], self.pieces, self.segments, self.length)
+        if self.body is None:
+            check_crossings(runs, self.pieces)
 
     def _fill_cables(self) -> None:
         """Give each cable what `cable_defaults` has and it does not, and empty them: a changed cable is not filled again."""
@@ -111,8 +113,7 @@ class Robot:
 
     def piece_at(self, s: float) -> Piece:
         """Return the piece at the arc length s (m), the later one where two meet. The robot needs segments."""
-        ends = [piece.start + piece.length for piece in self.pieces[:-1]]
-        return self.pieces[bisect.bisect_right(ends, s)]
+        return piece_at(self.pieces, s)
 
     def cable_place(self, cable: Cable, s: float) -> tuple[float, float]:
         """Return (x, y) in m where the cable crosses the section at the arc length s (m)."""

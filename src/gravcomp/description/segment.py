@@ -72,13 +72,6 @@ class Segment:
             self.disks.check(self.length, 2 * half)
 
     @property
-    def plain(self) -> bool:
-        """Whether it is round, of constant section, straight at rest, without lumens off the axis and without disks."""
-        tapered = self.tip_outer_diameter is not None or self.tip_lumen_diameter is not None or bool(self.stations)
-        tapered = tapered or self.transition is not None
-        return self.section is None and not tapered and not self.lumens and self.rest is None and self.disks is None
-
-    @property
     def full_length(self) -> float:
         """Length with the cap (m)."""
         return self.length + (self.cap.length if self.cap else 0.0)

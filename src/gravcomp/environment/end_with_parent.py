@@ -7,6 +7,6 @@ _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
 
 
-def end_with_parent() -> None:
-    """Let this process be ended by SIGTERM when its parent ends, however that happens; for the `preexec_fn` of a process."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+def end_with_parent(number: int = signal.SIGTERM) -> None:
+    """Let the kernel send this signal to this process when its parent ends, however that happens; also for a `preexec_fn`."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, number)

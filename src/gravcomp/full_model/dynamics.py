@@ -12,9 +12,9 @@ import numpy as np
 from gravcomp.cables.tendons import TendonState
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.motion import Motion
 from gravcomp.full_model.rayleigh import RayleighDamping
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.viscosity import Viscosity
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 from gravcomp.mechanics.corotational import CorotationalElements

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.corotational import CorotationalElements
 

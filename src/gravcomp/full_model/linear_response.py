@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.full_model.equilibrium import Equilibrium
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response
 
 

@@ -22,8 +22,10 @@ import numpy as np
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
+from gravcomp.full_model.mesh_loads import LoadedShapes, mesh_loads, shapes_under
+from gravcomp.full_model.model import MeshedModel
+from gravcomp.mesh.layers import least_layers
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.pieces import pieces_of
 from gravcomp.mesh.refusal import well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
 
@@ -151,8 +153,6 @@ class _Tips:
 
     def __init__(self, robot: Robot, start: Elements):
         """Find the loads with the mesh `start`."""
-        from gravcomp.full_model.mesh_loads import LoadedShapes, mesh_loads
-
         self._robot = robot
         self._known: dict[Elements, LoadedShapes] = {}
         self._unknowns: dict[Elements, int] = {}
@@ -176,23 +176,19 @@ class _Tips:
 
     def _tips(self, elements: Elements, near: Elements | None = None) -> np.ndarray:
         """The tips (l, 3) in m; near: a mesh that is nearly the same."""
-        from gravcomp.full_model.mesh_loads import shapes_under
-
         if elements not in self._known:
             if near is not None:
                 self._tips(near)
             self._known[elements] = shapes_under(self._model(elements), self._loads, self._known[near] if near else None)
         return self._known[elements].tips
 
-    def _model(self, elements: Elements):  # type: ignore[no-untyped-def]
-        from gravcomp.full_model.model import RobotModel
-
-        return RobotModel(dataclasses.replace(self._robot, elements=elements))
+    def _model(self, elements: Elements) -> MeshedModel:
+        return MeshedModel(dataclasses.replace(self._robot, elements=elements))
 
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    parts = least_layers(robot.pieces)
     disks = any(segment.disks for segment in robot.segments)
     around = 4 if coarse_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
@@ -219,7 +215,7 @@ def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
         return _with(robot, elements, "around", min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
     if direction == "radial":
         return _with(robot, elements, "radial", min(elements.radial + 1, 8))
-    parts = sum(len(piece.marks) + 1 for piece in pieces_of(robot))
+    parts = least_layers(robot.pieces)
     disks = any(segment.disks for segment in robot.segments)
     return _with(robot, elements, "along", min(elements.along + parts if disks else math.ceil(1.4 * elements.along), 500))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.full_model.mesh_loads import mesh_loads, shapes_under
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh import MeshError
 
 

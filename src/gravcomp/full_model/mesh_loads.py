@@ -12,7 +12,7 @@ import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.carried_shape import carried_shape
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.statics import StaticSolver
 
 _GRAVITY = 9.81
@@ -34,7 +34,7 @@ class MeshLoad:
     tension: np.ndarray
 
 
-def mesh_loads(model: RobotModel) -> list[MeshLoad]:
+def mesh_loads(model: MeshedModel) -> list[MeshLoad]:
     """Return the loads of a robot: its weight across its axis, in two directions where it is not round, and the bend."""
     robot, none = model.robot, np.zeros(len(model.robot.cables))
     loads = [MeshLoad("horizontal", np.array([-_GRAVITY, 0.0, 0.0]), none)]
@@ -50,7 +50,7 @@ def mesh_loads(model: RobotModel) -> list[MeshLoad]:
 class LoadedShapes:
     """The shapes of a model under loads: displacements (n, 3) in m of each, None where no equilibrium is found."""
 
-    model: RobotModel
+    model: MeshedModel
     shapes: tuple[np.ndarray | None, ...]
 
     @property
@@ -63,7 +63,7 @@ class LoadedShapes:
         return tips
 
 
-def shapes_under(model: RobotModel, loads: list[MeshLoad], near: LoadedShapes | None = None) -> LoadedShapes:
+def shapes_under(model: MeshedModel, loads: list[MeshLoad], near: LoadedShapes | None = None) -> LoadedShapes:
     """Return the shapes under the loads.
 
     near: the shapes of another mesh of the same robot under the same loads. Newton's method starts from them; only where that
@@ -81,7 +81,7 @@ def shapes_under(model: RobotModel, loads: list[MeshLoad], near: LoadedShapes | 
     return LoadedShapes(model, tuple(shapes))
 
 
-def _from_near(solver: StaticSolver, load: MeshLoad, source: RobotModel, shape: np.ndarray) -> bool:
+def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
     u = carried_shape(shape, source.mesh, model.mesh)
@@ -108,7 +108,7 @@ def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
     return True
 
 
-def _bending_tension(model: RobotModel) -> np.ndarray | None:
+def _bending_tension(model: MeshedModel) -> np.ndarray | None:
     """Tensions (m,) that bend the robot by the cable that ends last; None where there is no cable or it does not move."""
     robot = model.robot
     if not robot.cables:
@@ -137,7 +137,7 @@ def _bending_tension(model: RobotModel) -> np.ndarray | None:
     return best * unit if best else None
 
 
-def _turned(model: RobotModel, u: np.ndarray) -> float:
+def _turned(model: MeshedModel, u: np.ndarray) -> float:
     """Angle (rad) between the directions of the tip at displacements u (n, 3) and at rest."""
     (_, one, two), (_, rest_one, rest_two) = (
         model.effectors.sections(nodes)[-1] for nodes in (model.mesh.nodes + u, model.mesh.nodes)

@@ -12,7 +12,6 @@ from gravcomp.cables.tendons import Tendons, pieces_of
 from gravcomp.description import Robot
 from gravcomp.full_model.effectors import Effectors
 from gravcomp.full_model.hung_loads import hung_weights
-from gravcomp.full_model.mesh_choice import with_chosen_elements
 from gravcomp.mechanics.block_matrix import BlockMatrix, order_in_levels
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
@@ -20,8 +19,8 @@ from gravcomp.mesh import Mesh, body_mesh
 from gravcomp.mesh.elements import constant_strain
 
 
-class RobotModel:
-    """The finite-element model of a robot.
+class MeshedModel:
+    """The finite-element model of a robot with the elements that its description has.
 
     Attributes: robot; mesh, renumbered; pattern of the stiffness; elements; tendons; effectors; body_weight and nodal_weight
     (n,): mass in kg that gravity acts on at each node, without and with payload, loads and disks; n_free: number of free nodes;
@@ -33,7 +32,7 @@ class RobotModel:
 
         Raises MeshError for a body that cannot be meshed, a cable outside the body and parts that are not connected to the base.
         """
-        self.robot = robot = robot if mesh else with_chosen_elements(robot)
+        self.robot = robot
         mesh = mesh or body_mesh(robot)
         routes = route_cables(robot, mesh)
         cliques = [mesh.elements]

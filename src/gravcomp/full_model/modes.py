@@ -3,7 +3,7 @@
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.tube import with_coarse_elements
 
 

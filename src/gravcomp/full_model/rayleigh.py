@@ -3,7 +3,7 @@
 import numpy as np
 
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mechanics.block_matrix import BlockMatrix
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 from gravcomp.mechanics.viscous_strain import ViscousStrain
@@ -45,7 +45,7 @@ class StaticTracker:
     viscous: strain of what the materials' branches hold in the equilibrium (`full_model.creep`); None: they have relaxed.
     """
 
-    def __init__(self, model: RobotModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
+    def __init__(self, model: MeshedModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
         """Start from the straight robot.
 
         tolerance, longest_step and near (the step below which a factor is used again) are displacements of a node as fractions

@@ -12,7 +12,7 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.mesh.sections import section_functionals
 
 
@@ -37,7 +37,7 @@ class Wrench:
 class PointLoads:
     """The loads of some wrenches on a model. constant: no moment is among them."""
 
-    def __init__(self, model: RobotModel, wrenches: tuple[Wrench, ...]):
+    def __init__(self, model: MeshedModel, wrenches: tuple[Wrench, ...]):
         self._model = model
         rows = section_functionals(model.mesh, np.array([wrench.station for wrench in wrenches]) * model.length)
         self._rows = rows.reshape(len(wrenches), 3, len(model.mesh.nodes))
@@ -45,7 +45,7 @@ class PointLoads:
         self.constant = not any(wrench.moment.any() for wrench in wrenches)
 
     @staticmethod
-    def of(model: RobotModel, wrench: "Wrench | tuple[Wrench, ...] | None") -> "PointLoads | None":
+    def of(model: MeshedModel, wrench: "Wrench | tuple[Wrench, ...] | None") -> "PointLoads | None":
         """Return the loads of one wrench or several; None without any."""
         wrenches = (wrench,) if isinstance(wrench, Wrench) else wrench
         return PointLoads(model, tuple(wrenches)) if wrenches else None

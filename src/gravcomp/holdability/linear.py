@@ -7,8 +7,8 @@ quadratic programme.
 import numpy as np
 
 from gravcomp.description import Limits
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme

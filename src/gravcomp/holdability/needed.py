@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.description import Cable, Robot
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability.answer import Binding, DirectionAnswer, Needed
 from gravcomp.holdability.search import HoldSearch
 from gravcomp.mesh import MeshError

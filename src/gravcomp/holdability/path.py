@@ -13,7 +13,7 @@ from gravcomp.description import Limits
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.linear_response import observed
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.tangent import Eigenvalues, Tangent

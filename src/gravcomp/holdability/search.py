@@ -3,7 +3,7 @@
 import numpy as np
 
 from gravcomp.full_model.law_range import beyond_range
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability.answer import Binding, DirectionAnswer
 from gravcomp.holdability.limits import unlimited_rates
 from gravcomp.holdability.linear import LinearHolding

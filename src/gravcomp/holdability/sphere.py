@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.holdability.answer import Binding, DirectionAnswer, Holdability
 from gravcomp.holdability.directions import angles, sphere

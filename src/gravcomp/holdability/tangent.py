@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.full_model.equilibrium import Equilibrium
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 
 _ITERATIONS = 3

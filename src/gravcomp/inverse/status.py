@@ -21,6 +21,14 @@ class ControllerCode(IntEnum):
     RELAXING = 7
 
 
+class Holdable(IntEnum):
+    """Values of `holdable` in gravcomp_msgs/ControllerStatus."""
+
+    NOT_KNOWN = 0
+    YES = 1
+    NO = 2
+
+
 def evaluate(
     *,
     target: Target,

@@ -6,7 +6,7 @@ with NodeHost() as host:                       # imports in the background
 """
 
 import contextlib
-import ctypes
+import functools
 import json
 import os
 import select
@@ -18,10 +18,8 @@ import uuid
 from collections.abc import Iterable
 from pathlib import Path
 
+from gravcomp.environment.end_with_parent import end_with_parent
 from gravcomp.launcher.process_title import PADDING
-
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)
 
 MARK = "GRAVCOMP_GRAPH"
 """Environment variable of every process of a graph, also of those that a node starts in a session of their own."""
@@ -67,7 +65,8 @@ class NodeHost:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,  # Ctrl-C reaches the launcher alone
-                preexec_fn=_be_killed_with_parent,
+                # SIGKILL ends also a host that is stopped; its nodes then get SIGINT.
+                preexec_fn=functools.partial(end_with_parent, signal.SIGKILL),
                 pass_fds=[number],
                 env={**NODE_ENVIRONMENT, **os.environ, "PYTHONUNBUFFERED": "1", MARK: self.mark},
             )
@@ -143,11 +142,6 @@ class NodeHost:
                 else:
                     self._answers.append(answer)
             timeout = 0.0
-
-
-def _be_killed_with_parent() -> None:
-    """Make the kernel kill this process when the launcher ends, even when it is stopped; its nodes then get SIGINT."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def runs_in_host(path: str) -> bool:

@@ -18,7 +18,6 @@ end of the socket, and also when the launcher is killed. The kernel then sends S
 
 import atexit
 import contextlib
-import ctypes
 import gc
 import importlib
 import json
@@ -33,10 +32,8 @@ import traceback
 import warnings
 from typing import NoReturn
 
+from gravcomp.environment.end_with_parent import end_with_parent
 from gravcomp.launcher.process_title import set_title
-
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None)
 
 
 def main(arguments: list[str]) -> int:
@@ -138,7 +135,7 @@ def _become(command: list[str], output: int, environment: dict[str, str], host: 
     code = 1
     try:
         os.setsid()
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+        end_with_parent(signal.SIGINT)
         if os.getppid() != host:  # it ended before
             os._exit(1)
         signal.set_wakeup_fd(-1)

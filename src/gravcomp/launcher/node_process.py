@@ -5,7 +5,7 @@ by `exec`.
 """
 
 import contextlib
-import ctypes
+import functools
 import json
 import os
 import signal
@@ -15,12 +15,11 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gravcomp.environment.end_with_parent import end_with_parent
 from gravcomp.launcher.host_client import NODE_ENVIRONMENT, HostError, NodeHost, is_alive, runs_in_host
 
 # s that a node has to end after SIGINT, then after SIGTERM, before it is killed.
 _PATIENCE = (5.0, 3.0)
-_PR_SET_PDEATHSIG = 1
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 ACTIVE_FILE = "GRAVCOMP_ACTIVE_FILE"
 """Environment variable with the path of a file that a node creates when it becomes active at its start."""
@@ -175,7 +174,7 @@ class _Executed:
                 stderr=subprocess.STDOUT,
                 # In a session of its own: Ctrl-C in the terminal reaches the launcher only, which ends the nodes.
                 start_new_session=True,
-                preexec_fn=_die_with_parent,
+                preexec_fn=functools.partial(end_with_parent, signal.SIGINT),
                 env={**NODE_ENVIRONMENT, **os.environ, "PYTHONUNBUFFERED": "1", **environment},
             )
         self.pid = self._process.pid
@@ -213,8 +212,3 @@ class _Hosted:
     def reason(self) -> str:
         """Why the node ended, when that is the end of its host."""
         return self._host.why_ended() if self._host.exit_code(self.pid) is None and not self._host.is_running else ""
-
-
-def _die_with_parent() -> None:
-    """Make the kernel end this process when the launcher is killed."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)

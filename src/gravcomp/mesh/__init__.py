@@ -1,4 +1,4 @@
-"""Finite-element meshes of a robot's body: graded hexahedra for tubes, tetrahedra for any other body."""
+"""Finite-element meshes of a robot's body: graded hexahedra for tubes, or from a file."""
 
 from gravcomp.mesh.body import body_mesh
 from gravcomp.mesh.mesh import Mesh, MeshError

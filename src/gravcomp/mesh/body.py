@@ -7,15 +7,15 @@ from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.quadratic import raised_to_quadratic
 from gravcomp.mesh.refusal import require_well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
-from gravcomp.mesh_files.centreline import straightened
 from gravcomp.mesh_files.filling import filled
+from gravcomp.rest_axis import straightened
 
 # Relative to the length: distance of a node from the plane of base or tip up to which it is put onto the plane.
 _PLANE_TOLERANCE = 1e-4
 
 
 def body_mesh(robot: Robot) -> Mesh:
-    """Return the mesh: graded hexahedra for tubes, quadratic tetrahedra for a body from a file. Raises MeshError."""
+    """Return the mesh: graded hexahedra for tubes, quadratic elements for a body from a file. Raises MeshError."""
     if robot.body is not None:
         return _from_file(robot.body)
     mesh = tube_mesh(robot)

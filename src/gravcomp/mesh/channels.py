@@ -8,7 +8,6 @@ from gravcomp.description import Outline, Piece
 from gravcomp.description.segment import require_room
 from gravcomp.mesh.mesh import MeshError
 
-_SAME = 1e-9  # m
 # A filled circle that touches a lumen shrinks to this part of the room that it has.
 _PART_OF_ROOM = 0.6
 
@@ -30,13 +29,13 @@ def channels_of(pieces: list[Piece]) -> tuple[list[Outline], list[Channel]]:
     outlines = [pieces[0].outer[0], *(piece.outer[1] for piece in pieces)]
     found: list[tuple[dict[int, Outline], np.ndarray]] = []
     for index, piece in enumerate(pieces):
-        if not piece.outer[0].alike(outlines[index], _SAME):
+        if not piece.outer[0].alike(outlines[index]):
             raise MeshError(
                 f"segments '{pieces[index - 1].name}' and '{piece.name}' have different outlines where they meet"
                 f" ({outlines[index]}; {piece.outer[0]}): give the second one transition_mm"
             )
         for base, tip in piece.lumens:
-            known = next((c for c in found if index in c[0] and c[0][index].alike(base, _SAME)), None)
+            known = next((c for c in found if index in c[0] and c[0][index].alike(base)), None)
             if known is None:
                 known = {index: base}, np.zeros(len(pieces), dtype=bool)
                 found.append(known)

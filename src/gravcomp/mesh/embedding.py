@@ -60,8 +60,8 @@ def embed(mesh: Mesh, points: np.ndarray) -> Embedding:
     return found
 
 
-def locate(mesh: Mesh, points: np.ndarray, farthest: float = _EXTRAPOLATED) -> tuple[Embedding, np.ndarray]:
-    """Attach those of the points (p, 3) that lie in the mesh or at most `farthest` outside an element, in local coordinates.
+def locate(mesh: Mesh, points: np.ndarray) -> tuple[Embedding, np.ndarray]:
+    """Attach those of the points (p, 3) that lie in the mesh or at most half an element outside of it.
 
     Returns the embedding, and which points are attached (p,); the weights of the others are zero.
     """
@@ -91,7 +91,7 @@ def locate(mesh: Mesh, points: np.ndarray, farthest: float = _EXTRAPOLATED) -> t
         distance[again[reached]] = distance_outside(mesh.kind, at[reached])
     best = np.full(len(points), -1)
     for pair in np.argsort(-distance, kind="stable"):  # the last one written is the deepest inside
-        if distance[pair] <= farthest:
+        if distance[pair] <= _EXTRAPOLATED:
             best[points_of[pair]] = pair
     attached = best >= 0
     nodes = np.zeros((len(points), mesh.elements.shape[1]), dtype=mesh.elements.dtype)

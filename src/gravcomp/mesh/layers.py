@@ -4,8 +4,13 @@ import itertools
 
 import numpy as np
 
+from gravcomp.description import Piece
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.pieces import Piece
+
+
+def least_layers(pieces: list[Piece]) -> int:
+    """Return the number of parts, each a layer or more, into which the ends of the pieces and their marks divide the robot."""
+    return sum(len(piece.marks) + 1 for piece in pieces)
 
 
 def layers_of(pieces: list[Piece], along: int, grading: float) -> tuple[np.ndarray, list[int]]:

@@ -56,7 +56,7 @@ def _equal_levels(pieces: list[Piece]) -> Levels:
 
 def _require_same(pieces: list[Piece], index: int, curves: list[Outline | None], plane: int, outline: Outline, what: str) -> None:
     before = curves[plane]
-    if before is not None and not before.alike(outline, _SAME):
+    if before is not None and not before.alike(outline):
         raise MeshError(
             f"segments '{pieces[index - 1].name}' and '{pieces[index].name}' have different {what} where they meet"
             f" ({before}; {outline}): only round, concentric sections may change in a step"

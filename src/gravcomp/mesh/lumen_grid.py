@@ -16,18 +16,16 @@ from gravcomp.description import BlendedOutline, Outline
 from gravcomp.mesh.channels import Channel
 from gravcomp.mesh.lumen_cells import Diagram, diagram_of
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.section_grid import SectionGrid, core_cells
+from gravcomp.mesh.section_grid import BULGE, EVEN, SectionGrid, core_cells
 from gravcomp.mesh.section_laplace import jacobian_ratios, stiffness_and_moments
 
-# Above this ratio of radii the rings around a lumen are divided evenly, below it in geometric progression.
-_EVEN = 0.4
 # A division whose worst cell has a smaller Jacobian ratio is tried again from another plane, and with up to so many filled
 # channels more: where there is much room between the lumens, they make the cells around it regular.
 _GOOD, _MOST_FILLINGS = 0.25, 3
 # What a more complicated division has to gain.
 _BETTER = 0.03
-# What fills a channel inside the ring reaches to this part of its radius, and its sides bulge: 0 is a square, 1 a circle.
-_FILLED, _BULGE = 0.6, 0.35
+# What fills a channel inside the ring reaches to this part of its radius.
+_FILLED = 0.6
 # Up to so many sectors a channel is filled with kites: more of them would be too obtuse.
 _MOST_KITES = 10
 
@@ -178,7 +176,7 @@ class _Division:
         part = (np.arange(count) % sides / sides)[:, None]
         first = np.arange(count) // sides * sides
         straight = (1.0 - part) * corner[first] + part * corner[(first + sides) % count]
-        side = middle + (straight if sides == 2 else (1.0 - _BULGE) * straight + _BULGE * corner)
+        side = middle + (straight if sides == 2 else (1.0 - BULGE) * straight + BULGE * corner)
         rings = [self._add(side), self._add((side + outer) / 2), wall]
         self._ring_cells(rings, channel)
         if count % 8:
@@ -217,7 +215,7 @@ class _Division:
 def _shares(ratio: float, radial: int) -> np.ndarray:
     """(2 radial + 1,) parts of the way from a lumen to its region's border at which nodes lie, on half steps."""
     part = np.arange(radial + 1) / radial
-    whole = part if ratio > _EVEN else ((1.0 / ratio) ** part - 1.0) / (1.0 / ratio - 1.0)
+    whole = part if ratio > EVEN else ((1.0 / ratio) ** part - 1.0) / (1.0 / ratio - 1.0)
     return np.interp(np.arange(2 * radial + 1) / 2, np.arange(radial + 1), whole)
 
 

@@ -15,9 +15,9 @@ from gravcomp.mesh.levels import Levels
 from gravcomp.mesh.mesh import MeshError
 
 # Above this ratio of radii the rings of a wall are divided evenly, below it in geometric progression.
-_EVEN = 0.4
+EVEN = 0.4
 # How far the sides of the core bulge: 0 is a square, 1 a circle. The angles at its corners become equal in all three cells.
-_BULGE = 0.35
+BULGE = 0.35
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _shares(levels: Levels, level: int, plane: int, radial: int) -> np.ndarray:
     steepest = min((a.half_width / b.half_width for a, b in pairs), default=1.0)
     even = np.arange(radial) / radial
     inner, outer = levels.curves[level][plane], levels.curves[level + 1][plane]
-    if steepest > _EVEN or not inner or not outer:
+    if steepest > EVEN or not inner or not outer:
         return even
     ratio = outer.half_width / inner.half_width
     return (ratio**even - 1.0) / (ratio - 1.0)
@@ -127,7 +127,7 @@ def _core_boundary(outline: Outline | BlendedOutline, angle: np.ndarray, across:
     shrunk = 1.0 if outline.shape == "rectangle" else math.sqrt(0.5)
     square = Outline("rectangle", shrunk * outline.half_width, shrunk * outline.half_height).boundary(angle)
     curve = outline.boundary(angle) - middle
-    return middle + part * ((1.0 - _BULGE) * square + _BULGE * curve)
+    return middle + part * ((1.0 - BULGE) * square + BULGE * curve)
 
 
 def core_cells(across: int, side: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:

@@ -11,10 +11,10 @@ import numpy as np
 
 from gravcomp.description import Elements, Robot
 from gravcomp.mesh.elements import is_hexahedron, reference_nodes
-from gravcomp.mesh.layers import layers_of
+from gravcomp.mesh.layers import layers_of, least_layers
 from gravcomp.mesh.mesh import Mesh
-from gravcomp.mesh.pieces import pieces_of, rest_axis
 from gravcomp.mesh.quadratic import TET_EDGES
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.section_division import divided_sections
 
 
@@ -26,7 +26,7 @@ def tube_mesh(
     kind: one of `elements.KINDS`. Raises MeshError when the numbers cannot be met.
     """
     elements = robot.elements or coarse_elements(robot)
-    pieces = pieces_of(robot)
+    pieces = robot.pieces
     grid = divided_sections(pieces, around or elements.around, radial or elements.radial, elements.equal_stiffness)
     heights, piece_of_layer = layers_of(pieces, along or elements.along, elements.grading)
 
@@ -64,11 +64,9 @@ def tube_mesh(
 
 def coarse_elements(robot: Robot) -> Elements:
     """Return numbers of elements that every robot of segments can be meshed with."""
-    pieces = pieces_of(robot)
-    several = any(len(piece.lumens) > 1 for piece in pieces)
-    cornered = not several and any(not piece.lumens or piece.outer[0].shape == "rectangle" for piece in pieces)
-    parts = sum(len(piece.marks) + 1 for piece in pieces)
-    return Elements(around=8 if cornered else 6, along=max(10, parts))
+    several = any(len(piece.lumens) > 1 for piece in robot.pieces)
+    cornered = not several and any(not piece.lumens or piece.outer[0].shape == "rectangle" for piece in robot.pieces)
+    return Elements(around=8 if cornered else 6, along=max(10, least_layers(robot.pieces)))
 
 
 def with_coarse_elements(robot: Robot) -> Robot:

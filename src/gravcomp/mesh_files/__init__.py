@@ -1,8 +1,8 @@
 """Meshes as they come from other programmes: reading, repairing, unit, axis and place of a body in a file.
 
-    file -> `formats` -> `repair_volume` or `repair_surface` -> `orientation` -> `units` -> `placing` (body in soft_base)
+    file -> `formats` -> `repair_volume` or `repair_surface` -> `orientation` -> `centreline` -> `units` -> body in soft_base
 
-A surface is filled with tetrahedra by `filling`.
+`placing` takes the steps one after the other. A surface is filled with tetrahedra by `filling`.
 """
 
 from gravcomp.mesh_files.errors import MeshError

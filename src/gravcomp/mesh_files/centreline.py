@@ -4,7 +4,8 @@ import numpy as np
 
 from gravcomp.mesh_files.errors import MeshError
 from gravcomp.mesh_files.plane_section import plane_section
-from gravcomp.rest_axis import STRAIGHT, Arc, RestAxis
+from gravcomp.mesh_files.repair_surface import enclosed_volume
+from gravcomp.rest_axis import STRAIGHT, Arc, RestAxis, straightened
 
 _PIECES, _SECTIONS, _ROUNDS = 4, 40, 4
 # An axis that leaves the straight one by less than this part of the body's thickness, or turns less (rad), counts as straight.
@@ -24,8 +25,7 @@ def fitted_axis(nodes: np.ndarray, triangles: np.ndarray, name: str) -> tuple[Re
     from scipy.optimize import least_squares
 
     top = float(nodes[:, 2].max())
-    a, b, c = (nodes[triangles[:, i]] for i in range(3))
-    thickness = float(np.sqrt(4.0 * np.einsum("ki,ki->", np.cross(a, b), c) / 6.0 / (np.pi * top)))
+    thickness = float(np.sqrt(4.0 * enclosed_volume(nodes, triangles) / (np.pi * top)))
     direction = nodes[np.argmax(np.linalg.norm(nodes, axis=1))]
     length = float(np.linalg.norm(direction))
     upright = _section_places(STRAIGHT, direction, top)
@@ -59,23 +59,6 @@ def fitted_axis(nodes: np.ndarray, triangles: np.ndarray, name: str) -> tuple[Re
     if float(np.median(np.hypot(*straightened(axis, centroids, length)[:, :2].T))) > thickness:
         raise MeshError(f"{name}: axis: auto cannot follow the body: the middles of its sections lie on no smooth axis")
     return axis, length
-
-
-def straightened(axis: RestAxis, points: np.ndarray, length: float) -> np.ndarray:
-    """Return places in the sections and arc lengths (n, 3) of points (n, 3): the inverse of `RestAxis.points`."""
-    s = np.linspace(-0.02, 1.02, 105) * length
-    line = axis.frames(s)[0]
-    at = s[np.argmin(((points[:, None] - line[None]) ** 2).sum(axis=2), axis=1)]
-    for _ in range(200):
-        position, rotation = axis.frames(at)
-        offset = points - position
-        change = np.einsum("ni,ni->n", offset, rotation[:, :, 2])
-        at = at + change
-        if np.abs(change).max() < 1e-14 * length:
-            break
-    position, rotation = axis.frames(at)
-    place = np.einsum("ni,nij->nj", points - position, rotation[:, :, :2])
-    return np.column_stack([place, at])
 
 
 def _chain(curvature: np.ndarray, length: float) -> RestAxis:

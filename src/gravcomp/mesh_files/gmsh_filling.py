@@ -3,9 +3,8 @@
 import numpy as np
 
 from gravcomp.mesh_files.errors import MeshError
-from gravcomp.mesh_files.gmsh_library import gmsh_session
+from gravcomp.mesh_files.gmsh_library import TETRAHEDRON, TRIANGLE, gmsh_session, mesh_of
 
-_TETRAHEDRON, _TRIANGLE = 4, 2
 # Gmsh has absolute tolerances, which suit mm.
 _UNIT = 1e-3
 # Where facets meet at more than this angle (deg) an edge of the body stays sharp.
@@ -17,7 +16,7 @@ def by_gmsh(nodes: np.ndarray, triangles: np.ndarray, element_size: float, name:
     with gmsh_session(name, "cannot fill the surface") as gmsh:
         tag = gmsh.model.addDiscreteEntity(2)
         gmsh.model.mesh.addNodes(2, tag, np.arange(1, len(nodes) + 1), nodes.ravel() / _UNIT)
-        gmsh.model.mesh.addElementsByType(tag, _TRIANGLE, np.arange(1, len(triangles) + 1), (triangles + 1).ravel())
+        gmsh.model.mesh.addElementsByType(tag, TRIANGLE, np.arange(1, len(triangles) + 1), (triangles + 1).ravel())
         gmsh.model.mesh.classifySurfaces(np.deg2rad(_SHARP), True, True, np.pi)
         gmsh.model.mesh.createGeometry()
         faces = [face for _, face in gmsh.model.getEntities(2)]
@@ -27,11 +26,7 @@ def by_gmsh(nodes: np.ndarray, triangles: np.ndarray, element_size: float, name:
         gmsh.option.setNumber("Mesh.MeshSizeMin", element_size / _UNIT / 4.0)
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
-        tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, connectivity = gmsh.model.mesh.getElementsByType(_TETRAHEDRON)
-    if len(connectivity) == 0:
+        points, elements = mesh_of(gmsh, TETRAHEDRON, 4)
+    if len(elements) == 0:
         raise MeshError(f"{name}: Gmsh made no tetrahedra; is the surface free of intersections?")
-    index = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    index[tags.astype(np.int64)] = np.arange(len(tags))
-    used, numbers = np.unique(index[connectivity.astype(np.int64)], return_inverse=True)
-    return _UNIT * coordinates.reshape(-1, 3)[used], numbers.reshape(-1, 4)
+    return _UNIT * points, elements

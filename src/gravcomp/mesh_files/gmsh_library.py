@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from gravcomp.environment import system_packages
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.packages import provide_extra
@@ -16,6 +18,8 @@ from gravcomp.mesh_files.errors import MeshError
 SYSTEM_PACKAGES = ("libglu1-mesa", "libgl1", "libopengl0", "libxcursor1", "libxft2", "libxinerama1", "libxfixes3")
 """Debian packages with the system libraries that Gmsh's wheel is linked to."""
 INSTALL_LINE = "./gravcomp mesh install"
+# Gmsh's numbers of elements.
+TRIANGLE, TETRAHEDRON = 2, 4
 
 
 class GmshMissing(MeshError):
@@ -56,6 +60,18 @@ def gmsh_session(name: str, failure: str) -> Iterator[Any]:
             raise MeshError(f"{name}: Gmsh {failure}: {error}") from error
         finally:
             gmsh.finalize()
+
+
+def mesh_of(gmsh: Any, element_type: int, corners: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes (n, 3) and elements (k, corners) of Gmsh's number `element_type` in its model; none where it made none."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    _, connectivity = gmsh.model.mesh.getElementsByType(element_type)
+    if len(connectivity) == 0:
+        return np.zeros((0, 3)), np.zeros((0, corners), dtype=np.int64)
+    index = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    index[tags.astype(np.int64)] = np.arange(len(tags))
+    used, numbers = np.unique(index[connectivity.astype(np.int64)], return_inverse=True)
+    return coordinates.reshape(-1, 3)[used], numbers.reshape(-1, corners)
 
 
 @contextlib.contextmanager

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.mesh_files.flaw_picture import with_picture
+from gravcomp.mesh_files.winding import directed_edges
 
 # A hole is small up to this part of the body's diagonal, and flat when it leaves its plane by no more than this part of its size.
 _SMALL, _FLAT = 0.05, 0.01
@@ -12,7 +13,7 @@ _SMALL, _FLAT = 0.05, 0.01
 
 def open_edges(faces: np.ndarray) -> np.ndarray:
     """Return the directed edges (e, 2) that belong to one triangle only."""
-    directed = faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2)
+    directed = directed_edges(faces)
     _, first, count = np.unique(np.sort(directed, axis=1), axis=0, return_index=True, return_counts=True)
     return directed[first[count == 1]]
 

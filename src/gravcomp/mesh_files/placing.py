@@ -11,7 +11,6 @@ from gravcomp.mesh_files import formats
 from gravcomp.mesh_files.centreline import fitted_axis
 from gravcomp.mesh_files.errors import MeshError
 from gravcomp.mesh_files.orientation import automatic_frame
-from gravcomp.mesh_files.raw_mesh import RawMesh
 from gravcomp.mesh_files.repair_surface import repaired_surface
 from gravcomp.mesh_files.repair_volume import boundary_triangles, repaired_volume
 from gravcomp.mesh_files.units import unit_of
@@ -45,8 +44,7 @@ class Placement:
 class PlacedBody:
     """A surface (kind tri3, facing outward) or a volume (tet4, tet10, hex20) in soft_base.
 
-    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; flat_tip: whether it ends in a face across the
-    axis; notes: sentences on what was found and repaired.
+    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; notes: sentences on what was found and repaired.
     """
 
     kind: str
@@ -95,7 +93,7 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     if axis.bent:
         turn = np.degrees(np.arccos(axis.frames(np.array([length]))[1][0, 2, 2]))
         notes.append(f"the body is bent at rest: its axis turns by {turn:.0f} deg; lengths run along it")
-    unit, why = _unit(mesh, nodes, length, placement, name)
+    unit, why = _unit(mesh.unit, nodes, length, placement, name)
     notes.append(f"{why}: {length * unit * 1e3:.6g} mm long")
     if axis.bent and any(placement.move):
         raise MeshError(f"{name}: transform.move_mm cannot move a body that is bent at rest: its axis begins inside its base")
@@ -104,13 +102,14 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
     if placement.length is not None and not axis.bent:
         nodes[:, 2] *= placement.length / length  # rounding of the declared length
         length = placement.length
-    _check_base(mesh, nodes, length, clamped, name)
+    if not clamped:
+        _check_base(nodes, length, name)
     for plane in (0.0, length) if not axis.bent else (0.0,):
         nodes[np.abs(nodes[:, 2] - plane) < _PLANE * length, 2] = plane
     return PlacedBody(mesh.kind, nodes, mesh.cells, length, axis, tuple(notes))
 
 
-def _unit(mesh: RawMesh, nodes: np.ndarray, length: float, placement: Placement, name: str) -> tuple[float, str]:
+def _unit(fixed: float | None, nodes: np.ndarray, length: float, placement: Placement, name: str) -> tuple[float, str]:
     """The unit, and why it is that one; a body that lies on its side is named before its unit is doubted. Raises MeshError."""
     size = np.ptp(nodes, axis=0)
     lying = placement.axis == "given" and max(size[:2]) > _LYING * size[2]
@@ -121,7 +120,7 @@ def _unit(mesh: RawMesh, nodes: np.ndarray, length: float, placement: Placement,
     if lying and placement.length is None:
         raise on_side
     try:
-        return unit_of(length, placement.unit, mesh.unit, placement.length, name)
+        return unit_of(length, placement.unit, fixed, placement.length, name)
     except MeshError as error:
         raise (on_side if lying else error) from None
 
@@ -133,12 +132,10 @@ def _rotation(angles: tuple[float, float, float]) -> np.ndarray:
     return Rotation.from_euler("xyz", angles).as_matrix()
 
 
-def _check_base(mesh: RawMesh, nodes: np.ndarray, length: float, clamped: bool, name: str) -> None:
-    """Raise MeshError unless the body stands on z = 0 on a flat face, or is clamped there up to some height."""
+def _check_base(nodes: np.ndarray, length: float, name: str) -> None:
+    """Raise MeshError unless the body stands on z = 0 on a flat face."""
     low, size = nodes.min(axis=0), np.ptp(nodes, axis=0)
     found = f"the body is {' x '.join(f'{1e3 * x:.4g}' for x in size)} mm, from z = {1e3 * low[2]:.4g} mm"
-    if clamped:
-        return
     if abs(low[2]) > _PLANE * length:
         raise MeshError(f"{name}: {found}; the base must lie at z = 0; {_WAYS}")
     base = nodes[np.abs(nodes[:, 2]) < _PLANE * length]

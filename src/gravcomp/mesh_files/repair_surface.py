@@ -14,7 +14,7 @@ from gravcomp.mesh_files.raw_mesh import RawMesh
 from gravcomp.mesh_files.repair_volume import require_numbers, require_one_body
 from gravcomp.mesh_files.self_intersection import intersecting_triangles
 from gravcomp.mesh_files.welding import components, welded
-from gravcomp.mesh_files.winding import edge_pairs, wound_alike
+from gravcomp.mesh_files.winding import directed_edges, edge_pairs, wound_alike
 
 # Points on both sides of a gap up to this part of the diagonal are joined.
 _GAP = 1e-4
@@ -33,11 +33,11 @@ def repaired_surface(mesh: RawMesh, path: Path) -> RawMesh:
     faces = _without_idle(nodes, faces, notes)
     if len(faces) == 0:
         raise MeshError(f"{name}: has no volume: all its triangles have collapsed")
-    if len(open_edges(faces)):
-        nodes, faces = _stitched(nodes, faces, notes)
+    nodes, faces = _stitched(nodes, faces, notes)
     _refuse_branches(nodes, faces, path)
-    require_one_body(nodes, faces, components(len(faces), *edge_pairs(faces)[:2]), "triangles", name)
-    turned = wound_alike(faces)
+    one, other, alike = edge_pairs(faces)
+    require_one_body(nodes, faces, components(len(faces), one, other), "triangles", name)
+    turned = wound_alike(faces, one, other, alike)
     if turned is None:
         raise MeshError(f"{name}: the surface has one side only, like a Moebius band; a closed surface is needed")
     if (flipped := int((turned[:, 1] != faces[:, 1]).sum())) and flipped != len(faces):
@@ -78,10 +78,12 @@ def _without_idle(nodes: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.
 
 def _stitched(nodes: np.ndarray, faces: np.ndarray, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Nodes and triangles with the points of open edges joined where a gap is narrow, if that closes edges."""
-    before = open_edges(faces)
-    rim = np.unique(before)
     from scipy.spatial import cKDTree
 
+    before = open_edges(faces)
+    if not len(before):
+        return nodes, faces
+    rim = np.unique(before)
     pairs = cKDTree(nodes[rim]).query_pairs(_GAP * float(np.linalg.norm(np.ptp(nodes, axis=0))), output_type="ndarray")
     if not len(pairs):
         return nodes, faces
@@ -97,7 +99,7 @@ def _stitched(nodes: np.ndarray, faces: np.ndarray, notes: list[str]) -> tuple[n
 
 
 def _refuse_branches(nodes: np.ndarray, faces: np.ndarray, path: Path) -> None:
-    edges = np.sort(faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
+    edges = np.sort(directed_edges(faces), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     branched = unique[count > 2]
     if len(branched):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.mesh_files.errors import MeshError
-from gravcomp.mesh_files.gmsh_library import gmsh_session
+from gravcomp.mesh_files.gmsh_library import TRIANGLE, gmsh_session, mesh_of
 from gravcomp.mesh_files.raw_mesh import RawMesh
 
 # Triangles around a full circle, and along the diagonal.
@@ -25,8 +25,5 @@ def read_step(path: Path) -> RawMesh:
         gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(box[3:] - box[:3])) / _ALONG)
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _AROUND)
         gmsh.model.mesh.generate(2)
-        tags, coordinates, _ = gmsh.model.mesh.getNodes()
-        _, corners = gmsh.model.mesh.getElementsByType(2)
-    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    number[tags.astype(np.int64)] = np.arange(len(tags))
-    return RawMesh("tri3", coordinates.reshape(-1, 3), number[corners.astype(np.int64)].reshape(-1, 3), unit=1e-3)
+        nodes, triangles = mesh_of(gmsh, TRIANGLE, 3)
+    return RawMesh("tri3", nodes, triangles, unit=1e-3)

@@ -6,8 +6,8 @@ import numpy as np
 _SAME_PLACE = 1e-6
 
 
-def welded(nodes: np.ndarray, cells: np.ndarray, within: float = _SAME_PLACE) -> tuple[np.ndarray, np.ndarray, int]:
-    """Merge the nodes that cells use and that lie within `within` of the diagonal of one another.
+def welded(nodes: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Merge the nodes that cells use and that lie at the same place.
 
     Returns the nodes in use (n, 3), the cells with their numbers (k, c), and how many nodes were merged.
     """
@@ -15,7 +15,7 @@ def welded(nodes: np.ndarray, cells: np.ndarray, within: float = _SAME_PLACE) ->
 
     used, numbers = np.unique(cells, return_inverse=True)
     nodes, cells = nodes[used], numbers.reshape(cells.shape)
-    pairs = cKDTree(nodes).query_pairs(within * float(np.linalg.norm(np.ptp(nodes, axis=0))), output_type="ndarray")
+    pairs = cKDTree(nodes).query_pairs(_SAME_PLACE * float(np.linalg.norm(np.ptp(nodes, axis=0))), output_type="ndarray")
     if not len(pairs):
         return nodes, cells, 0
     group = _labels(len(nodes), pairs[:, 0], pairs[:, 1])

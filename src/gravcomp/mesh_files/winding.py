@@ -1,13 +1,16 @@
-"""The direction in which the triangles of a surface face."""
+"""The edges of a surface, and the direction in which its triangles face."""
 
 import numpy as np
 
-_CYCLE = [(0, 1), (1, 2), (2, 0)]
+
+def directed_edges(faces: np.ndarray) -> np.ndarray:
+    """Return the edges (3 f, 2) of the triangles (f, 3), those of a triangle one after the other, in the order around it."""
+    return faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2)
 
 
 def edge_pairs(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the triangles on both sides of every shared edge (e,), (e,), and whether they face alike (e,)."""
-    directed = faces[:, _CYCLE].reshape(-1, 2)
+    directed = directed_edges(faces)
     owner = np.repeat(np.arange(len(faces)), 3)
     forward = directed[:, 0] < directed[:, 1]
     _, number = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
@@ -17,15 +20,14 @@ def edge_pairs(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return owner[one], owner[other], forward[one] != forward[other]
 
 
-def wound_alike(faces: np.ndarray) -> np.ndarray | None:
+def wound_alike(faces: np.ndarray, one: np.ndarray, other: np.ndarray, alike: np.ndarray) -> np.ndarray | None:
     """Return the triangles of one connected surface, those turned over that face another way than the first.
 
-    None if they cannot all face alike.
+    one, other and alike (e,) are their `edge_pairs`. None if they cannot all face alike.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import breadth_first_order
 
-    one, other, alike = edge_pairs(faces)
     if alike.all():
         return faces
     value = np.where(alike, 1, 2)

@@ -13,8 +13,8 @@ from numba import njit
 
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import pieces_of
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.reduction.cubature import Cubature
 from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_cables import ReducedCables

@@ -16,7 +16,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.mechanics.total_lagrangian import SolidElements

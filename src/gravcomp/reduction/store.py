@@ -13,7 +13,7 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Cable, CableLine, Robot
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.materials.laws import LAWS
 from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.reduction.cubature import Cubature

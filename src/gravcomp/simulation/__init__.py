@@ -6,7 +6,7 @@ shape = simulator.solve(gravity, tension=tension)  # independent of the last sha
 """
 
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.simulation.dynamic_simulator import DynamicSimulator
 from gravcomp.simulation.simulator import Simulator

@@ -11,9 +11,9 @@ from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.motion import Motion
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation.simulator import Simulator

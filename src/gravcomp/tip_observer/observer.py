@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.description import Robot
 from gravcomp.inverse import Target
-from gravcomp.mesh.pieces import rest_axis
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.tip_observer.causes import wild, wrong_axes, wrong_stamp
 from gravcomp.tip_observer.error_filter import GATE, ErrorFilter
 from gravcomp.tip_observer.history import History, Prediction

@@ -16,7 +16,7 @@ def main(arguments: list[str]) -> int:
     give_way()
     (robot,) = arguments
     from gravcomp.description import load_robot_file
-    from gravcomp.full_model.model import RobotModel
+    from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.reduction import load, why_not
     from gravcomp.training.build import alone, build
 

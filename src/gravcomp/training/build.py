@@ -12,7 +12,7 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.cache import content_key
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gravcomp.full_model.model import RobotModel
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import ShapeStatus
 from gravcomp.inverse import InverseController, bend_target, direction_weight
 from gravcomp.simulation.simulator import Simulator

@@ -55,16 +55,11 @@ def arc_backbone(length: float, angle: float, plane: float, points: int = 33) ->
     return Backbone(station, arc_points(length, angle, plane, station), orientation)
 
 
-def straight_backbone(length: float) -> Backbone:
-    """Return the straight robot of `length` (m)."""
-    return arc_backbone(length, 0.0, 0.0)
-
-
 def rest_backbone(robot: Robot) -> Backbone:
     """Return the robot at rest, without load."""
     from scipy.spatial.transform import Rotation
 
-    from gravcomp.mesh.pieces import rest_axis
+    from gravcomp.mesh.robot_axis import rest_axis
 
     station = np.linspace(0.0, 1.0, _REST_POINTS)
     position, rotation = rest_axis(robot).frames(station * robot.length)

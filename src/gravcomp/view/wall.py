@@ -55,7 +55,7 @@ def _wall(robot: Robot, pieces: list[Piece], before: Outline | None, around: int
     angle = _angles(around)
     heights: list[float] = []
     offsets: list[np.ndarray] = []
-    if before is not None and not before.alike(pieces[0].outer[0], 1e-9):
+    if before is not None and not before.alike(pieces[0].outer[0]):
         heights, offsets = [pieces[0].start], [before.boundary(angle)]
     for piece in pieces:
         for height in _heights(robot, piece, rings):

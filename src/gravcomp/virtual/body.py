@@ -11,7 +11,7 @@ import numpy as np
 from gravcomp.config import ConfigError
 from gravcomp.description import PointLoad, Robot
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.pieces import rest_axis
+from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.rest_axis import RestAxis
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel

@@ -9,7 +9,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Material, MeshBody
 from gravcomp.mesh.elements import edges, faces, reference_nodes, shape_values
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh_files.centreline import straightened
+from gravcomp.rest_axis import straightened
 from gravcomp.virtual.cross_section import CrossSection, sliced_section
 
 # Off the plane of a layer of nodes, relative to the length.

@@ -43,7 +43,7 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from gravcomp.description import load_robot_file
-    from gravcomp.full_model.model import RobotModel
+    from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.reduction import load
     from gravcomp.training.build import alone, build
 

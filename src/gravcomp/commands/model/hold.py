@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from gravcomp.commands import output
 
 if TYPE_CHECKING:
-    from gravcomp.full_model.model import RobotModel
+    from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.holdability import DirectionAnswer, Holdability
     from gravcomp.inverse.target import Target
 

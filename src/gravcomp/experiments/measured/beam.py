@@ -21,9 +21,9 @@ from gravcomp.experiments.measured.part import Part
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
-from gravcomp.full_model.model import RobotModel
 from gravcomp.full_model.modes import natural_frequencies
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.report.drawing import MODEL, REAL, Drawing
 from gravcomp.report.result import Figure, Plot, Table

@@ -1,12 +1,7 @@
-"""The pieces of a row of segments, and its axis at rest."""
+"""The axis of a robot at rest, from its segments or from the file of its body."""
 
-from gravcomp.description import Piece, Robot
+from gravcomp.description import Robot
 from gravcomp.rest_axis import Arc, RestAxis
-
-
-def pieces_of(robot: Robot) -> list[Piece]:
-    """Return the pieces from base to tip."""
-    return robot.pieces
 
 
 def rest_axis(robot: Robot) -> RestAxis:
