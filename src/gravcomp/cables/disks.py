@@ -1,8 +1,8 @@
 """Spacer disks: rigid, and each attached to a cross-section of the backbone.
 
 A hole at (x, y) of a disk lies at p + x f_1 + y f_2 with the section's functionals (`mesh.sections`), which are linear in
-the nodes. f_1 and f_2
-are unit vectors at rest; they keep their length as far as the backbone's section keeps its size, which stiff backbones do.
+the nodes. f_1 and f_2 are unit vectors at rest; they keep their length as far as the backbone's section keeps its size, which
+stiff backbones do.
 """
 
 import dataclasses

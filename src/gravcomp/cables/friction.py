@@ -16,25 +16,23 @@ _AT_REST = 1e-9
 
 
 class Friction:
-    """Capstan friction of m cables. sheath_angle (m,) in rad and free_length (m,) in m: between capstan and robot."""
+    """Capstan friction of m cables.
+
+    coefficient (m,); sheath_angle (m,) in rad and free_length (m,) in m: between capstan and robot.
+    """
 
     def __init__(self, cables: tuple[Cable, ...]):
-        self._coefficient = np.array([cable.friction or 0.0 for cable in cables])
+        self.coefficient = np.array([cable.friction or 0.0 for cable in cables])
         self.sheath_angle = np.array([cable.sheath_angle or 0.0 for cable in cables])
         self.free_length = np.array([cable.free_length or 0.0 for cable in cables])
 
-    @property
-    def coefficient(self) -> np.ndarray:
-        """(m,) friction coefficient of each cable."""
-        return self._coefficient
-
     def any(self) -> bool:
         """Return whether any cable has friction; its forces then depend on the past motion."""
-        return bool(self._coefficient.any())
+        return bool(self.coefficient.any())
 
     def acts(self, pulling: np.ndarray) -> bool:
         """Return whether any cable with friction slides. pulling (m,): 1 pulled in, -1 paid out, 0 for no friction."""
-        return bool((self._coefficient * pulling).any())
+        return bool((self.coefficient * pulling).any())
 
     def shares(self, cable: np.ndarray, tangent: np.ndarray, pulling: np.ndarray) -> np.ndarray:
         """Return (s,) the tension in every piece over the tension of its cable.
@@ -46,14 +44,14 @@ class Friction:
         turned = np.cumsum(np.concatenate([[0.0], np.where(same, np.arccos(cosine), 0.0)]))
         first = np.searchsorted(cable, np.arange(len(pulling)))
         angle = self.sheath_angle[cable] + turned - turned[first][cable]
-        return np.exp(-(self._coefficient * pulling)[cable] * angle)
+        return np.exp(-(self.coefficient * pulling)[cable] * angle)
 
     def mean_shares(self, cable: np.ndarray, length: np.ndarray, share: np.ndarray, pulling: np.ndarray) -> np.ndarray:
         """Return (m,) the mean tension along each cable, free length included, over that at the capstan.
 
         cable, length and share (s,): of the pieces; pulling (m,) as in `acts`.
         """
-        turn = self._coefficient * pulling * self.sheath_angle
+        turn = self.coefficient * pulling * self.sheath_angle
         sheath = np.where(np.abs(turn) > 1e-9, -np.expm1(-turn) / np.where(turn == 0.0, 1.0, turn), 1.0)
         count = len(pulling)
         inside, weighted = np.bincount(cable, length, count), np.bincount(cable, share * length, count)

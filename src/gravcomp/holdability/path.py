@@ -75,8 +75,7 @@ class HoldPath:
         """Return the points of the path from no gravity to `most` times gravity (3,) in m/s^2, or to where it ends.
 
         limits: of tension and displacement, without rates (`limits.unlimited_rates`). first (m,): tensions in N that hold about
-        the whole gravity, of a linear estimate. No point at all: the target is out of
-        reach of the weightless robot.
+        the whole gravity, of a linear estimate. No point at all: the target is out of reach of the weightless robot.
         """
         self._tracker.reset()
         self._solver.reset()
@@ -100,6 +99,11 @@ class HoldPath:
             if step < self.options.least_step * max(1.0, points[-1].share):
                 break
         return points
+
+    def lateral(self, state: Equilibrium) -> float:
+        """Return the lateral error of the tip in m at a state of the model."""
+        effector = observed(self.model, state).effector
+        return float(tip_errors(effector, self.target.tip_position, self.target.direction_or_zeros).lateral)
 
     def _settled(self, gravity: np.ndarray, tension: np.ndarray, limits: Limits) -> Equilibrium | None:
         """Return the equilibrium under gravity (3,) nearest to the target, from the tensions (m,) on; None if there is none."""
@@ -141,7 +145,7 @@ class HoldPath:
             last = change
             state = self._moved(gravity, state, wanted)
         # Where the equilibria end, the steps become shorter and shorter and do not settle.
-        return state if state is not None and self._lateral(state) <= self.options.tolerance * model.length else None
+        return state if state is not None and self.lateral(state) <= self.options.tolerance * model.length else None
 
     def _moved(self, gravity: np.ndarray, state: Equilibrium, wanted: np.ndarray) -> Equilibrium | None:
         """Return the equilibrium at the tensions `wanted` (m,), or part of the way to them; None if there is none."""
@@ -156,11 +160,6 @@ class HoldPath:
     def _tracked(self, gravity: np.ndarray, tension: np.ndarray) -> Equilibrium | None:
         state = self._tracker.track(gravity, CableInput(tension=tension), iterations=_NEWTON)
         return state if state.converged else None
-
-    def _lateral(self, state: Equilibrium) -> float:
-        """Return the lateral error of the tip in m."""
-        effector = observed(self.model, state).effector
-        return float(tip_errors(effector, self.target.tip_position, self.target.direction_or_zeros).lateral)
 
     def _point(self, share: float, state: Equilibrium) -> PathPoint:
         seen = observed(self.model, state)

@@ -118,10 +118,5 @@ def _buckling(search: HoldSearch, answers: tuple[DirectionAnswer, ...]) -> tuple
 
 def _released(search: HoldSearch, direction: np.ndarray) -> float | None:
     """Return the lateral error in m of the released robot under gravity in a direction (3,)."""
-    model, target = search.model, search.target
-    state = StaticSolver(model).solve(STANDARD_GRAVITY * direction, CableInput(), parts=_PARTS)
-    if not state.converged:
-        return None
-    error = model.effectors.sections(model.mesh.nodes + state.u)[-1, 0] - target.tip_position
-    axis = target.direction_or_zeros
-    return float(np.linalg.norm(error - (error @ axis) * axis))
+    state = StaticSolver(search.model).solve(STANDARD_GRAVITY * direction, CableInput(), parts=_PARTS)
+    return search.path.lateral(state) if state.converged else None

@@ -25,8 +25,7 @@ class ReducedMotion:
     """A state of motion at the end of a step.
 
     q, velocity and acceleration (r,); tension (m,) in N; point: the model at q; force (r,): g; strain_before (k,): strain one
-    step before; memory: of the branches; step: length of the last step in s; residual: norm of the force out
-    of balance in N.
+    step before; memory: of the branches; step: length of the last step in s; residual: norm of the force out of balance in N.
     """
 
     q: np.ndarray

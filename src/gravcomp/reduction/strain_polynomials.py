@@ -43,11 +43,6 @@ class StrainPolynomials:
     linear: np.ndarray
     quadratic: np.ndarray
 
-    def evaluate(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return internal force (r,), tangent stiffness (r, r), lower triangle only, and strain eps (m,) at q (r,)."""
-        jacobian, strain = strain_at(self.linear, self.quadratic, q)
-        return jacobian @ strain, tangent(jacobian, self.quadratic, strain, 1.0), strain
-
 
 @njit(cache=True)
 def _packed(i: int, j: int) -> int:

@@ -56,6 +56,7 @@ class ReducedTracker:
         self._limits = longest_step * length, near * length, tolerance * length
         self._body = body_of(model)
         self._kept = kept_stiffness(model)
+        self._has_friction = bool(model.cables.friction.any())
         self._no_offset = np.zeros(model.elasticity.linear.shape[1])
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
@@ -80,7 +81,7 @@ class ReducedTracker:
         """
         stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
-        if self.model.cables.friction.any():
+        if self._has_friction:
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
         wound, given = cable_arrays(cables, state.tension.size)
         weight = self.model.weight @ gravity
