@@ -31,8 +31,11 @@ def robot(case: dict[str, str]) -> Robot:
 
 def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part:
     """Compute the tips of all cases (brief: of three)."""
-    with (folder / "tips.csv").open(newline="", encoding="utf-8") as file:
-        cases = [case for case in csv.DictReader(file) if case["model"] == _MODEL]
+    try:
+        with (folder / "tips.csv").open(newline="", encoding="utf-8") as file:
+            cases = [case for case in csv.DictReader(file) if case["model"] == _MODEL]
+    except (OSError, KeyError) as error:
+        raise MeasurementError(f"{folder / 'tips.csv'}: cannot be read: {error}") from error
     if not cases:
         raise MeasurementError(f"{folder / 'tips.csv'}: contains no rows of the model '{_MODEL}'")
     rows = []
