@@ -34,8 +34,8 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     try:
         with (folder / "tips.csv").open(newline="", encoding="utf-8") as file:
             cases = [case for case in csv.DictReader(file) if case["model"] == _MODEL]
-    except (OSError, KeyError) as error:
-        raise MeasurementError(f"{folder / 'tips.csv'}: cannot be read: {error}") from error
+    except (OSError, KeyError) as reason:
+        raise MeasurementError(f"{folder / 'tips.csv'}: cannot be read: {reason}") from reason
     if not cases:
         raise MeasurementError(f"{folder / 'tips.csv'}: contains no rows of the model '{_MODEL}'")
     rows = []
