@@ -51,12 +51,14 @@ class Bridge(Supervisor):
         self._rotors = Rotors(hardware)
         self._faults = FaultWatch(hardware, self._rotors)
         self._loops = CableLoops(hardware, self._rotors, self._faults)
+        limits = [(hardware.drive.displacement_min, hardware.drive.displacement_max)] * len(hardware.motors)
         super().__init__(
             hardware.transmission,
             hardware.watchdog,
-            CommandCheck(hardware),
+            CommandCheck(hardware.cables, hardware.motors, hardware.transmission, lambda: limits, hardware.watchdog),
             self._loops,
             require_imu=require_imu,
+            idle="no current",
             recovery=_RECOVERY,
         )
         self.rejected_frames = 0
@@ -142,10 +144,9 @@ class Bridge(Supervisor):
 
     def tick(self, now: float) -> list[can.Message]:
         """Run one control period: check for faults, change the state, compute the currents. Return the frames to send."""
-        if self.state in (State.UNCONFIGURED, State.INACTIVE):
-            self._last_tick = now
-            return []
         self._advance(now)
+        if self.state in (State.UNCONFIGURED, State.INACTIVE):
+            return []
         return self._output.frames(self._loops.currents, enabled=self.state in DRIVING)
 
     def zero_frames(self) -> list[can.Message]:

@@ -48,8 +48,8 @@ class Loops(Protocol):
 class Supervisor(abc.ABC):
     """Changes the state of a bridge by requests, commands and time.
 
-    With `require_imu` the bridge holds the cables while no IMU samples come. `recovery` says what the user can do about a latched
-    fault or a stop. Attributes: state, message (its reason), refused_commands (counter).
+    With `require_imu` the bridge holds the cables while no IMU samples come. `idle` says what the motors do while they are not
+    driven, `recovery` what the user can do about a latched fault or a stop. Attributes: state, message (its reason), refused_commands (counter).
     """
 
     def __init__(
@@ -60,12 +60,13 @@ class Supervisor(abc.ABC):
         loops: Loops,
         *,
         require_imu: bool,
+        idle: str,
         recovery: str,
     ):
         self.state, self.message = State.UNCONFIGURED, "no bus"
         self.refused_commands = 0
         self._transmission, self._watchdog, self._check, self._loops = transmission, watchdog, check, loops
-        self._require_imu, self._recovery = require_imu, recovery
+        self._require_imu, self._idle, self._recovery = require_imu, idle, recovery
         self._stamp: object | None = None
         self._command_time = self._imu_time = -math.inf
         self._good_commands = 0
@@ -86,15 +87,15 @@ class Supervisor(abc.ABC):
         self._enter(State.FAULT, "waiting for the feedback of all motors")
 
     def deactivate(self) -> None:
-        """Enter INACTIVE: no current."""
-        self._enter(State.INACTIVE, "deactivated, no current")
+        """Enter INACTIVE: no motor is driven."""
+        self._enter(State.INACTIVE, f"deactivated, {self._idle}")
 
     def stop(self, why: str = "stop requested") -> tuple[bool, str]:
-        """Send zero current from the next tick on."""
+        """Drive no motor from the next tick on."""
         if self.state in (State.UNCONFIGURED, State.INACTIVE):
-            return True, "no motor has current"
+            return True, "no motor is driven"
         if not self._latched:
-            self._enter(State.STOPPED, f"stopped, no current: {why}{self._recovery}")
+            self._enter(State.STOPPED, f"stopped, {self._idle}: {why}{self._recovery}")
         return True, self.message
 
     def resume(self, now: float) -> tuple[bool, str]:
@@ -113,7 +114,7 @@ class Supervisor(abc.ABC):
         """Pay all cables out to `displacement_min`, then stop. Stop immediately when the zero position is unknown."""
         if self.state not in DRIVING or not self._can_pay_out:
             done, _ = self.stop("release requested")
-            return done, "no current; the cables were not paid out because the motors were not driving or have no zero"
+            return done, f"{self._idle}; the cables were not paid out because the motors were not driving or have no zero"
         self._enter(State.HOLDING, "paying the cables out")
         self._releasing = True
         self._loops.pay_out()
@@ -203,19 +204,21 @@ class Supervisor(abc.ABC):
 
     # Changes of the state.
 
-    def _advance(self, now: float) -> None:
-        """Run one control period."""
+    def _advance(self, now: float) -> float:
+        """Run one control period; return its duration (s) as the loops take it."""
         elapsed = 0.0 if self._last_tick is None else max(now - self._last_tick, 0.0)
         self._last_tick = now
+        dt = min(elapsed, _LONGEST_STEP)
         if self.state in (State.UNCONFIGURED, State.INACTIVE):
-            return
+            return dt
         if elapsed > _LONGEST_PAUSE and self.state in DRIVING:
             self._fault(f"the bridge was delayed by {1e3 * elapsed:.0f} ms", latched=False)
         self._watch(now)
         if self.state in DRIVING:
-            self._drive(now, min(elapsed, _LONGEST_STEP))
+            self._drive(now, dt)
         if self.state not in DRIVING:
             self._loops.no_current()
+        return dt
 
     def _enter(self, state: State, message: str) -> None:
         if state is not State.ACTIVE:
@@ -258,7 +261,7 @@ class Supervisor(abc.ABC):
         if fault:
             self._fault(fault, latched=True)
         elif self._releasing and self._loops.arrived:
-            self._enter(State.STOPPED, f"cables paid out, no current{self._recovery}")
+            self._enter(State.STOPPED, f"cables paid out, {self._idle}{self._recovery}")
 
     def _imu_is_stale(self, now: float) -> bool:
         return self._require_imu and now - self._imu_time > self._watchdog.imu_timeout
