@@ -74,7 +74,7 @@ class BridgedJoints:
         if values is None:
             return
         if self.controller.command == "trajectory":
-            point = TrajectoryPoint(values, [], _PERIOD)
+            point = TrajectoryPoint(values, [], 0.0)
             self.controller.on_trajectory(self._names, [point], None, now, self.servos.state.angles)
         else:
             self.controller.on_values(values)

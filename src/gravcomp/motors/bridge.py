@@ -181,7 +181,8 @@ class Bridge(Supervisor):
     def _can_follow(self) -> bool:
         return not self._lost
 
-    def _trust_motors(self) -> None:
+    def _accept(self) -> None:
+        super()._accept()
         self._rotors.trust_turns()
 
     def _enter(self, state: State, message: str) -> None:

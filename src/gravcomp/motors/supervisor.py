@@ -105,8 +105,7 @@ class Supervisor(abc.ABC):
         missing = self._missing(now)
         if missing:
             return False, f"cannot resume: {missing}"
-        self._clear_faults()
-        self._trust_motors()
+        self._accept()
         self._begin(now)
         return self.state in DRIVING, self.message
 
@@ -187,8 +186,9 @@ class Supervisor(abc.ABC):
     def _clear_faults(self) -> None:
         """Forget the faults so far, latched ones as well."""
 
-    def _trust_motors(self) -> None:
-        """Take what the motors report as right, because the user says so."""
+    def _accept(self) -> None:
+        """Take the motors as they are, because the user says so."""
+        self._clear_faults()
 
     @abc.abstractmethod
     def _begin(self, now: float) -> None:

@@ -1,8 +1,9 @@
-"""A stand-in for the controllers of ros2_control, where the packages are not to be had: what they accept, and what they command.
+"""A stand-in for the controllers of ros2_control: what they accept, and what they command.
 
-    trajectory  joint_trajectory_controller: every joint named, points in strictly increasing time, no velocity at the end, the end
-                not in the past; a new trajectory replaces the old one and begins at the measured angles; linear between points
-                that give positions only, cubic between those that give velocities as well; after the end the last point stays
+    trajectory  joint_trajectory_controller: every joint named, points in strictly increasing time, no velocity at the end, the
+                end not in the past; a new trajectory replaces the old one and begins at the measured angles, or, where the time
+                of its first point is zero, at this point; linear between points that give positions only, cubic between those
+                that give velocities as well; after the end the last point stays
     position    forward_command_controller with interface_name position: one value a joint, kept until the next message
     effort      the same with efforts
 
@@ -47,10 +48,12 @@ class JointController:
             return reason
         order = [list(names).index(name) for name in self.names]
         self._begin = now if start is None else start
-        self._points = [TrajectoryPoint(list(measured), [0.0] * len(order) if points[0].velocities else [], 0.0)] + [
-            TrajectoryPoint([p.positions[i] for i in order], [p.velocities[i] for i in order] if p.velocities else [], p.time)
+        self._points = [
+            TrajectoryPoint([p.positions[i] for i in order], [p.velocities[i] for i in order] if len(p.velocities) else [], p.time)
             for p in points
         ]
+        if points[0].time > 0.0:
+            self._points.insert(0, TrajectoryPoint(list(measured), [0.0] * len(order) if self._points[0].velocities else [], 0.0))
         self.accepted += 1
         return None
 
@@ -69,7 +72,7 @@ class JointController:
             return self._values
         if not self._points:
             return None
-        since = now - self._begin
+        since = max(now - self._begin, 0.0)  # until it starts, the joints stay where they are
         before, after = self._points[0], self._points[0]
         for point in self._points:
             before, after = after, point
