@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 
-from gravcomp_hw.bridge_topics import LOG_PERIOD, ImuTopics, cable_state, level, trigger
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -25,6 +24,7 @@ from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
 from gravcomp.motors.state import CableSnapshot
+from gravcomp_hw.bridge_topics import LOG_PERIOD, ImuTopics, cable_state, level, trigger
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 

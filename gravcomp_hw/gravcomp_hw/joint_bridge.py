@@ -11,7 +11,6 @@ import time
 from collections.abc import Sequence
 
 from builtin_interfaces.msg import Duration
-from gravcomp_hw.bridge_topics import LOG_PERIOD, cable_state, level, trigger
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
@@ -26,6 +25,7 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.joint_bridge import JointBridgeParameters
 from gravcomp.motors.joint_driver import JointDriver, JointDriverOptions
 from gravcomp.motors.state import CableSnapshot
+from gravcomp_hw.bridge_topics import LOG_PERIOD, cable_state, level, trigger
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -98,7 +98,9 @@ class JointBridgeNode(ManagedNode):
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         check_pairs(hardware, file.robot, file.source)
         if hardware.joints is None:
-            raise ConfigError(f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)")
+            raise ConfigError(
+                f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)"
+            )
         return hardware.joints, hardware
 
     def _missing_controller(self) -> str | None:

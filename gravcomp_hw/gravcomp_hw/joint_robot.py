@@ -1,13 +1,12 @@
 """The node joint_robot: a stand-in for a ros2_control robot, for the virtual robot and for tests.
 
 It offers what joint_bridge uses of ros2_control: the topic of a joint_trajectory_controller or a forward_command_controller, and
-joint_states. The motors of the virtual robot are behind it, as servos on its CAN bus, or mock joints. It also publishes the IMU of
-the virtual robot, as the driver of an IMU would.
+joint_states. The motors of the virtual robot are behind it, as servos on its CAN bus, or mock joints. It also publishes the IMU
+of the virtual robot, as the driver of an IMU would.
 """
 
 import sys
 
-from gravcomp_hw.bridge_topics import ImuTopics, to_time
 from gravcomp_node.managed_node import ERROR, OK
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState as JointStateMessage
@@ -21,6 +20,7 @@ from gravcomp.graph.parameters.joint_robot import JointRobotParameters
 from gravcomp.virtual.joint_controller import TrajectoryPoint
 from gravcomp.virtual.joint_robot import JointRobot
 from gravcomp.virtual.joint_servos import JointState
+from gravcomp_hw.bridge_topics import ImuTopics, to_time
 from gravcomp_node import ManagedNode, run
 
 _MESSAGES = QoSProfile(depth=10)
@@ -37,7 +37,9 @@ class JointRobotNode(ManagedNode):
         file, p = self.robot_file, self.parameters
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         if hardware.joints is None:
-            raise ConfigError(f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)")
+            raise ConfigError(
+                f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)"
+            )
         self._topic, self._kind = hardware.joints.topic, hardware.joints.command
         try:
             self._robot = JointRobot(
@@ -105,7 +107,11 @@ class JointRobotNode(ManagedNode):
             self.finished = True
             return
         self.report(
-            OK, f"takes {self._topic}", accepted=robot.controller.accepted, refused=robot.controller.refused, refusal=self._refusal
+            OK,
+            f"takes {self._topic}",
+            accepted=robot.controller.accepted,
+            refused=robot.controller.refused,
+            refusal=self._refusal,
         )
 
 

@@ -16,7 +16,7 @@ from gravcomp.motors.state import State
 from gravcomp.virtual.joint_controller import JointController, TrajectoryPoint
 from gravcomp.virtual.joint_servos import ServoJoints
 
-_PERIOD = 0.01  # s, of bridge, controller and joint states, as ros2_control has it by default
+_PERIOD = 0.004  # s, of bridge, controller and joint states
 
 
 class BridgedJoints:

@@ -1,5 +1,4 @@
-"""Motors for a robot whose file has none: one for each joint of `hardware.joints`, else one for each cable, as the limits of the
-robot ask. For the virtual robot only.
+"""Motors for a robot whose file has none, for the virtual robot only: one for each cable or for each joint of `hardware.joints`.
 
 What the file gives in `hardware.drive` stays. The rest follows from `robot.limits`: tension, stroke and speed of the cables, and
 a current limit that reaches the largest tension.

@@ -71,7 +71,10 @@ NODES = (
         ),
         publishes=(
             Port("joint_states", "sensor_msgs/msg/JointState", "angles (rad), speeds (rad/s), efforts (N m) of the joints"),
-            Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link", optional=True),
+            Port(
+                "imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link",
+                optional=True,
+            ),
             Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC", optional=True),
             _DIAGNOSTICS,
         ),

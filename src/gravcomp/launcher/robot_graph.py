@@ -41,7 +41,7 @@ class RobotGraph:
 
         virtual: for the virtual robot, which joints need a node more for.
         """
-        nodes = LOOP
+        nodes: tuple[tuple[str, str], ...] = LOOP
         if has_joints(self.robot):
             nodes = (JOINT_BRIDGE, *LOOP[1:]) + ((JOINT_ROBOT,) if virtual else ())
         return [self.node(package, executable) for package, executable in nodes]

@@ -22,7 +22,7 @@ class CommandCheck:
         limits: Callable[[], Sequence[tuple[float, float]]],
         watchdog: Watchdog,
     ):
-        """cables (m): names; motors (k) with their transmission and their limits (m) at present: smallest and largest displacement."""
+        """cables (m): names; motors (k) with their transmission; limits (k,): smallest and largest displacement (m) now."""
         self._cables, self._transmission, self._limits, self._watchdog = tuple(cables), transmission, limits, watchdog
         self._labels = self._cables if transmission.direct else tuple(motor.label for motor in motors)
         self._last: list[float] | None = None

@@ -5,7 +5,7 @@ returns what the controller is sent. The table of states is that of `supervisor`
 
     FAULT, STOPPED   a controller of efforts is sent zeros; one of positions is led to where its joints are, and left there
     any --joint_states missing, controller gone--> FAULT --they are back--> as after activation
-    any --stall, runaway, a joint left behind, a jump of an angle, a joint outside its limits--> FAULT (latched) --resume--> HOLDING
+    any --stall, runaway, a joint left behind, a jump of an angle, outside the limits--> FAULT (latched) --resume--> HOLDING
 """
 
 from collections.abc import Sequence
@@ -34,7 +34,8 @@ class JointBridge(Supervisor):
         assert hardware.joints is not None
         self._by_effort = by_effort = hardware.joints.command == "effort"
         self.joints = JointStates(hardware.joints.motors, hardware.drive, hardware.watchdog)
-        self._loops = JointLoops(self.joints, hardware.watchdog, transmission.pays_out, by_effort=by_effort)
+        delay = hardware.joints.feedback_delay if by_effort else None
+        self._loops = JointLoops(self.joints, hardware.watchdog, transmission.pays_out, delay)
         self._output = JointOutput(self.joints, by_effort=by_effort)
         self._wanted: list[float] | None = None
         self._no_controller: str | None = None
@@ -74,7 +75,7 @@ class JointBridge(Supervisor):
         dt = self._advance(now)
         if self.state in (State.UNCONFIGURED, State.INACTIVE) or not self.joints.zeros_known:
             return None
-        if self.state not in DRIVING:
+        if self.state not in DRIVING and (self._by_effort or self._wanted is None):
             self._wanted = self._loops.rest(dt)
         return None if self._wanted is None else self._output.clamp(self._wanted)
 

@@ -1,7 +1,7 @@
 """The thread that runs a JointBridge: it controls at its own rate, independently of the rest of the process.
 
-    on_joint_states(), command() --> JointBridge --send()--> controller       every control period, and after each command
-                                                 --on_snapshot()--> caller    at the state rate, and at each change
+on_joint_states(), command() --> JointBridge --send()--> controller       every control period, and after each command
+                                             --on_snapshot()--> caller    at the state rate, and at each change
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ _LAST_TIMES = 5  # messages at the end of the bridge
 class JointDriverOptions:
     """Options of the driver."""
 
-    rate: float = 100.0  # Hz, of the control
+    rate: float = 250.0  # Hz, of the control
     state_rate: float = 50.0  # Hz, of the snapshots; every change of the state gives an additional one
     require_imu: bool = False  # hold the cables while no IMU samples come
 

@@ -2,8 +2,13 @@
 
     trajectory, position:   q = angle of the setpoint; the controller of the robot closes the loop
     effort:                 tau = d r F,  F the force of the loop of `loop`
+
+The gains of the drive are those of loops that answer within 4 ms, as on a CAN bus. Over topics the answer takes longer, by the
+delay D, and a loop stays stable when its crossover falls as much: with s = min(1, 4 ms / D) the gains are s K_v, s K_i and
+min(1, 2 s) K_p, so that the velocity loop stays faster than the position loop.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,17 +21,19 @@ from gravcomp.motors.setpoint import Setpoint
 
 _AWAY = 0.1  # of the following error, at rest away from the setpoint
 _AWAY_TIME = 4.0  # stall times
+_NOMINAL_DELAY = 0.004  # s, of the loops that the gains of a drive are for
 
 
 class JointLoops:
     """Setpoints, or position loops, of the joints of `states`. Attribute: target (k,) m at the capstans.
 
-    by_effort: the controller takes efforts; pays_out (k,): motors that only pay out when they turn back.
+    pays_out (k,): motors that only pay out when they turn back; delay: None for a controller of positions; for one of efforts,
+    the time (s) from a measurement to the effort that answers it.
     """
 
-    def __init__(self, states: JointStates, watchdog: Watchdog, pays_out: np.ndarray, *, by_effort: bool):
-        self._states, self._watchdog, self._pays_out, self._by_effort = states, watchdog, pays_out, by_effort
-        drives = [scale.drive for scale in states.scales]
+    def __init__(self, states: JointStates, watchdog: Watchdog, pays_out: np.ndarray, delay: float | None):
+        self._states, self._watchdog, self._pays_out, self._by_effort = states, watchdog, pays_out, delay is not None
+        drives = [_softer(scale.drive, delay or 0.0) for scale in states.scales]
         self._drives: list[Drive] = drives
         self._setpoints = [Setpoint(drive.acceleration_limit) for drive in drives]
         self._loops = [PositionLoop(drive, two_way=not alone) for drive, alone in zip(drives, pays_out)]
@@ -69,14 +76,14 @@ class JointLoops:
         self.follow([low if alone else 0.0 for alone, (low, _) in zip(self._pays_out, self.limits())], [])
 
     def no_current(self) -> None:
-        """Command no effort; a controller of positions is led back to where the joints are, if that is near, and left there."""
+        """Command no effort; joints away from their setpoints are led to where they are, if that is near, and left there."""
         if self._by_effort or self._resting:
             self._resting = True
             return
         self._resting = True
         near = self._watchdog.following_error
         self.target = [
-            min(max(x, low, s - near), high, s + near)
+            s if abs(x - s) <= _AWAY * near else min(max(x, low, s - near), high, s + near)
             for x, s, (low, high) in zip(self._states.displacement(), self._positions(), self.limits())
         ]
 
@@ -128,3 +135,14 @@ class JointLoops:
         if self._by_effort or self._away[index] <= _AWAY_TIME * watchdog.stall_time:
             return None
         return f"rests {1e3 * abs(lag):.1f} mm away from its setpoint: does its controller take the commands?"
+
+
+def _softer(drive: Drive, delay: float) -> Drive:
+    """Return the drive with gains for loops that answer after `delay` (s)."""
+    share = min(1.0, _NOMINAL_DELAY / max(delay, _NOMINAL_DELAY))
+    return dataclasses.replace(
+        drive,
+        position_gain=min(1.0, 2.0 * share) * drive.position_gain,
+        velocity_gain=share * drive.velocity_gain,
+        velocity_integral=share * drive.velocity_integral,
+    )

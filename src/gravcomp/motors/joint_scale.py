@@ -19,10 +19,9 @@ class JointScale:
     def __init__(self, motor: JointMotor, drive: Drive):
         self._motor = motor
         self.zero = motor.zero
-        if motor.lookup is None:
-            radius = drive.capstan_radius if motor.capstan_radius is None else motor.capstan_radius
-            self._angles, self._travels = (0.0, 1.0), (0.0, radius)
-        else:
+        self._angles: tuple[float, ...] = (0.0, 1.0)
+        self._travels: tuple[float, ...] = (0.0, drive.capstan_radius if motor.capstan_radius is None else motor.capstan_radius)
+        if motor.lookup is not None:
             self._angles, self._travels = motor.lookup.angle, motor.lookup.displacement
         mean = (self._travels[-1] - self._travels[0]) / (self._angles[-1] - self._angles[0])
         self.drive = dataclasses.replace(drive, capstan_radius=mean)

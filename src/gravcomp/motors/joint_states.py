@@ -51,7 +51,7 @@ class JointStates:
     ) -> None:
         """Take a message: names, and angles (rad), speeds (rad/s), efforts (N m) of all of them; speeds and efforts may be empty.
 
-        `stamp` (ns, the sender's clock) is that of the message, 0 for none. A message that is older than the last one is not used.
+        `stamp` (ns, the sender's clock) is that of the message, 0 for none. A message older than the last one is not used.
         After a silence longer than `zero_timeout` the zero position of a joint that has none in the robot file is lost.
         """
         if len(angles) != len(names):

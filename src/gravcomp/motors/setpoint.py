@@ -1,6 +1,6 @@
 """The setpoint of one cable: it moves to its target within limits of velocity and acceleration, and stops there.
 
-    |x_s'| <= v_max,  |x_s''| <= a_max
+|x_s'| <= v_max,  |x_s''| <= a_max
 """
 
 import math

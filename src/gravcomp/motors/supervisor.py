@@ -49,7 +49,8 @@ class Supervisor(abc.ABC):
     """Changes the state of a bridge by requests, commands and time.
 
     With `require_imu` the bridge holds the cables while no IMU samples come. `idle` says what the motors do while they are not
-    driven, `recovery` what the user can do about a latched fault or a stop. Attributes: state, message (its reason), refused_commands (counter).
+    driven, `recovery` what the user can do about a latched fault or a stop. Attributes: state, message (its reason),
+    refused_commands (counter).
     """
 
     def __init__(

@@ -49,7 +49,9 @@ class JointController:
         order = [list(names).index(name) for name in self.names]
         self._begin = now if start is None else start
         self._points = [
-            TrajectoryPoint([p.positions[i] for i in order], [p.velocities[i] for i in order] if len(p.velocities) else [], p.time)
+            TrajectoryPoint(
+                [p.positions[i] for i in order], [p.velocities[i] for i in order] if len(p.velocities) else [], p.time
+            )
             for p in points
         ]
         if points[0].time > 0.0:
@@ -86,9 +88,7 @@ class JointController:
             for i, (x, y) in enumerate(zip(before.positions, after.positions))
         ]
 
-    def _objection(
-        self, names: Sequence[str], points: Sequence[TrajectoryPoint], start: float | None, now: float
-    ) -> str | None:
+    def _objection(self, names: Sequence[str], points: Sequence[TrajectoryPoint], start: float | None, now: float) -> str | None:
         if sorted(names) != sorted(self.names):
             return f"the joints {', '.join(names) or 'none'} are not those of the controller: {', '.join(self.names)}"
         if not points:
@@ -113,6 +113,4 @@ def _between(before: TrajectoryPoint, after: TrajectoryPoint, joint: int, share:
     x, y = before.positions[joint], after.positions[joint]
     v, w = before.velocities[joint] * length, after.velocities[joint] * length
     s = share
-    return (
-        (2 * s**3 - 3 * s**2 + 1) * x + (s**3 - 2 * s**2 + s) * v + (3 * s**2 - 2 * s**3) * y + (s**3 - s**2) * w
-    )
+    return (2 * s**3 - 3 * s**2 + 1) * x + (s**3 - 2 * s**2 + s) * v + (3 * s**2 - 2 * s**3) * y + (s**3 - s**2) * w

@@ -1,7 +1,7 @@
 """The stand-in for a ros2_control robot in real time: a controller and what is behind it, in a thread.
 
-    on_trajectory(), on_values() --> JointController --> joints (servos of the virtual robot on its buses, or mock joints)
-                                                         --on_state(), on_sample()--> caller
+on_trajectory(), on_values() --> JointController --> joints (servos of the virtual robot on its buses, or mock joints)
+                                                     --on_state(), on_sample()--> caller
 """
 
 import threading

@@ -18,7 +18,7 @@ from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.output import BusOutputs
 from gravcomp.motors.rotors import Rotors
 
-_STIFFER = 20.0  # a servo's own limits of speed and acceleration over those of the cables, so that it follows its command
+_PROFILE = 2.0  # a servo's own limits of speed and acceleration over those of the cables: it smooths the steps of its commands
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,12 +64,12 @@ class ServoJoints:
         self._index = {(hardware.bus_index(motor), motor.can_id): i for i, motor in enumerate(hardware.motors)}
         self._buses = {bus.name: index for index, bus in enumerate(hardware.all_buses)}
         self._directions = [motor.direction for motor in hardware.motors]
-        quick = dataclasses.replace(
+        profile = dataclasses.replace(
             hardware.drive,
-            velocity_limit=_STIFFER * hardware.drive.velocity_limit,
-            acceleration_limit=_STIFFER * hardware.drive.acceleration_limit,
+            velocity_limit=_PROFILE * hardware.drive.velocity_limit,
+            acceleration_limit=_PROFILE * hardware.drive.acceleration_limit,
         )
-        self._loops = [PositionLoop(quick, two_way=True) for _ in self._motors]
+        self._loops = [PositionLoop(profile, two_way=True) for _ in self._motors]
         self._started = False
 
     @property

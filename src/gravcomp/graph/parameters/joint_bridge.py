@@ -10,7 +10,7 @@ class JointBridgeParameters:
     """Parameters of the node; the joints are described in the robot file under `hardware.joints`."""
 
     control_rate: float = parameter(
-        100.0, unit="Hz", minimum=50, maximum=1000, description="rate of the messages to the controller", read_only=True
+        250.0, unit="Hz", minimum=50, maximum=1000, description="rate of the messages to the controller", read_only=True
     )
     horizon: float = parameter(
         0.0,

@@ -24,6 +24,6 @@ class JointRobotParameters:
         read_only=True,
     )
     update_rate: float = parameter(
-        100.0, unit="Hz", minimum=10, maximum=1000, description="rate of the controller and of joint_states", read_only=True
+        250.0, unit="Hz", minimum=10, maximum=250, description="rate of the controller and of joint_states", read_only=True
     )
     imu_frame: str = parameter("imu_link", description="frame of the IMU messages", read_only=True)
