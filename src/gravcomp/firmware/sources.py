@@ -14,7 +14,7 @@ WARNINGS = (
     "-Wmissing-prototypes", "-Wcast-qual", "-Wvla", "-Werror",
 )  # fmt: skip
 
-EXACT = ("-ffp-contract=off", "-fno-fast-math", "-fno-strict-aliasing")
+EXACT = ("-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-strict-aliasing")
 """A host and the chip round alike."""
 
 
