@@ -1,5 +1,5 @@
 // Events are bytes: what happens, then what it needs. What must hold is checked after each event, that of the
-// parameters at the end:
+// heater after each tick, that of the parameters at the end:
 //
 //   - no current above the limit, none to a motor that does not exist, none while idle, released or in a fault
 //   - no current of a host that has been silent for more than 100 ms
@@ -13,7 +13,7 @@
 #include "../core/request.h"
 
 #define DEAD_HOST 100000u   // us
-#define DEAD_HEATER 502000u  // us; the heater is decided at the next tick
+#define DEAD_HEATER 502000u  // us; with the tick
 
 gc_tally gc_counted;
 
@@ -62,6 +62,10 @@ static void drain(void) {
       }
     }
   }
+}
+
+// The heater is decided at each tick.
+static void check_heater(void) {
   const uint32_t duty = gc_host_duty(&host);
   const bool fresh = heater_seen && host.board.now - heater_time <= DEAD_HEATER;
   expect(duty == 0u || (fresh && duty <= (uint32_t)gc_parameter_int(&host.board.parameters, GC_HEATER_LIMIT)));
@@ -151,6 +155,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             give_feedback();
           }
           gc_host_advance(&host, host.board.now + GC_TICK);
+          check_heater();
           drain();
         }
         break;

@@ -55,12 +55,14 @@ class HostBoard:
 
     def receive(self, message: can.Message, bus: int = HOST_BUS) -> None:
         """Take a frame from a bus."""
-        frame = self._frame
-        frame.id, frame.length = message.arbitration_id & 0xFFFF, message.dlc & 0xFF
         odd = message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd
-        frame.extended = odd or message.arbitration_id > 0x7FF
-        data = bytes(message.data[:8])
-        ctypes.memmove(frame.data, data, len(data))
+        self.receive_raw(message.arbitration_id & 0x7FF, message.dlc & 0xFF, bytes(message.data[:8]), bus, odd=odd)
+
+    def receive_raw(self, number: int, length: int, data: bytes, bus: int = HOST_BUS, *, odd: bool = False) -> None:
+        """Take a frame by its id, length and bytes; `odd`: it is no standard data frame."""
+        frame = self._frame
+        frame.id, frame.length, frame.extended = number, length, odd
+        ctypes.memmove(frame.data, data.ljust(8, b"\0"), 8)
         self._library.gc_host_receive(self._at, bus, frame)
 
     def sample(self, counts: tuple[int, ...], temperature: int, time_us: int) -> None:

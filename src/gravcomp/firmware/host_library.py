@@ -20,6 +20,9 @@ from gravcomp.firmware.sources import CORE, EXACT, HOST, STANDALONE, WARNINGS, c
 PARTS = (CORE, STANDALONE, HOST)
 """Folders in the library."""
 
+LIBRARY_VARIABLE = "GRAVCOMP_FIRMWARE_LIBRARY"
+"""Environment variable that names a library to load in place of the built one, such as one that counts lines."""
+
 
 class Frame(ctypes.Structure):
     """`gc_frame` of core/frame.h."""
@@ -35,7 +38,7 @@ class Frame(ctypes.Structure):
 @functools.cache
 def load() -> ctypes.CDLL:
     """Return the library with the types of the functions in boards/host/host.h. Raises SetupError, ConfigError."""
-    library = ctypes.CDLL(str(build()))
+    library = ctypes.CDLL(os.environ.get(LIBRARY_VARIABLE) or str(build()))
     memory, frame = ctypes.c_void_p, ctypes.POINTER(Frame)
     u8, u32, flag, i16 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_bool, ctypes.c_int16
     for name, result, arguments in (
@@ -82,10 +85,12 @@ def host_compiler() -> list[str]:
     raise SetupError("a C compiler is missing on this machine: it builds the board's firmware. Run: apt-get install gcc")
 
 
-def compile_files(compiler: Sequence[str], files: Sequence[Path], target: Path, options: Sequence[str]) -> None:
-    """Compile and link `files` into `target`. Raises SetupError with the compiler's messages."""
+def compile_files(
+    compiler: Sequence[str], files: Sequence[Path], target: Path, options: Sequence[str], folder: Path | None = None
+) -> None:
+    """Compile and link `files` into `target`; what the compiler leaves beside it goes into `folder`. Raises SetupError."""
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         command = [*compiler, *WARNINGS, *EXACT, *options, *map(str, files), "-o", str(target)]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=scratch)
+        done = subprocess.run(command, capture_output=True, text=True, cwd=folder or scratch)
     if done.returncode != 0:
         raise SetupError(f"the firmware does not compile with {compiler[0]}:\n{done.stderr.strip()[-4000:]}")
