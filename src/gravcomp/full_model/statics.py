@@ -13,6 +13,9 @@ from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.full_model.wrench import PointLoads, Wrench
 
+# Parts of the load in which it is applied where an obstacle has friction.
+_RUBBING_PART = 0.1
+
 
 class StaticSolver(StaticTracker):
     """Finds equilibria of a model and tracks them."""
@@ -27,16 +30,20 @@ class StaticSolver(StaticTracker):
         last equilibrium is returned with `load_fraction` below 1 and `converged` False, and the solver keeps its state.
         """
         start, loads = self.state, PointLoads.of(self.model, wrench)
-        if self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
+        depth, rubs = self._obstacles(gravity)
+        if not depth and not rubs and self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
             return self.state
         self.reset()
         here, origin = self.state, self.state.tendons.displacement
-        done, part = 0.0, 0.25
+        # Friction depends on the way: the whole load at once is none.
+        done, part = 0.0, _RUBBING_PART if rubs else 0.25
         while done < 1.0:
             fraction = min(1.0, done + part)
             force = fraction * np.asarray(gravity)
+            if self.contact is not None:
+                self.contact.allowed = (1.0 - fraction) * depth
             if self.track(force, cables.part(origin, fraction), 15, exact=True, loads=loads, fraction=fraction).converged:
-                here, done, part = self.state, fraction, 2.0 * part
+                here, done, part = self.state, fraction, part if rubs else 2.0 * part
                 continue
             self.state = here
             part /= 2.0
@@ -44,3 +51,10 @@ class StaticSolver(StaticTracker):
                 self.state = start
                 return dataclasses.replace(here, converged=False, load_fraction=done)
         return self.state
+
+    def _obstacles(self, gravity: np.ndarray) -> tuple[float, bool]:
+        """Return how deep in m the straight robot is in an obstacle under gravity (3,), and whether any obstacle has friction."""
+        if self.contact is None:
+            return 0.0, False
+        self.contact.begin(np.zeros_like(self.state.u), gravity)
+        return self.contact.depth(np.zeros_like(self.state.u)), self.contact.rubbing
