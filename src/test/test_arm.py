@@ -60,6 +60,22 @@ def test_the_root_may_be_any_link_above():
         (TWO_JOINTS, "a", "b", "link 'a' is not below 'b' in the tree; its root is 'world'"),
         (TWO_JOINTS.replace('<parent link="b"/>', ""), "soft_base", None, "joint 'j3' has no parent link"),
         (TWO_JOINTS.replace("revolute", "floating"), "soft_base", None, "joint 'j1' is of type 'floating'"),
+        (
+            TWO_JOINTS.replace('<link name="b"/>', '<link name="b"/><link name="table"/>'),
+            "soft_base",
+            None,
+            "several roots, the links world, table",
+        ),
+        (TWO_JOINTS.replace('<parent link="world"/>', '<parent link="b"/>'), "soft_base", None, "links a, b are a loop"),
+        (
+            TWO_JOINTS.replace('<child link="b"/>', '<child link="a"/>'),
+            "soft_base",
+            None,
+            "link 'a' is below two joints, 'j1' and 'j2'",
+        ),
+        (TWO_JOINTS.replace('<link name="a"/>', ""), "soft_base", None, "joint 'j1' has the child link 'a', which is not in it"),
+        (TWO_JOINTS.replace("0.5 0 0", "0.5 0"), "soft_base", None, "joint 'j3' has xyz '0.5 0'; three numbers are needed"),
+        (TWO_JOINTS.replace("0 2 0", "0 0 0"), "soft_base", None, "joint 'j1' has an axis of length 0"),
     ],
 )
 def test_the_error_says_what_is_wrong_with_a_urdf(urdf, tip, root, sentence):

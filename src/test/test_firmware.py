@@ -231,7 +231,7 @@ def test_a_bus_that_is_off_counts_as_a_dead_host_and_recovers(bench):
 def test_homing_on_the_board_fails_without_motors_and_stops_when_a_cable_never_gets_taut(bench):
     b = bench()
     b.run(10, feedback=False)
-    assert b.ask(requests.act("home")) .result == "a motor does not answer"
+    assert b.ask(requests.act("home")).result == "a motor does not answer"
     b = bench()
     b.run(50)
     assert b.ask(requests.act("home")).done
