@@ -17,7 +17,8 @@ from gravcomp.arm.chain import Chain
 WINDOW = 0.04
 """s; at 10 m/s^3, about the jerk of fast arms, half of it changes the acceleration by 0.2 m/s^2 (1 deg for this moment only)."""
 
-_LEAST = 5  # poses in the window
+_LEAST = 5  # poses; an arm that sends fewer in the window has a longer one
+_GAP = 0.05  # s between two poses, after which the motion in between is unknown
 
 
 class CarriedPoint:
@@ -33,13 +34,13 @@ class CarriedPoint:
         None while the window is not filled, after a gap, and after a time that goes back. Raises KeyError for a joint without a
         position.
         """
-        if self._poses and not 0.0 < time - self._poses[-1][0] <= WINDOW:
-            if time == self._poses[-1][0]:
-                return None
+        if self._poses and time == self._poses[-1][0]:
+            return None
+        if self._poses and not 0.0 < time - self._poses[-1][0] <= _GAP:
             self._poses.clear()
         pose = self._chain.pose(positions)
         self._poses.append((time, (pose @ self._place)[:3]))
-        while time - self._poses[0][0] > WINDOW:
+        while len(self._poses) > _LEAST and time - self._poses[0][0] > WINDOW:
             self._poses.popleft()
         if len(self._poses) < _LEAST or time - self._poses[0][0] < 0.5 * WINDOW:
             return None
