@@ -116,6 +116,7 @@ NODES = (
             Port("robot/tip", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m", 100.0),
             Port("robot/markers", "visualization_msgs/msg/MarkerArray", "markers for RViz, up to 10 Hz"),
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of tip and backbone, where tf2_msgs is installed", optional=True),
+            Port("joint_states", "sensor_msgs/msg/JointState", "the shape as joints of the URDF (shape_joints)", optional=True),
             _DIAGNOSTICS,
         ),
     ),
