@@ -1,4 +1,4 @@
-"""Gravity from arms: published descriptions against closed forms, accelerations, TF, fusion with the IMU, the mount of the IMU."""
+"""Gravity from arms: published descriptions against closed forms, accelerations, TF, fusion with the IMU, its mount."""
 
 import math
 import os

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 
-
 AXES = ("x", "y", "z")
 """Ends of the names of the joints of a piece."""
 

@@ -116,7 +116,7 @@ NODES = (
             Port("robot/tip", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m", 100.0),
             Port("robot/markers", "visualization_msgs/msg/MarkerArray", "markers for RViz, up to 10 Hz"),
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of tip and backbone, where tf2_msgs is installed", optional=True),
-            Port("joint_states", "sensor_msgs/msg/JointState", "the shape as joints of the URDF (shape_joints)", optional=True),
+            Port("joint_states", "sensor_msgs/msg/JointState", "shape as joints of the URDF (shape_joints)", optional=True),
             _DIAGNOSTICS,
         ),
     ),
@@ -192,7 +192,7 @@ NODES = (
         ),
         publishes=(
             Port("gravity/arm", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: check)", optional=True),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: publish, fuse)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity of the arm, m/s^2 (use: publish, fuse)", optional=True),
             Port(
                 "arm/acceleration", "geometry_msgs/msg/Vector3Stamped", "of the IMU, m/s^2 in soft_base (feed_acceleration)",
                 optional=True,
