@@ -4,6 +4,7 @@ The arm measures its pose with encoders, the IMU measures gravity. If both are a
 loose mount, a wrong URDF or a saturated sensor.
 """
 
+import sys
 import time
 from typing import Any
 
@@ -253,3 +254,7 @@ def _finite(message: JointState) -> dict[str, float]:
 def main() -> int:
     """Run the node; return the exit code."""
     return run(ArmGravity)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

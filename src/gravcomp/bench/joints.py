@@ -19,7 +19,7 @@ def run(
 ) -> dict:
     """Return the figures; the names of the keys give their units.
 
-    messages: hostile messages; seed: of the messages and of the virtual robot; orientations: of the base, in addition to the five poses;
+    messages: hostile messages; seed: of messages and virtual robot; orientations: of the base, in addition to the five poses;
     loops: number of kinds of controllers whose loop is closed.
     """
     setup = Setup.of(load_robot_file("article"), seed)
