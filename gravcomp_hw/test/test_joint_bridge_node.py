@@ -13,6 +13,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -112,6 +113,38 @@ def test_the_joints_of_a_ros2_control_robot_wind_the_cables(bench):
 
     bench.until(refused, "the bridge resumes without joints")
     assert "joint_states" in answered[-1].result().message or "cable_controller" in answered[-1].result().message
+
+
+def test_a_killed_bridge_leaves_no_effort(tmp_path):
+    robot = tmp_path / "effort.yaml"
+    robot.write_text(ROBOT.read_text().replace("command: trajectory", "command: effort"))
+    bridge = subprocess.Popen(
+        [sys.executable, "-m", "gravcomp_hw.joint_bridge", "--ros-args", "-p", f"robot:={robot}", "-r", "__ns:=/alone"]
+    )
+    rclpy.init()
+    node, sent = rclpy.create_node("controller"), []
+    node.create_subscription(Float64MultiArray, "/alone/cable_controller/commands", lambda m: sent.append(list(m.data)), 10)
+    states = node.create_publisher(JointState, "/alone/joint_states", 10)
+    commands = node.create_publisher(CableCommand, "/alone/cable/command", COMMAND)
+    names = [f"motor_{i}" for i in range(1, 5)]
+
+    def until(condition, what):
+        deadline = time.monotonic() + 30.0
+        while not condition():
+            assert time.monotonic() < deadline, what
+            states.publish(JointState(name=names, position=[0.0, 1.5707963, 0.0, 0.0], velocity=[0.0] * 4))
+            commands.publish(CableCommand(displacement=[0.001] * 4, tension=[0.3] * 4))
+            rclpy.spin_once(node, timeout_sec=0.01)
+
+    try:
+        until(lambda: sent and any(sent[-1]), "no effort is sent")
+        bridge.kill()
+        bridge.wait()
+        until(lambda: sent[-1] == [0.0] * 4, "the efforts stay")
+    finally:
+        bridge.kill()
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def test_a_robot_without_joints_is_refused():
