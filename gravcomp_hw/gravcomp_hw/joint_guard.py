@@ -2,8 +2,8 @@
 
     python -m gravcomp_hw.joint_guard TOPIC NUMBER NAMESPACE
 
-TOPIC: of the controller, NUMBER: of its joints. Heartbeats come through standard input (`gravcomp.motors.joint_guard`). It prints a
-line when it is ready.
+TOPIC: of the controller, NUMBER: of its joints. Heartbeats come through standard input (`gravcomp.motors.joint_guard`). It prints
+a line when it is ready.
 """
 
 import array

@@ -64,8 +64,8 @@ def resting_poses(
 
 
 def _pose(recording: Recording, values: np.ndarray, indices: list[int]) -> RestingPose:
-    means = (part[indices].mean(axis=0) for part in (recording.accel, recording.gyro))
-    return RestingPose(*means, len(indices), values[indices].mean(axis=0))
+    accel, gyro, others = (part[indices].mean(axis=0) for part in (recording.accel, recording.gyro, values))
+    return RestingPose(accel, gyro, len(indices), others)
 
 
 def _joined(poses: list[RestingPose]) -> list[RestingPose]:
