@@ -57,7 +57,7 @@ def run(hardware: Hardware, messages: int, seed: int, progress: Callable[[str], 
     result = {}
     for command in COMMANDS:
         progress(f"hostile messages, command: {command}")
-        result[command] = _Attack(with_joints(hardware, command), random.Random(seed)).run(messages // len(COMMANDS))
+        result[command] = _Attack(with_joints(hardware, command), random.Random(seed)).run(-(-messages // len(COMMANDS)))
     return result
 
 
