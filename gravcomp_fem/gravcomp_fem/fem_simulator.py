@@ -48,7 +48,7 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
-        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
+        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot.with_assumed_lines())
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
         # The first step compiles functions that are not cached yet; do it before the first sample arrives.

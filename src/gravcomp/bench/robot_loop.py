@@ -4,6 +4,7 @@ The loop runs in one process, in virtual time. Rate and delay of commands belong
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from gravcomp.closed_loop.setup import Setup
@@ -31,7 +32,7 @@ SEEDS = (1, 2, 3)
 _ORIENTATIONS = 20
 
 
-def measure(file: str, every: int = 1) -> dict[str, Any]:
+def measure(file: str, every: int = 1, progress: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
     """Return the figures of `FIGURES`, the worst over `SEEDS`, and `seeds`: the two shares of each seed.
 
     Held: at the article's five poses and 20 random orientations of the base; moving: during the turns between them at 30 deg/s.
@@ -41,7 +42,10 @@ def measure(file: str, every: int = 1) -> dict[str, Any]:
     robot_file = load_robot_file(file)
     runs: dict[int, Residuals] = {}
     for seed in SEEDS[:1] if every > 1 else SEEDS:
-        runs[seed] = residuals(Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every))
+        counted = _counted(f"{robot_file.robot.name}: loop, seed {seed}", progress)
+        runs[seed] = residuals(Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every), progress=counted)
+        progress(f"{robot_file.robot.name}: loop, seed {seed}: held {_pct(runs[seed].held, runs[seed].sag)} % of the sag")
+    progress(f"{robot_file.robot.name}: whether it can be held")
     shares = {seed: {"held_pct": _pct(run.held, run.sag), "moving_pct": _pct(run.moving, run.sag)} for seed, run in runs.items()}
     return dict.fromkeys(FIGURES) | {
         "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),
@@ -59,6 +63,11 @@ def unholdable(file: RobotFile) -> str | None:
     """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
     answer = holdability(file.robot, with_needed=False)
     return None if answer.held else sentence(file.robot, answer)
+
+
+def _counted(name: str, progress: Callable[[str], None]) -> Callable[[int, int], None]:
+    """Return the progress of `residuals` as a text that begins with `name`."""
+    return lambda done, total: progress(f"{name} ({done} of {total} orientations)")
 
 
 def _pct(residual: float, sag: float) -> float:

@@ -22,9 +22,9 @@ from gravcomp.virtual.true_robot import TrueRobot
 class Setup:
     """Model and virtual robot of one robot.
 
-    robot, hardware: in model, controller and bridge; nominal, nominal_hardware: the description from which the virtual robot is
-    built, with what is given in `truth` and what `seed` draws. They are equal (hardware: None) unless a calibration changes
-    robot and hardware.
+    robot, hardware: in model, controller and bridge, with assumed lines where none are described; nominal, nominal_hardware: the
+    description from which the virtual robot is built, with what is given in `truth` and what `seed` draws. Otherwise they are
+    equal (hardware: None) unless a calibration changes robot and hardware.
     """
 
     source: str
@@ -49,7 +49,7 @@ class Setup:
         check_pairs(hardware, file.robot, file.source)
         return cls(
             source=file.source,
-            robot=file.robot,
+            robot=file.robot.with_assumed_lines(),
             nominal=virtual.robot,
             truth=virtual.given,
             hardware=hardware,

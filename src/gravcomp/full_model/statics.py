@@ -58,8 +58,8 @@ class StaticSolver(StaticTracker):
     ) -> Equilibrium:
         """Change the load from `before` (3,) and the cables' displacements `origin` (m,) in steps, beginning with `part` of it.
 
-        A step that fails is halved, down to `least`; iterations and exact: of `track`. Then the last equilibrium is returned, not converged, with the fraction of
-        the load that it balances, and the solver keeps the state `kept`.
+        A step that fails is halved, down to `least`; iterations and exact: of `track`. Then the last equilibrium is returned,
+        not converged, with the fraction of the load that it balances, and the solver keeps the state `kept`.
         """
         here, done = self.state, 0.0
         while done < 1.0:

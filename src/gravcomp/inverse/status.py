@@ -51,14 +51,12 @@ def evaluate(
     if points_missed > tolerance:
         return (
             ControllerCode.UNREACHABLE,
-            f"the nearest shape is {1e3 * points_missed:.1f} mm from the target"
-            f" (tolerance {1e3 * tolerance:g} mm){reason}",
+            f"the nearest shape is {1e3 * points_missed:.1f} mm from the target (tolerance {1e3 * tolerance:g} mm){reason}",
         )
     if target.tip_direction_weight > 0.0 and tilt > tilt_tolerance:
         return (
             ControllerCode.UNREACHABLE,
-            f"the nearest shape is tilted by {np.degrees(tilt):.1f} deg"
-            f" (tolerance {np.degrees(tilt_tolerance):g} deg){reason}",
+            f"the nearest shape is tilted by {np.degrees(tilt):.1f} deg (tolerance {np.degrees(tilt_tolerance):g} deg){reason}",
         )
     if held:
         return ControllerCode.AT_LIMIT, f"the nearest shape is kept{reason}"

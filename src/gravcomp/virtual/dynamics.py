@@ -117,6 +117,8 @@ class MovingRod:
             self._compliance,
             model.length,
             model.stiffness,
+            model.filament,
+            model.curve,
             model.rest_strain,
             model.mass,
             model.centre,
