@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gravcomp.contact.contacts import Contacts
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
@@ -22,6 +24,7 @@ from gravcomp.simulation.search_pace import SearchPace
 if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.reduction.serving import ReducedServing
+    from gravcomp.scene.scene import Scene
 
 _MORE_ITERATIONS = 12
 _LIMIT_POINT = "the robot has no equilibrium beyond it, or only at a distant shape"
@@ -39,14 +42,20 @@ class Simulator:
     (True, -27.9)
     """
 
-    def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
-        """reduced: use the reduced model if one is built. Raises MeshError for a body that cannot be meshed or computed."""
+    def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None):
+        """reduced: use the reduced model if one is built; scene: what the robot touches.
+
+        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact.
+        """
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
+        self.scene = scene
+        if scene:
+            self.solver.contact = FullContact(self.model, scene)
         self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
-        self._serving = self.load_reduced() if reduced else None
+        self._serving = self.load_reduced() if reduced and not scene else None
 
     def load_reduced(self) -> "ReducedServing | None":
         """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""
@@ -207,6 +216,7 @@ class Simulator:
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
             message=beyond_range(self.model, state.u) if state.converged else self._reason(state),
+            contacts=Contacts.none() if self.solver.contact is None else self.solver.contact.contacts(state.u),
         )
 
     def _reason(self, state: Equilibrium) -> str:

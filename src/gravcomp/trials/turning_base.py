@@ -78,16 +78,21 @@ def _turned_upright(orientation: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def residuals(
-    setup: Setup, count: int = 20, orientation_seed: int = 1, progress: Callable[[int, int], None] | None = None
+    setup: Setup,
+    count: int = 20,
+    orientation_seed: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    board: str = "virtual",
 ) -> Residuals:
     """Run the loop through the five poses and `count` random ones.
 
-    progress receives the number of orientations that are done, and that of all. Raises ConfigError, NoEquilibrium, RuntimeError.
+    progress receives the number of orientations that are done, and that of all; board: of the virtual robot. Raises ConfigError,
+    NoEquilibrium, RuntimeError.
     """
     wanted = orientations(count, orientation_seed)
     rest = _REACTION + _PERIODS * 2.0 * math.pi / first_frequency(build_rod(setup.true_robot)) + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
-    loop = ClosedLoop(setup, motion)
+    loop = ClosedLoop(setup, motion, board=board)
     loop.hold(target_of(setup, Case(0.0)))
     start = loop.time
     legs = motion.rests
