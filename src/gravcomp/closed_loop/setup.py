@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
+from gravcomp.virtual.body import build_rod, first_frequency
 from gravcomp.virtual.described import described
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -73,6 +75,11 @@ class Setup:
     def true_robot(self) -> TrueRobot:
         """The virtual robot as it truly is. Raises ConfigError where `truth` describes no robot."""
         return draw(self.truth, self.nominal, self.virtual_hardware, self.seed)
+
+    @functools.cached_property
+    def first_period(self) -> float:
+        """Period in s of the virtual robot's first bending motion."""
+        return 2.0 * math.pi / first_frequency(build_rod(self.true_robot))
 
     def with_model(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
         """Return the same virtual robot with another model, and with the motor offsets of `hardware` where it is given."""

@@ -19,7 +19,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
-from gravcomp.virtual.body import build_rod, first_frequency
+from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import NoEquilibrium, equilibrium
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, turned
 
@@ -90,7 +90,7 @@ def residuals(
     NoEquilibrium, RuntimeError.
     """
     wanted = orientations(count, orientation_seed)
-    rest = _REACTION + _PERIODS * 2.0 * math.pi / first_frequency(build_rod(setup.true_robot)) + _COUNTED
+    rest = _REACTION + _PERIODS * setup.first_period + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
     loop = ClosedLoop(setup, motion, board=board)
     loop.hold(target_of(setup, Case(0.0)))
