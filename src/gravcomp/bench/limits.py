@@ -60,6 +60,7 @@ ROWS = {
         Row("robots.article.reduced_step_ms", "article: step of the reduced model with the inverse problem, median", "ms", 0.11),
         Row("robots.*.uncalibrated_pct", "lateral residual held, of the released sag, worst seed", "%", 8.0),
         Row("robots.*.moving_pct", "the same while the base turns at 30 deg/s", "%", 4.0),
+        Row("robots.*.similarity_pct", "robots of 0.5 to 4 times the size, largest difference in model and loop", "%", 2.0),
         Row("ccx_error_pct", "against CalculiX, worst row, share of the length", "%", 0.2),
         Row("disks_error_pct", "backbones with disks, worst, share of the length", "%", 0.3),
         Row("rod_error_pct", "rod under gravity, worst, share of the length", "%", 0.3),

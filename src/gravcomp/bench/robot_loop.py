@@ -11,6 +11,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
 from gravcomp.holdability import holdability
 from gravcomp.holdability.text import sentence
+from gravcomp.trials.similarity import SCALES, similarity
 from gravcomp.trials.turning_base import Residuals, residuals
 
 FIGURES = (
@@ -21,6 +22,7 @@ FIGURES = (
     "sag_mm",
     "settle_s",
     "unholdable",
+    "similarity_pct",
     "calibrated_pct",
     "modulus_error_pct",
     "compliance_error_pct",
@@ -55,6 +57,7 @@ def measure(file: str, every: int = 1, progress: Callable[[str], None] = lambda 
         "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
         "settle_s": _worst([run.settled for run in runs.values()]),
         "unholdable": unholdable(robot_file),
+        "similarity_pct": similarity_pct(robot_file, every, progress),
         "seeds": {str(seed): share for seed, share in shares.items()},
     }
 
@@ -63,6 +66,18 @@ def unholdable(file: RobotFile) -> str | None:
     """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
     answer = holdability(file.robot, with_needed=False)
     return None if answer.held else sentence(file.robot, answer)
+
+
+def similarity_pct(file: RobotFile, every: int, progress: Callable[[str], None]) -> float | None:
+    """Return by how many per cent robots of half to four times the size differ at most, see `trials.similarity`.
+
+    None for a body from a file, whose mesh is not scaled.
+    """
+    if file.robot.body is not None:
+        return None
+    progress(f"{file.robot.name}: the same robot in other sizes")
+    differences = similarity(Setup.of(file, SEEDS[0]), SCALES[-1:] if every > 1 else SCALES)
+    return round(100.0 * max(differences.values()), 2)
 
 
 def _counted(name: str, progress: Callable[[str], None]) -> Callable[[int, int], None]:

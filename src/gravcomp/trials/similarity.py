@@ -1,4 +1,4 @@
-"""Robots of another size that behave alike: what in model and loop suits only robots of one size shows as a difference.
+"""Robots of another size that behave alike: what in model and loop suits a single size shows as a difference.
 
 With lengths times k, moduli times k and the same density, a robot under its own weight bends alike. Then
 
