@@ -106,10 +106,8 @@ class CableLine:
 
     def assumed(self, tension_max: float, length: float) -> "Self":
         """Return the line with what is assumed where nothing is said of it, on a robot of `length` m with `tension_max` N."""
-        changes: dict[str, float] = {} if self.stretches else {"axial_stiffness": tension_max / ASSUMED_STRETCH}
-        if self.free_length is None:
-            changes["free_length"] = ASSUMED_FREE_LENGTH * length
-        return dataclasses.replace(self, **changes) if changes else self
+        line = self if self.stretches else dataclasses.replace(self, axial_stiffness=tension_max / ASSUMED_STRETCH)
+        return line if line.free_length is not None else dataclasses.replace(line, free_length=ASSUMED_FREE_LENGTH * length)
 
     def with_stiffness(self, stiffness: float | None) -> "Self":
         """Return the line with the stiffness E A in N in place of its material; None: without stretch."""
