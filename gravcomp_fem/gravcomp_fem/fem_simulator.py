@@ -16,9 +16,11 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.time import Time
 from rclpy.timer import Timer
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from gravcomp.arm.shape_chain import joint_names, joint_positions
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
@@ -65,6 +67,9 @@ class FemSimulator(ManagedNode):
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
         self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
+        robot = self.robot_file.robot
+        self._chain_names = joint_names(self.parameters.joint_prefix, len(robot.effectors.backbone_station))
+        self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
 
     def activate(self) -> None:
         """Reset the simulator and subscribe."""
@@ -92,8 +97,9 @@ class FemSimulator(ManagedNode):
         if self._builder is not None:
             self._builder.terminate()
             self._builder.wait()
-        for publisher in (self._deformation, self._tip, self._markers):
-            self.destroy_publisher(publisher)
+        for publisher in (self._deformation, self._tip, self._markers, self._chain):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
         self._transforms.destroy()
 
     def _start_builder(self) -> None:
@@ -188,6 +194,9 @@ class FemSimulator(ManagedNode):
         if self._markers.get_subscription_count():
             self._markers.publish(self._robot_markers.of(shape, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
+        if self._chain is not None:
+            positions = joint_positions(shape.backbone_position, self.robot_file.robot.length)
+            self._chain.publish(JointState(header=header, name=self._chain_names, position=positions))
 
     def _refuse(self, sentence: str) -> None:
         self._refused += 1

@@ -62,7 +62,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
-    "joints": {"messages": 3000, "orientations": 0},
+    "joints": {"messages": 3000, "orientations": 0, "loops": 1},
     "start": {},
     "soak": {"minutes": 0.2},
 }

@@ -85,6 +85,10 @@ NODES = (
         subscribes=(
             Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link"),
             Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC"),
+            Port(
+                "arm/acceleration", "geometry_msgs/msg/Vector3Stamped", "of the IMU, m/s^2 in soft_base (arm_acceleration)",
+                optional=True,
+            ),
         ),
         publishes=(
             Port("imu/data", "sensor_msgs/msg/Imu", "with orientation and covariances, bias removed (REP-145)", 100.0),
@@ -112,6 +116,7 @@ NODES = (
             Port("robot/tip", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m", 100.0),
             Port("robot/markers", "visualization_msgs/msg/MarkerArray", "markers for RViz, up to 10 Hz"),
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of tip and backbone, where tf2_msgs is installed", optional=True),
+            Port("joint_states", "sensor_msgs/msg/JointState", "shape as joints of the URDF (shape_joints)", optional=True),
             _DIAGNOSTICS,
         ),
     ),
@@ -183,10 +188,15 @@ NODES = (
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of the arm (source: tf)", optional=True),
             Port("/tf_static", "tf2_msgs/msg/TFMessage", "fixed frames of the arm (source: tf)", optional=True),
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the IMU (use: check)", optional=True),
+            Port("gravity/imu", "geometry_msgs/msg/Vector3Stamped", "gravity from the IMU (use: fuse)", optional=True),
         ),
         publishes=(
             Port("gravity/arm", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: check)", optional=True),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: publish)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity of the arm, m/s^2 (use: publish, fuse)", optional=True),
+            Port(
+                "arm/acceleration", "geometry_msgs/msg/Vector3Stamped", "of the IMU, m/s^2 in soft_base (feed_acceleration)",
+                optional=True,
+            ),
             _DIAGNOSTICS,
         ),
     ),
