@@ -42,7 +42,7 @@ __attribute__((section(".vectors"), used)) const gc_vectors gc_vector_table = {
 __attribute__((section(".image_header"), used)) const gc_image_header gc_image = {.magic = GC_IMAGE_MAGIC};
 
 // Faults of the processor, and an image that is not whole: nothing is driven; the watchdog restarts the chip.
-void gc_stuck(void) {
+__attribute__((noinline)) void gc_stuck(void) {
   for (;;) {
     __asm__ volatile("nop");
   }
