@@ -33,6 +33,7 @@ __attribute__((section(".vectors"), used)) const gc_vectors gc_vector_table = {
         {
             [IRQ_CAN1_TX] = gc_on_host_sent,
             [IRQ_CAN1_RX0] = gc_on_host_frame,
+            [IRQ_EXTI9_5] = gc_on_edge,
             [IRQ_TIM2] = gc_on_data_ready,
             [IRQ_CAN2_TX] = gc_on_motor_sent,
             [IRQ_CAN2_RX0] = gc_on_motor_frame,

@@ -25,10 +25,11 @@ RESET_FLAGS = {"power": 1 << 27 | 1 << 25, "supply": 1 << 25, "watchdog": 1 << 2
 
 _RETURN = 0x08007FF0  # nothing is there; a handler that returns comes to it
 _PAINT = 0xA5
-_START_PATIENCE = 2_000_000  # us
+_START_PATIENCE = 30_000_000  # us
 _WFI = b"\x30\xbf"
 _PERIPHERALS, _SYSTEM, _UNIQUE = 0x40000000, 0xE000E000, 0x1FFF7000
-_TIM2, _TIM3, _IWDG, _CAN1, _CAN2, _PWR, _SPI1 = 0x0000, 0x0400, 0x3000, 0x6400, 0x6800, 0x7000, 0x13000
+_TIM2, _TIM10, _IWDG, _CAN1, _CAN2, _PWR, _SPI1, _EXTI = 0x0000, 0x14400, 0x3000, 0x6400, 0x6800, 0x7000, 0x13000, 0x13C00
+_EDGE = 1 << 5
 _GPIOA, _GPIOB, _RCC, _FLASH = 0x20000, 0x20400, 0x23800, 0x23C00
 _SELECTS = {_GPIOA: (4, "acc"), _GPIOB: (0, "gyro")}
 
@@ -131,7 +132,10 @@ class Machine:
         """Let the gyroscope's data-ready edge come at `time` (us)."""
         if self.dead or not self.imu.set_up or self.imu.silent:
             return
-        self._registers[_TIM2 + 0x34] = time & 0xFFFFFFFF
+        self._registers[_EXTI + 0x14] = _EDGE
+        tick, self.now = self.now, time & 0xFFFFFFFF
+        self.interrupt("gc_on_edge")
+        self.now = tick
         self.interrupt("gc_on_data_ready")
         self._flush()
         if not self.dead and not self.main_stands:
@@ -259,8 +263,10 @@ class Machine:
             self._fed = self.now
         elif offset == _SPI1 + 0x0C:
             self._spi = self.imu.exchange(value & 0xFF)
-        elif offset == _TIM3 + 0x34:
+        elif offset == _TIM10 + 0x34:
             self.duty = value
+        elif offset == _EXTI + 0x14:
+            self._registers[offset] = self._registers.get(offset, 0) & ~value
         elif _FLASH < offset < _FLASH + 0x20:
             self.flash.write_register(offset - _FLASH, value)
         elif offset in (_GPIOA + 0x18, _GPIOB + 0x18):
