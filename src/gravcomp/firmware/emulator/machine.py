@@ -83,6 +83,8 @@ class Machine:
         self._uc.mem_write(BOOT_START, boot)
         self._uc.mem_write(CODE_START, b"\xff" * (FLASH_END - CODE_START))
         self._uc.mem_write(CODE_START, code)
+        self._uc.ctl_remove_cache(BOOT_START, PARAMETERS)
+        self._uc.ctl_remove_cache(CODE_START, FLASH_END)
 
     def write_memory(self, address: int, data: bytes) -> None:
         """Write into memory or flash, as a debugger does."""
