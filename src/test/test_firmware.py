@@ -177,7 +177,7 @@ def test_the_shipped_values_of_all_parameters_are_in_their_ranges():
     board = HostBoard()
     for name in keys():
         board.set({name: value_of(name, board.word(name))})
-    assert REAL <= set(keys())
+    assert set(keys()) >= REAL
 
 
 def test_saved_parameters_come_back_and_a_supply_lost_at_any_word_leaves_the_last_whole_ones(bench):
@@ -234,7 +234,7 @@ def test_a_bus_that_is_off_counts_as_a_dead_host_and_recovers(bench):
 def test_homing_on_the_board_fails_without_motors_and_stops_when_a_cable_never_gets_taut(bench):
     b = bench()
     b.run(10, feedback=False)
-    assert b.ask(requests.act("home")) .result == "a motor does not answer"
+    assert b.ask(requests.act("home")).result == "a motor does not answer"
     b = bench()
     b.run(50)
     assert b.ask(requests.act("home")).done
@@ -287,7 +287,12 @@ def test_homing_on_the_board_finds_where_each_cable_gets_taut():
 
 
 def test_homing_of_a_cable_that_is_unhooked_fails():
-    b = Bench(HostBoard(SETTINGS | {"travel_per_count": 1e-6, "homing_travel": 0.004, "velocity_gain": 20.0, "velocity_integral": 300.0}), motors=(1,))
+    b = Bench(
+        HostBoard(
+            SETTINGS | {"travel_per_count": 1e-6, "homing_travel": 0.004, "velocity_gain": 20.0, "velocity_integral": 300.0}
+        ),
+        motors=(1,),
+    )
     b.board.set({"motors": 1})
     cables = Cables(b, {1: 1.0})
     b.run(20)

@@ -52,7 +52,9 @@ ROWS = {
         Row("dynamics_step_ms.median", "free fall of the reduced model: one step, median", "ms", 0.5),
     ),
     "board": (
-        Row("board_frames", "hostile frames and samples, at the emulated image and at the C code each", "", 200_000, at_least=True),
+        Row(
+            "board_frames", "hostile frames and samples, at the emulated image and at the C code each", "", 200_000, at_least=True
+        ),
         Row("board_violations", "violations of what must hold", "", 0),
         Row("board_faults", "faults of the processor, resets, reports of the sanitizers", "", 0),
         Row("image_differences", "ticks in which image and C code sent different frames", "", 0),

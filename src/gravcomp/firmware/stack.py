@@ -80,7 +80,7 @@ def _refuse_recursion(calls: Mapping[str, set[str]]) -> None:
 
     def visit(name: str, path: tuple[str, ...]) -> None:
         if name in path:
-            raise SetupError(f"the firmware calls itself: {' -> '.join([*path[path.index(name):], name])}")
+            raise SetupError(f"the firmware calls itself: {' -> '.join([*path[path.index(name) :], name])}")
         if name in done:
             return
         for callee in sorted(calls.get(name, ())):

@@ -78,9 +78,7 @@ class ImageBoard:
     def sent(self, bus: int = HOST_BUS) -> list[can.Message]:
         """Return the frames that have left on a bus, in order."""
         frames, self.machine.cans[bus].sent = self.machine.cans[bus].sent, []
-        return [
-            can.Message(arbitration_id=f.identifier >> 21, is_extended_id=False, data=f.data[: f.length]) for f in frames
-        ]
+        return [can.Message(arbitration_id=f.identifier >> 21, is_extended_id=False, data=f.data[: f.length]) for f in frames]
 
     def bus_off(self, bus: int, off: bool) -> None:
         """Let a bus be off, or on again."""
@@ -103,5 +101,7 @@ class ImageBoard:
 def _wire(message: can.Message) -> WireFrame:
     data = bytes(message.data[:8]).ljust(8, b"\0")
     odd = message.is_error_frame or message.is_fd
-    identifier = (message.arbitration_id & 0x1FFFFFFF) << 3 | _IDE if message.is_extended_id or odd else message.arbitration_id << 21
+    identifier = (
+        (message.arbitration_id & 0x1FFFFFFF) << 3 | _IDE if message.is_extended_id or odd else message.arbitration_id << 21
+    )
     return WireFrame(identifier & 0xFFFFFFFF | (_RTR if message.is_remote_frame else 0), min(message.dlc, 8), data)

@@ -40,7 +40,8 @@ class ProcessorFault(RuntimeError):
 
 class Machine:
     """The chip with an image. Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty,
-    resets (by cause), symbols."""
+    resets (by cause), symbols.
+    """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
         """Raises SetupError without the emulator."""
