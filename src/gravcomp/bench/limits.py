@@ -52,9 +52,7 @@ ROWS = {
         Row("dynamics_step_ms.median", "free fall of the reduced model: one step, median", "ms", 0.5),
     ),
     "board": (
-        Row(
-            "board_frames", "hostile frames and samples, at the emulated image and at the C code each", "", 200_000, at_least=True
-        ),
+        Row("board_frames", "hostile frames and samples, at the emulated image and the C code each", "", 200_000, at_least=True),
         Row("board_violations", "violations of what must hold", "", 0),
         Row("board_faults", "faults of the processor, resets, reports of the sanitizers", "", 0),
         Row("image_differences", "ticks in which image and C code sent different frames", "", 0),
@@ -154,6 +152,16 @@ ROWS = {
         Row("not_back", "faults after which commands were not followed again", "", 0),
         Row("worst_safe_ms", "time from fault to safe current, worst", "ms", 250.0),
         Row("safe_ms.stop", "time from stop to zero current", "ms", 20.0),
+    ),
+    "joints": (
+        Row("messages", "hostile messages to joint_bridge", "", 1_000_000, True),
+        Row("violations", "messages to the controller beyond a limit", "", 0),
+        Row("over_can_pct.trajectory.held_mm", "trajectory controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.trajectory.moving_mm", "trajectory controller: error in motion over that on CAN", "%", 10.0),
+        Row("over_can_pct.position.held_mm", "position controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.position.moving_mm", "position controller: error in motion over that on CAN", "%", 10.0),
+        Row("over_can_pct.effort.held_mm", "effort controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.effort.moving_mm", "effort controller: error in motion over that on CAN", "%"),
     ),
     "start": (
         Row("first_page_s", "clone to the moving page with empty caches, without the downloads", "s", 90.0),

@@ -39,8 +39,10 @@ class ProcessorFault(RuntimeError):
 
 
 class Machine:
-    """The chip with an image. Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty,
-    resets (by cause), symbols.
+    """The chip with an image.
+
+    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty, resets (their causes),
+    dead (nothing runs), symbols.
     """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
