@@ -17,6 +17,7 @@ BENCHMARKS = {
     "track": "a wrong model that a tracker of the tip corrects",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
+    "board": "the board's firmware: hostile frames, dead host, failed sensor, build",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
@@ -31,6 +32,10 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "kills": (20, "number of kills of each process"),
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
+    },
+    "board": {
+        "frames": (200_000, "number of hostile frames and samples at the image and at the C code"),
+        "seed": (1, "seed of the hostile frames"),
     },
     "joints": {
         "messages": (1_000_000, "number of malformed and hostile messages"),
@@ -59,6 +64,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "track": {"seeds": 1},
     "estimator": {"every": 13},
     "streams": {"every": 5},
+    "board": {"frames": 10_000, "every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
