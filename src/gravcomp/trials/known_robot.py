@@ -23,6 +23,7 @@ OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
 # m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (0.6e-3, 1.8e-3)
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
+_FITTED = {"offsets", "compliance", "winding"}
 _IMAGES = 10  # that are averaged
 
 
@@ -111,4 +112,4 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
 
 def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...]]) -> StaticFit:
     setup, modulus, poses = job
-    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses))
+    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses), groups=_FITTED)
