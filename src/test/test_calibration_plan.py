@@ -109,7 +109,7 @@ def test_a_session_waits_for_the_base_and_goes_on_where_it_was(robot, tmp_path):
         LiveSession(other, session_plan(), out)
 
 
-def test_a_base_that_leaves_its_pose_begins_it_anew(robot, tmp_path):
+def test_a_base_that_leaves_its_pose_begins_it_again(robot, tmp_path):
     session = LiveSession(robot, session_plan(), tmp_path / "live.csv")
     now = run(session, 0.0, 0.0, 1.5)
     assert session.phase in (Phase.PULL, Phase.REST)

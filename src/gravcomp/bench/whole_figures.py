@@ -29,7 +29,7 @@ coverage_pct: share of the 95 % intervals of a calibration that contain the trut
 coverage_width: half width of the intervals over the deviation of the errors, widest kind and robot.
 """
 
-_COVERED = ("tpu_3_long", "silicone_long")  # beside the article's, of ../shared/robots
+_COVERED = ("tpu_3_long", "silicone_long")  # in addition to the article's, of ../shared/robots
 _SEEDS = 50
 
 

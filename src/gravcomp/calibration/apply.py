@@ -99,7 +99,7 @@ def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
 
 
 def overlay_path(source: str | Path, name: str) -> Path:
-    """Return where a calibrated robot goes by default: beside the robot file; for a shipped robot into the present folder."""
+    """Return where a calibrated robot goes by default: next to the robot file; for a shipped robot into the present folder."""
     path = Path(source)
     shipped = path.resolve() in [one.resolve() for one in shipped_robots().values()]
     return (Path() if shipped else path.parent) / f"{name}-calibrated.yaml"

@@ -14,7 +14,7 @@ from gravcomp.calibration.standstill import Standstill
 from gravcomp.description import Robot
 
 WINDOWS = 3
-"""Windows of each rest: what has crept between them is told apart from what bends at once."""
+"""Windows of each rest: what has crept between them is distinguished from what bends at once."""
 
 _CREEPING = 10  # rests in a course, from which on it shows creep
 

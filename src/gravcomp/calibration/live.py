@@ -6,7 +6,7 @@
     done    all poses are measured
 
 Each finished pose is appended to a CSV file in the form of `files`. A session that finds such a file goes on after its last pose.
-After a pause the course begins anew: a new trial, whose robot counts as relaxed.
+After a pause the course begins again: a new trial, whose robot counts as relaxed.
 """
 
 import csv
@@ -31,9 +31,7 @@ class LiveOptions:
     """When a pose counts as reached."""
 
     turned: float = parameter(8.0, edge="deg", minimum=0.5, maximum=45.0, description="farthest from the planned gravity")
-    steady: float = parameter(
-        0.5, edge="deg", minimum=0.01, maximum=10.0, description="largest turn of a base held still"
-    )
+    steady: float = parameter(0.5, edge="deg", minimum=0.01, maximum=10.0, description="largest turn of a base held still")
     hold: float = parameter(1.0, unit="s", minimum=0.1, maximum=30.0, description="time for which it has to be still")
 
 
@@ -77,14 +75,14 @@ class LiveSession:
             return f"all {len(self._plan.poses)} poses are measured: {self._path}"
         place = f"pose {self._pose + 1} of {len(self._plan.poses)}"
         if self.phase == Phase.TURN:
-            away = "" if not self._gravities else f", {math.degrees(self._away(self._gravities[-1][1])):.0f} deg away"
+            away = "" if not self._gravities else f", about {5 * round(self._degrees_away() / 5)} deg away"
             return f"{place}: hold the base with its {instruction(pose)}{away}"
         if self.phase == Phase.PULL:
             return f"{place}: hold still, the cables move"
         return f"{place}: hold still, measuring"
 
     def on_gravity(self, time: float, gravity: np.ndarray) -> None:
-        """Take gravity (3,). A base that leaves the pose begins it anew."""
+        """Take gravity (3,). A base that leaves the pose begins it again."""
         self._gravities = [(t, g) for t, g in self._gravities if t >= time - self._options.hold] + [(time, gravity)]
         if self.phase == Phase.DONE:
             return
@@ -151,7 +149,7 @@ class LiveSession:
         except (KeyError, TypeError, ValueError):
             done, trial = -1, 0
         if not 0 <= done <= len(self._plan.poses):
-            raise MeasurementError(f"{self._path}: is not of this robot and plan; name another file to begin anew")
+            raise MeasurementError(f"{self._path}: is not of this robot and plan; name another file to begin again")
         return done, trial
 
     def _away(self, gravity: np.ndarray) -> float:
@@ -160,6 +158,9 @@ class LiveSession:
         assert pose is not None
         one, other = gravity / np.linalg.norm(gravity), pose.gravity / np.linalg.norm(pose.gravity)
         return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+
+    def _degrees_away(self) -> float:
+        return math.degrees(self._away(self._gravities[-1][1]))
 
     def _spread(self) -> float:
         """Return by how much gravity turned within the time of `hold`, in rad."""

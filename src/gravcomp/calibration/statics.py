@@ -140,7 +140,7 @@ class StaticPredictor:
         return tuple(places.ravel().tolist())
 
     def _differences(self, parameters: StaticParameters, kind: str, steps: list[Step], shown: list[Step]) -> np.ndarray:
-        """Return the difference quotients (k, 6, n) by a field, each from a walk of its own beside `steps`."""
+        """Return the difference quotients (k, 6, n) by a field, each from a walk of its own near `steps`."""
         here, columns = np.array([step.tip for step in shown]), []
         for index in range(parameters.count(kind)):
             moved = parameters.changed(kind, (index,), _STEPS[kind])
@@ -161,7 +161,7 @@ class StaticPredictor:
             moved = parameters.changed(kind, (cable,), _STEPS[kind])
             self._set_tendons(parameters, np.stack([moved.radius, moved.angle]))
             for k in taut:
-                there = self._walk.beside(inputs[shown[k].window], shown[k])
+                there = self._walk.near(inputs[shown[k].window], shown[k])
                 result[k, :, cable] = (there - shown[k].tip) / _STEPS[kind]
         return result
 

@@ -23,7 +23,7 @@ GROUPS = {
     "creep": ("creep",),
     "friction": ("friction",),
 }
-"""What may be fitted beside the moduli, and the kinds of unknowns that it means."""
+"""What may be fitted in addition to the moduli, and the kinds of unknowns that it means."""
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,8 @@ class Walk:
         self._creep, self._times = Creep(model), times
         self._weight = model.mass * STANDARD_GRAVITY
 
-    def run(self, steps: list[Step], creep: np.ndarray, beside: list[Step] | None = None) -> list[Step]:
-        """Return the steps with their results. creep (b,): ratio of each branch; beside: steps of nearly the same parameters.
+    def run(self, steps: list[Step], creep: np.ndarray, known: list[Step] | None = None) -> list[Step]:
+        """Return the steps with their results. creep (b,): ratio of each branch; known: steps of nearly the same parameters.
 
         Raises RuntimeError if there is no equilibrium.
         """
@@ -76,11 +76,11 @@ class Walk:
             self._creep.set_ratio(creep)
         done: list[Step] = []
         for number, step in enumerate(steps):
-            near = beside[number].state if beside else None
+            near = known[number].state if known else None
             done.append(self._seen(step, *self._through(step, near)))
         return done
 
-    def beside(self, step: Step, known: Step) -> np.ndarray:
+    def near(self, step: Step, known: Step) -> np.ndarray:
         """Return the tip (6,) of a step near `known`, with what the branches held in that one."""
         state = self._solve(step, known.viscous, known.state)
         if not state.converged:

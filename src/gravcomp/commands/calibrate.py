@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mass-g", type=float, metavar="G", help="weighed mass of body and payload in g: the data then tell density"
     )
     parser.add_argument(
-        "--write", metavar="YAML", help="file to write, which stands on the robot file (default: NAME-calibrated.yaml beside it)"
+        "--write", metavar="YAML", help="file to write, which stands on the robot file (default: NAME-calibrated.yaml next to it)"
     )
     parser.add_argument(
         "--out", metavar="DIR", default="reports", help="folder for the report page and its JSON (default: reports)"
@@ -289,7 +289,7 @@ def _data(args: argparse.Namespace, setup: "Setup", still: "Standstill", sweep: 
 
 
 def _groups(args: argparse.Namespace) -> set[str]:
-    """Return what is fitted beside the moduli."""
+    """Return what is fitted in addition to the moduli."""
     return {name.replace("slow-creep", "creep") for name in _KEPT if not getattr(args, f"no_{name.replace('-', '_')}")}
 
 

@@ -43,6 +43,13 @@ def on_base(document: dict, base: dict, folder: Path) -> dict:
     body = (base.get("robot") or {}).get("body")
     if isinstance(body, dict) and isinstance(body.get("file"), str):
         base = merged(base, {"robot": {"body": {"file": str(folder / body["file"])}}})
+    meshes = (base.get("scene") or {}).get("meshes")
+    if isinstance(meshes, list):
+        whole = [
+            {**mesh, "file": str(folder / mesh["file"])} if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) else mesh
+            for mesh in meshes
+        ]
+        base = {**base, "scene": {**base["scene"], "meshes": whole}}
     virtual = change.get("virtual_robot")
     if isinstance(virtual, dict) and "description" in virtual:
         base = {key: value for key, value in base.items() if key != "virtual_robot"}

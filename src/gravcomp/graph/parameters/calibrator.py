@@ -10,9 +10,7 @@ class CalibratorParameters:
     """Parameters of the node."""
 
     plan: str = parameter("", unit="path", read_only=True, description="plan from ./gravcomp calibrate --live")
-    out: str = parameter(
-        "", unit="path", read_only=True, description="CSV file of the measured poses, continued if it is there"
-    )
+    out: str = parameter("", unit="path", read_only=True, description="CSV file of the measured poses, continued if it is there")
     state_file: str = parameter(
         "", unit="path", read_only=True, description="JSON file with what to do now, rewritten as it changes; empty: none"
     )
