@@ -114,11 +114,11 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    gravity, displacement, tip, direction, number, began, middle, share = (np.array(column) for column in zip(*found))
+    gravity, displacement, tip, direction, trials, since, middle, share = (np.array(column) for column in zip(*found))
     directed = measured.tip_direction is not None and np.ptp(measured.tip_direction, axis=0).max() > 0.0
     # A tracker of positions alone publishes one and the same orientation.
     unit = direction / np.linalg.norm(direction, axis=1, keepdims=True) if directed else None
-    return StillWindows(gravity, displacement, tip, unit, History(number, began, middle, starts), share)
+    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share)
 
 
 def rests_of(trial: Measured, still: Standstill) -> list[tuple[int, int]]:

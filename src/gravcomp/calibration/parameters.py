@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,8 @@ class StaticParameters:
         at = list(index)
         values[at] = values[at] * np.exp(step) if kind == "modulus" else values[at] + step
         name = FIELDS.get(kind, kind)
-        return dataclasses.replace(self, **{name: values if np.ndim(getattr(self, name)) else float(values[0])})
+        change: dict[str, Any] = {name: values if np.ndim(getattr(self, name)) else float(values[0])}
+        return dataclasses.replace(self, **change)
 
 
 FIELDS = {"modulus": "youngs_modulus"}

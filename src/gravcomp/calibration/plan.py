@@ -249,7 +249,7 @@ def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:
 def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
     """Return the poses station by station, each next to the one before; released first, then cable by cable."""
     left, ordered = list(poses), []
-    here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll), default=None)
+    here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
     while left:
         station = [pose for pose in left if pose.station == here.station]
         ordered += sorted(station, key=lambda pose: (pose.pulled, float(pose.tension.sum())))

@@ -5,8 +5,8 @@ The table is a CSV file with one row for each pose:
     pose, inclination_deg, roll_deg, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty:
     released), tip_x_mm, tip_y_mm, tip_z_mm (in soft_base; empty until measured)
 
-Gravity is that of the planned orientation; where the IMU's is known, write that. Rows without a tip are left out. A pose counts as
-relaxed: the robot hangs there until nothing moves any more.
+Gravity is that of the planned orientation; where the IMU's is known, write that. Rows without a tip are left out. A pose
+counts as relaxed: the robot hangs there until nothing moves any more.
 """
 
 import csv

@@ -153,7 +153,7 @@ class StaticPredictor:
     def _by_place(self, parameters: StaticParameters, kind: str, shown: list[Step]) -> np.ndarray:
         """Return the derivatives (k, 6, m) by the places of the cables: only taut ones move the tip."""
         result = np.zeros((len(shown), 6, parameters.count(kind)))
-        inputs = {step.window: step for step in self._inputs(parameters) if step.window is not None}
+        inputs = [step for step in self._inputs(parameters) if step.window is not None]
         for cable in range(result.shape[2]):
             taut = [k for k, step in enumerate(shown) if step.tension[cable] > 0.0]
             if not taut:
@@ -161,7 +161,7 @@ class StaticPredictor:
             moved = parameters.changed(kind, (cable,), _STEPS[kind])
             self._set_tendons(parameters, np.stack([moved.radius, moved.angle]))
             for k in taut:
-                there = self._walk.near(inputs[shown[k].window], shown[k])
+                there = self._walk.near(inputs[k], shown[k])
                 result[k, :, cable] = (there - shown[k].tip) / _STEPS[kind]
         return result
 

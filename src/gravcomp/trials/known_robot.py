@@ -107,7 +107,8 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
             tips, directions = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
             tip, direction = Tracker().seen(setup.nominal.length, tips, directions, random)
             rows.append((gravity, command, tip.mean(axis=0), direction.mean(axis=0)))
-    return StillWindows(*(np.array(column) for column in zip(*rows)))
+    gravity, displacement, tip, direction = (np.array(column) for column in zip(*rows))
+    return StillWindows(gravity, displacement, tip, direction)
 
 
 def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...]]) -> StaticFit:
