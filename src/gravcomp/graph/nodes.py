@@ -227,6 +227,20 @@ NODES = (
         tool=True,
     ),
     Node(
+        "gravcomp_fem", "calibrator", "leads through a calibration pose by pose: pulls the cables and writes the measured tips",
+        f"{_PARAMETERS}.calibrator:CalibratorParameters",
+        subscribes=(
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2: when the base is turned as planned"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "displacements from which the cables are moved"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; another topic by `tip_topic`"),
+        ),
+        publishes=(
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "planned displacements of the cables in m"),
+            _DIAGNOSTICS,
+        ),
+        tool=True,
+    ),
+    Node(
         "gravcomp_fem", "arm_player", "simulates an arm that carries the virtual robot through poses, and measures the tip error",
         f"{_PARAMETERS}.arm_player:ArmPlayerParameters",
         subscribes=(
