@@ -73,11 +73,16 @@ class ReducedTracker:
         return self._point.strain
 
     def track(
-        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, creep: tuple[float, np.ndarray] | None = None
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        iterations: int = 4,
+        creep: tuple[float, np.ndarray] | None = None,
+        force: np.ndarray | None = None,
     ) -> ReducedState:
         """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`.
 
-        creep: of `Memory.stress`; None: the branches have relaxed.
+        creep: of `Memory.stress`; None: the branches have relaxed. force (r,): acts in addition to the weight.
         """
         stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
@@ -85,6 +90,8 @@ class ReducedTracker:
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
         wound, given = cable_arrays(cables, state.tension.size)
         weight = self.model.weight @ gravity
+        if force is not None:
+            weight = weight + force
         converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
             self._point,
