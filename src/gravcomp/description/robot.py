@@ -40,9 +40,13 @@ class Effectors:
 
 @dataclasses.dataclass(frozen=True)
 class Payload:
-    """A dead weight at the tip."""
+    """A weight that is fixed to the tip, such as a tool."""
 
     mass: float = parameter(0.0, edge="g", minimum=0.0, maximum=1e5, description="mass at the tip")
+    centre: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), edge="mm", minimum=-1000.0, maximum=1000.0,
+        description="centre of the mass from the tip, in soft_tip: z along the robot",
+    )  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,6 +13,7 @@ from gravcomp.cables.tendons import TendonState
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
 from gravcomp.full_model.motion import ExternalForce, Motion
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.rayleigh import RayleighDamping
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.viscosity import Viscosity
@@ -100,6 +101,9 @@ class DynamicSolver:
         weight = model.weight(gravity)
         if external is not None:
             weight = weight + external(last.u)
+        couple = with_payload(model, gravity, None)
+        if couple is not None:
+            weight = weight + couple.at(last.u)
         u = last.u.copy()
         velocity_0, acceleration_0 = scheme.predict(model.free(last.velocity), model.free(last.acceleration))
         # Newton starts at the displacements of the last step: a straight prediction would stretch a rotating body, and the

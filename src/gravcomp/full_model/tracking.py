@@ -22,6 +22,7 @@ from gravcomp.cables.friction import Sliding
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.turning_loads import TurningFactor, add_symmetric_part, slopes_of
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix, NotPositiveDefinite
@@ -91,6 +92,7 @@ class StaticTracker:
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
         if self.model.tendons.friction.any():
             self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement)
+        loads = with_payload(self.model, gravity / fraction, loads)
         load = _Load(self.model.weight(gravity), loads, fraction)
         if load.turns:
             self._kept = None  # it may be of other loads
@@ -104,6 +106,21 @@ class StaticTracker:
             state.converged &= state.residual <= self._allowed_residual(state, load)
         self.state = state
         return state
+
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present state.
+
+        Raises NotPositiveDefinite where the state is not stable.
+        """
+        model, state = self.model, self.state
+        self._kept = None
+        self._matrix.values[:] = 0.0
+        model.elements.assemble(state.u, self._matrix, self.viscous)
+        if state.tension.any():
+            model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
+        pulls = np.kron(model.section_rows(1.0)[0, : model.n_free, None], np.eye(3))
+        compliance: np.ndarray = pulls.T @ self._matrix.factor().solve(pulls)
+        return compliance
 
     def _newton_step(
         self,

@@ -16,6 +16,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
@@ -91,6 +92,10 @@ class ReducedServing:
         self._model.free(u)[:] = self.reduced.basis @ self._tracker.state.q
         return u
 
+    def tip_compliance(self) -> np.ndarray:
+        """As `ReducedTracker.tip_compliance`."""
+        return self._tracker.tip_compliance()
+
     def step(
         self, gravity: np.ndarray, cables: CableInput, h: float | None = None, loads: PointLoads | None = None
     ) -> Shape | None:
@@ -165,6 +170,7 @@ class ReducedServing:
     def _tracked(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> ReducedState:
         """Track the reduced model; the forces of loads that turn with their sections are those of the last shape."""
         creep = None if h is None else self._memory.stress(h)
+        loads = with_payload(self._model, gravity, loads)
         force = None if loads is None else self._loads.at(loads, self._tracker.state.q)
         return self._tracker.track(gravity, cables, iterations=10, creep=creep, force=force)
 

@@ -13,6 +13,7 @@ from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
 from gravcomp.full_model.motion import ExternalForce, Motion
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.full_model.wrench import PointLoads, Wrench
@@ -158,7 +159,9 @@ class DynamicSimulator:
         reduced = self._usable_reduced()
         if reduced is not None:
             before = reduced.state
-            motion = _advanced(reduced, gravity, cables, h, count, external=self._external(loads, reduced))
+            motion = _advanced(
+                reduced, gravity, cables, h, count, external=self._external(with_payload(self.model, gravity, loads), reduced)
+            )
             if motion.converged and reduced.model.outside(reduced.state.q) <= 1.0:
                 return motion
             reduced.state, self._wait = before, _RETURN_AFTER

@@ -138,6 +138,13 @@ class Simulator:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
 
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present shape.
+
+        Raises NotPositiveDefinite where the shape is not stable.
+        """
+        return self._serving.tip_compliance() if self._serving and self._serving.trusted else self.solver.tip_compliance()
+
     def solve(
         self,
         gravity: np.ndarray,
