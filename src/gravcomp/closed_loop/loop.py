@@ -201,7 +201,7 @@ class ClosedLoop:
         carried = None if self._load is None else self._load.wrench(gravity, self.time)
         cables = None if released else self._cables
         self.shape = shape = self._simulator.step(gravity, cables, duration=elapsed, wrench=carried)
-        self._observe_load(shape, carried)
+        self._observe_load(shape, carried, cables)
         target = self._observed(shape)
         self._cables, tension = self._released(shape) if target is None else self._compensated(shape, target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
@@ -225,13 +225,13 @@ class ClosedLoop:
                 self._load.measure_tip(measured.time, measured.position)
         return None if self._target is None else self.observer.corrected(self._target, now)
 
-    def _observe_load(self, shape: Shape, carried: Wrench | None) -> None:
-        """Pass the shape, which carries a wrench, and what the load cells measured to the observer of the load."""
+    def _observe_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
+        """Pass the shape, which carries a wrench while its winches are at wound (m,), and what the load cells measured to the observer of the load."""
         if self._load is None or not shape.is_equilibrium:
             return
         if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < 5:
             self._tip_compliance = self._simulator.tip_compliance()
-        self._load.predict(self.time, shape, self._tip_compliance, np.zeros(3) if carried is None else carried.force)
+        self._load.predict(self.time, shape, self._tip_compliance, np.zeros(3) if carried is None else carried.force, wound)
         measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
         if measured is not None:
             self._load.measure_tensions(self.time, measured)

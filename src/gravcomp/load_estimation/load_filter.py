@@ -2,19 +2,24 @@
 
 The state is x = (load, s_E, s_w, b_e, b_lambda, b_u): the load in k numbers that give the force D x, the relative errors of
 compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (friction, zeros of the
-sensors) and in the cables' displacements (backlash, stretch). All of it walks at random (Kalman 1960).
+sensors) and in the cables' displacements (backlash, stretch). All of it walks at random (Kalman 1960). As a load makes cables
+slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
 
 The errors are learnt while the robot is known to carry nothing. Afterwards they only count in the variances (Schmidt 1966): a
 load that comes must not be taken for an error, nor the robot's lag behind the model.
 """
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 
 from gravcomp.description import Limits
 from gravcomp.load_estimation.options import LoadEstimationOptions
-from gravcomp.load_estimation.sensitivity import Sensitivity
+from gravcomp.load_estimation.sensitivity import HeldRobot, Sensitivity
+
+_ITERATIONS = 6
+_SAME = 1e-3  # of the standard deviation of the load: a change that ends the iteration
 
 
 class LoadFilter:
@@ -62,61 +67,89 @@ class LoadFilter:
         return other
 
     def diffuse(self, elapsed: float, load_rate: float, tension_change: np.ndarray) -> None:
-        """Let what walks walk, for `elapsed` s. load_rate: standard deviation in 1 s; tension_change (m,) N: since the last call."""
-        k = self._k
+        """Let what walks walk, for `elapsed` s.
+
+        load_rate: standard deviation of the load in 1 s; tension_change (m,) N: since the last call.
+        """
+        k, m = self._k, self._m
         step = np.zeros(len(self.state))
         step[:k] = load_rate**2 * elapsed
         step[k + 2 : k + 5] = (self._options.drift * self._sag) ** 2 * elapsed
-        m = self._m
         step[k + 5 : k + 5 + m] = (self._options.cable_friction * tension_change) ** 2
         step[k + 5 + m :] = self._displacement**2 * np.minimum(1.0, np.abs(tension_change) / self._largest)
         self.covariance[np.diag_indices(len(step))] += step
 
     def take_tip(
-        self, residual: np.ndarray, at: Sensitivity, direction: np.ndarray, carried: np.ndarray, moved: np.ndarray
+        self, residual: np.ndarray, robot: HeldRobot, direction: np.ndarray, carried: np.ndarray, moved: np.ndarray
     ) -> float:
-        """Take a measured tip: residual (3,) m against the model that carries the force (3,) N; direction D (3, k); moved
-        (3,) m: of the model while the robot may be behind it.
+        """Take a measured tip and return the squared Mahalanobis distance from what was expected.
 
-        Returns the squared Mahalanobis distance of the residual from what was expected.
+        residual (3,) m: against the model, which carries the force (3,) N; direction D (3, k); moved (3,) m: of the model while
+        the robot may be behind it.
         """
-        k = self._k
-        rows = np.zeros((3, len(self.state)))
-        rows[:, :k] = at.tip_force @ direction
-        rows[:, k] = rows[:, k + 1] = at.tip_error
-        rows[:, k + 2 : k + 5] = np.eye(3)
-        rows[:, k + 5 + self._m :] = at.tip_cables
-        return self._take(residual + at.tip_force @ carried, rows, self._options.tip_std**2 * np.eye(3) + np.outer(moved, moved))
+        k, noise = self._k, self._options.tip_std**2 * np.eye(3) + np.outer(moved, moved)
+
+        def seen(at: Sensitivity) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            rows = np.zeros((3, len(self.state)))
+            rows[:, :k] = at.tip_force @ direction
+            rows[:, k] = rows[:, k + 1] = at.tip_error
+            rows[:, k + 2 : k + 5] = np.eye(3)
+            rows[:, k + 5 + self._m :] = at.tip_cables
+            return residual, at.tip, rows, noise
+
+        return self._take(seen, robot, direction, carried)
 
     def take_tensions(
         self,
         residual: np.ndarray,
-        at: Sensitivity,
+        robot: HeldRobot,
         direction: np.ndarray,
         carried: np.ndarray,
         moved: np.ndarray,
         tension: np.ndarray,
     ) -> float:
-        """Take measured tensions (m,) N, as `take_tip`; slack cables are left out."""
-        k, taut = self._k, at.taut
-        if not taut.any():
-            return 0.0
-        rows = np.zeros((self._m, len(self.state)))
-        rows[:, :k] = at.tension_force @ direction
-        rows[:, k], rows[:, k + 1] = at.tension_stiffness, at.tension_weight
-        rows[:, k + 5 : k + 5 + self._m] = np.eye(self._m)
-        rows[:, k + 5 + self._m :] = at.tension_cables
-        noise = np.diag((self._options.tension_noise * tension[taut]) ** 2 + self._floor**2) + np.outer(moved[taut], moved[taut])
-        return self._take((residual + at.tension_force @ carried)[taut], rows[taut], noise)
+        """Take measured tensions (m,) N, as `take_tip`; cables that should be slack are left out."""
+        k, m = self._k, self._m
+        noise = np.diag((self._options.tension_noise * tension) ** 2 + self._floor**2) + np.outer(moved, moved)
 
-    def _take(self, seen: np.ndarray, rows: np.ndarray, noise: np.ndarray) -> float:
-        innovation = seen - rows @ self.state
-        spread = rows @ self.covariance @ rows.T + noise
-        distance = float(innovation @ np.linalg.solve(spread, innovation))
-        gain = np.linalg.solve(spread, rows @ self.covariance).T
-        if not self.learning:
-            gain[self._k :] = 0.0
-        self.state = self.state + gain @ innovation
-        kept = np.eye(len(self.state)) - gain @ rows
+        def seen(at: Sensitivity) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            rows = np.zeros((m, len(self.state)))
+            rows[:, :k] = at.tension_force @ direction
+            rows[:, k], rows[:, k + 1] = at.tension_stiffness, at.tension_weight
+            rows[:, k + 5 : k + 5 + m] = np.eye(m)
+            rows[:, k + 5 + m :] = at.tension_cables
+            return residual[at.taut], at.tension[at.taut], rows[at.taut], noise[np.ix_(at.taut, at.taut)]
+
+        return self._take(seen, robot, direction, carried)
+
+    def _take(
+        self,
+        seen: Callable[[Sensitivity], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
+        robot: HeldRobot,
+        direction: np.ndarray,
+        carried: np.ndarray,
+    ) -> float:
+        """Take a measurement: residual, what the load changes of it, derivatives by the state, noise; all of the taut cables."""
+        k, start = self._k, self.state
+        state, distance = start, 0.0
+        deviation = np.sqrt(np.diag(self.load_covariance))
+        for iteration in range(_ITERATIONS):
+            residual, changed, rows, noise = seen(robot.under(direction @ state[:k] - carried))
+            if not len(residual):
+                return 0.0
+            errors = rows.copy()
+            errors[:, :k] = 0.0
+            innovation = residual - changed - errors @ state - rows @ (start - state)
+            spread = rows @ self.covariance @ rows.T + noise
+            if iteration == 0:
+                distance = float(innovation @ np.linalg.solve(spread, innovation))
+            gain = np.linalg.solve(spread, rows @ self.covariance).T
+            if not self.learning:
+                gain[k:] = 0.0
+            last, state = state, start + gain @ innovation
+            if (np.abs(state[:k] - last[:k]) <= _SAME * deviation).all():
+                break
+        self.state = state
+        kept = np.eye(len(state)) - gain @ rows
         self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
         return distance

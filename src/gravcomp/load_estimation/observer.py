@@ -1,6 +1,6 @@
 """The observer: compares tips and tensions with the model that carries the load estimated so far, and improves the estimate.
 
-    observer.predict(stamp, shape, tip_compliance, carried)   # each shape of the model, and the force that it carries
+    observer.predict(stamp, shape, tip_compliance, carried, wound)   # each shape of the model, and the force that it carries
     observer.zero(now)                                        # the robot carries nothing now: what differs is the model's error
     observer.measure_tip(stamp, position), observer.measure_tensions(stamp, tensions)
     observer.wrench(gravity, now)                             # for the next step of the model
@@ -24,7 +24,7 @@ from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.load_estimation.load_filter import LoadFilter
 from gravcomp.load_estimation.options import LoadEstimationOptions
-from gravcomp.load_estimation.sensitivity import Sensitivity, sensitivity
+from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.load_estimation.tension_check import TensionCheck
 from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.standard_gravity import STANDARD_GRAVITY
@@ -41,9 +41,9 @@ _CONSTANT = 1e5  # s: a payload changes at once or not at all
 class LoadEstimate:
     """The load at the tip.
 
-    force (3,) in N in soft_base, with covariance (3, 3); mass in kg and its standard deviation, for a payload; zeroed: the model's
-    errors were measured without load; sources: what was measured lately; sentence: what the user has to know, empty while all is
-    well.
+    force (3,) in N in soft_base, with covariance (3, 3); mass in kg and its standard deviation, for a payload; zeroed: the
+    model's errors were measured without load; sources: what was measured lately; sentence: what the user has to know, empty while
+    all is well.
     """
 
     force: np.ndarray
@@ -64,7 +64,7 @@ class _Prediction(NamedTuple):
     stamp: float
     tip: np.ndarray
     tension: np.ndarray
-    at: Sensitivity
+    robot: HeldRobot
     carried: np.ndarray
     gravity: np.ndarray
 
@@ -94,17 +94,22 @@ class LoadObserver:
     def _numbers(self) -> int:
         return 1 if self.options.kind == "payload" else 3
 
-    def predict(self, stamp: float, shape: Shape, tip_compliance: np.ndarray, carried: np.ndarray) -> None:
-        """Remember a shape of the model: stamp in s, compliance (3, 3) m/N of the tip, and the force (3,) N that it carries."""
-        at = sensitivity(shape, tip_compliance, self._rest_tip)
-        self._history.append(_Prediction(stamp, shape.tip_position, shape.cable_tension, at, carried, shape.gravity))
+    def predict(
+        self, stamp: float, shape: Shape, tip_compliance: np.ndarray, carried: np.ndarray, wound: np.ndarray | None
+    ) -> None:
+        """Remember a shape of the model: stamp in s, compliance (3, 3) m/N of the tip, and the force (3,) N that it carries.
+
+        wound (m,) m: displacements that its winches hold, None: released.
+        """
+        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip)
+        self._history.append(_Prediction(stamp, shape.tip_position, shape.cable_tension, robot, carried, shape.gravity))
         while self._history[0].stamp < stamp - _KEPT:
             self._history.popleft()
         if self._filter is None:
             sag = float(np.linalg.norm(tip_compliance @ shape.gravity)) * self._weight_of(shape, tip_compliance)
             self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
-        if not self._scale and at.taut.any():
-            strongest = float(np.linalg.norm(at.tension_force, 2))
+        if not self._scale and (shape.cable_tension > 0.0).any():
+            strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
             self._scale = self._robot.limits.tension_max / strongest
             if self.options.kind == "payload":
                 self._scale /= STANDARD_GRAVITY
@@ -129,7 +134,9 @@ class LoadObserver:
         self._diffuse(then)
         moved = then.tip - self._behind(then).tip
         direction = self._direction(then.gravity)
-        self._take("tip", then, lambda one: one.take_tip(position - then.tip, then.at, direction, then.carried, moved), _GATE_TIP)
+        self._take(
+            "tip", then, lambda one: one.take_tip(position - then.tip, then.robot, direction, then.carried, moved), _GATE_TIP
+        )
 
     def measure_tensions(self, stamp: float, tension: np.ndarray) -> None:
         """Take measured tensions (m,) N at their stamp (s). Sensors that cannot be right are named, and not used."""
@@ -145,7 +152,7 @@ class LoadObserver:
         self._take(
             "tensions",
             then,
-            lambda one: one.take_tensions(residual, then.at, direction, then.carried, moved, tension),
+            lambda one: one.take_tensions(residual, then.robot, direction, then.carried, moved, tension),
             _GATE_TENSIONS,
         )
 

@@ -87,6 +87,7 @@ def path_of(model: RobotModel) -> Path:
         materials,
         cables,
         *_payload(robot),
+        *(["max_wrench", dataclasses.asdict(robot.max_wrench)] if robot.max_wrench else []),
         *_loads(robot),
         *_disks(robot),
         *(["mean volume"] if model.elements.averaged.any() else []),
