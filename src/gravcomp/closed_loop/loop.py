@@ -3,8 +3,9 @@
     virtual robot --CAN frames--> IMU stream -> orientation filter -> simulator -> inverse problem
                   <--CAN frames-- bridge <----------------------------------------------- command
 
-All parts are those of the graph: frames, state machine of the bridge, position loops, filter. Only the middleware is missing;
-`delay` represents its latency. The ground truth of the virtual robot is recorded for evaluation and does not enter the loop.
+All parts are those of the graph: frames, state machine of the bridge, position loops, filter. A robot with `hardware.joints` has
+the bridge, controller and servos of `bridged_joints` in place of the CAN bridge. Only the middleware is missing; `delay`
+represents its latency. The ground truth of the virtual robot is recorded for evaluation and does not enter the loop.
 
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)))
     loop.release(); loop.run(4.0)
@@ -21,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
+from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.full_model.wrench import Wrench
@@ -67,18 +69,26 @@ class ClosedLoop:
         tracker: VirtualTrackerParameters | None = None,
         load: LoadEstimationOptions | None = None,
         cells: VirtualLoadCellParameters | None = None,
+        board: str = "virtual",
     ):
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
-        load; cells: load cells at the capstans; None: there is none. Raises RuntimeError where the bridge does not start.
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. Raises RuntimeError
+        where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
-            _truth(setup, warm and heating), setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion
+            _truth(setup, warm and heating),
+            setup.nominal,
+            setup.virtual_hardware,
+            seed=setup.seed,
+            motion=motion,
+            board=board,
         )
-        self._bridge = Bridge(setup.hardware, require_imu=False)
+        joints = setup.hardware.joints is not None
+        self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
@@ -226,12 +236,13 @@ class ClosedLoop:
         return None if self._target is None else self.observer.corrected(self._target, now)
 
     def _observe_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
-        """Pass the shape, which carries a wrench while its winches are at wound (m,), and what the load cells measured to the observer of the load."""
+        """Pass the shape, its wrench, the winches' displacements (m,) and the load cells' tensions to the observer."""
         if self._load is None or not shape.is_equilibrium:
             return
         if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < 5:
             self._tip_compliance = self._simulator.tip_compliance()
-        self._load.predict(self.time, shape, self._tip_compliance, np.zeros(3) if carried is None else carried.force, wound)
+        force = np.zeros(3) if carried is None else carried.force
+        self._load.predict(self.time, shape, self._tip_compliance, force, wound)
         measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
         if measured is not None:
             self._load.measure_tensions(self.time, measured)

@@ -15,11 +15,13 @@ BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
     "track": "a wrong model that a tracker of the tip corrects",
+    "loads": "external wrenches against SoRoSim; unknown payloads and tip forces that the loop has to find",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
+    "joints": "joint_bridge: malformed messages, and the loop through each kind of controller against CAN",
     "start": "the first and the second start in a new clone, start of the nodes, size of the environment",
     "soak": "a long run: lost commands, growing memory",
 }
@@ -31,8 +33,13 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
     },
+    "joints": {
+        "messages": (1_000_000, "number of malformed and hostile messages"),
+        "seed": (1, "seed of the messages and of the virtual robot"),
+    },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
+    "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
@@ -45,6 +52,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
         "--figures": ("KEY", "only these figures, by their keys in --json"),
     },
     "track": {"files": ("FILE", "robot files or shipped robots (default: article)")},
+    "loads": {"files": ("FILE", "robot files or shipped robots (default: article)")},
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
@@ -52,11 +60,13 @@ BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
     "track": {"seeds": 1},
+    "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},
     "streams": {"every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
+    "joints": {"messages": 3000, "orientations": 0},
     "start": {},
     "soak": {"minutes": 0.2},
 }

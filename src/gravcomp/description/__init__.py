@@ -26,6 +26,7 @@ from gravcomp.description.segment import Segment
 
 __all__ = [
     "BlendedOutline", "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "Fibres", "ImuMount", "Limits", "Lumen",
-    "Material", "MaxWrench", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot", "RobotFile", "Section",
-    "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments", "shipped_robots",
+    "Material", "MaxWrench", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot",
+    "RobotFile", "Section", "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments",
+    "shipped_robots",
 ]  # fmt: skip

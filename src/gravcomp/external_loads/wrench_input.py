@@ -1,7 +1,7 @@
 """Wrenches on the robot as another node knows them: checked against frame, time and the robot's limits, ramped, and dropped.
 
-The frame says both the axes and the section: in that of the tip or of a backbone point the wrench acts there and turns with it; in
-soft_base it acts on the tip in fixed axes. Any other frame is refused, unless its orientation in soft_base is known (`orient`).
+The frame says both the axes and the section: in that of the tip or of a backbone point the wrench acts there and turns with it;
+in soft_base it acts on the tip in fixed axes. Any other frame is refused, unless its orientation is known (`orient`).
 """
 
 import dataclasses

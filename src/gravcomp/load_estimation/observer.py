@@ -89,6 +89,7 @@ class LoadObserver:
         self._seen: dict[str, float] = {}
         self._outliers: dict[str, int] = {}
         self._sentence = ""
+        self._last_wrench: Wrench | None = None
 
     @property
     def _numbers(self) -> int:
@@ -168,7 +169,12 @@ class LoadObserver:
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
-        return Wrench(self._direction(gravity) @ self._applied)
+        self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
+        return self._last_wrench
+
+    def carries(self, wrenches: tuple[Wrench, ...]) -> np.ndarray:
+        """Return the force (3,) in N of the last one of a model's wrenches if it is that of `wrench`, else zeros."""
+        return wrenches[-1].force if wrenches and self._last_wrench is wrenches[-1] else np.zeros(3)
 
     def estimate(self, gravity: np.ndarray, now: float) -> LoadEstimate:
         """Return the estimate under gravity (3,) m/s^2 at `now` (s)."""

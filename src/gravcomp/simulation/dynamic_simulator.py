@@ -92,6 +92,10 @@ class DynamicSimulator:
         """The reduced model's solver while it computes the motion; None while the full model does."""
         return self._reduced if self._in_reduced else None
 
+    def tip_compliance(self) -> np.ndarray:
+        """As `Simulator.tip_compliance`, of the equilibrium toward which the robot moves."""
+        return self.statics.tip_compliance()
+
     def reset(self) -> None:
         """Return to the straight robot at rest, without gravity."""
         self.statics.reset()

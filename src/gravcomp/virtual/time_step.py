@@ -83,9 +83,9 @@ def time_step(
     """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
 
     The parameters are those of `MovingRod`; load (n + 1, 3) N acts in addition to the weights; wound_before and wound (m,) m are
-    the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one step, m/N; direction, chord and band are scratch.
-    MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step, and the caller sets the rest of the state.
+    the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one
+    step, m/N; direction, chord and band are scratch. MOST_ITERATIONS iterations mean that the iteration did not converge. If the
+    state is not possible, pose and material keep their values from before the step, and the caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
     beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))

@@ -48,14 +48,14 @@ def in_soft_base(shape: dict[str, np.ndarray], lines: tuple[str, ...], column: i
     return np.array([y, z, x])
 
 
-def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part:
-    """Compute all shapes (brief: three)."""
+def evaluate(folder: Path, progress: Callable[[str], None], brief: bool = False, count: int | None = None) -> Part:
+    """Compute all shapes, or the first `count` (brief: three)."""
     shapes = read(folder / "statics.csv")
     simulator = Simulator(Robot("rod", segments=(_ROD,), elements=_ELEMENTS), reduced=False)
     free: list[tuple] = []
     loaded: list[tuple] = []
     for number, (name, shape) in enumerate(shapes.items()):
-        if brief and number == 3:
+        if number == (3 if brief else count):
             break
         progress(f"shape {number + 1} of {len(shapes)}")
         wrenches = []
