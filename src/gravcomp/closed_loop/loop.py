@@ -31,6 +31,7 @@ from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import InverseController, Target
 from gravcomp.inverse.limits import within_limits
 from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
 from gravcomp.orientation import GravityEstimator, Problem
@@ -240,7 +241,10 @@ class ClosedLoop:
         if self._load is None or not shape.is_equilibrium:
             return
         if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < 5:
-            self._tip_compliance = self._simulator.tip_compliance()
+            try:
+                self._tip_compliance = self._simulator.tip_compliance()
+            except NotPositiveDefinite:  # the next shape may be stable
+                return
         force = np.zeros(3) if carried is None else carried.force
         self._load.predict(self.time, shape, self._tip_compliance, force, wound)
         measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
