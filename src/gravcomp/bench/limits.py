@@ -92,6 +92,15 @@ ROWS = {
         Row("robots.*.untracked_moving_mm", "base turning at 30 deg/s, without tracker: lateral RMS, worst", "mm"),
         Row("robots.*.tracked_moving_mm", "base turning at 30 deg/s, with a tracker: lateral RMS, worst", "mm"),
     ),
+    "loads": (
+        Row("wrench_error_pct", "rod under gravity and wrenches against SoRoSim: tip, worst, share of the length", "%", 0.3),
+        Row("payload_error_pct", "unknown payload, found from tensions and tracker: error, worst", "%", 10.0),
+        Row("payload_residual_mm", "the same: lateral tip error once it is found, RMS, worst", "mm", 1.0),
+        Row("payload_outside", "payloads outside the interval that is reported, all sensors", "", 0.0),
+        Row("payload_imu_frames", "IMU frames that a payload changes while an arm turns the base", ""),
+        Row("force_error_pct", "force across the tip, 0.05 to 0.5 N, tensions and tracker: error, worst", "%", 20.0),
+        Row("force_error_deg", "the same: error of its direction across the robot, worst", "deg", 15.0),
+    ),
     "estimator": (
         Row("broad_deg", "inclination: mean RMSE of five BROAD trials, larger of 95.2 Hz and full rate", "deg", 0.37),
         Row("broad_biased_deg", "inclination: RMSE with 1 deg/s of bias and a warm-up drift added", "deg"),

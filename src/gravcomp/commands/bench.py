@@ -15,6 +15,7 @@ BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
     "track": "a wrong model that a tracker of the tip corrects",
+    "loads": "external wrenches against SoRoSim; unknown payloads and tip forces that the loop has to find",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
     "board": "the board's firmware: hostile frames, dead host, failed sensor, build",
@@ -43,6 +44,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
+    "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
@@ -55,6 +57,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
         "--figures": ("KEY", "only these figures, by their keys in --json"),
     },
     "track": {"files": ("FILE", "robot files or shipped robots (default: article)")},
+    "loads": {"files": ("FILE", "robot files or shipped robots (default: article)")},
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
@@ -62,6 +65,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
     "track": {"seeds": 1},
+    "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},
     "streams": {"every": 5},
     "board": {"frames": 10_000, "every": 5},
