@@ -51,6 +51,13 @@ ROWS = {
         Row("dynamics_error_mm", "free fall of the reduced model: steps of 10 ms against 0.5 ms, worst tip error", "mm", 1.0),
         Row("dynamics_step_ms.median", "free fall of the reduced model: one step, median", "ms", 0.5),
     ),
+    "contact": (
+        Row("contact_error_pct", "tip and force of contact against closed forms, worst", "%", 0.5),
+        Row("penetration_mm", "deepest place in a rigid wall, 200 seeded scenes with motion", "mm", 0.02),
+        Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
+        Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
+        Row("lost_steps", "steps without an equilibrium, share", ""),
+    ),
     "robots": (
         Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),
         Row("robots.*.rest_error_pct", "tip without load and gravity, share of the length", "%", 1e-7),

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
+    "contact": "a robot that touches a scene: accuracy, penetration, energy, step times",
     "track": "a wrong model that a tracker of the tip corrects",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
@@ -51,6 +52,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
+    "contact": {"every": 20},
     "track": {"seeds": 1},
     "estimator": {"every": 13},
     "streams": {"every": 5},

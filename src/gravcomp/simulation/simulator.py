@@ -55,7 +55,7 @@ class Simulator:
             self.solver.contact = FullContact(self.model, scene)
         self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
-        self._serving = self.load_reduced() if reduced and not scene else None
+        self._serving = self.load_reduced() if reduced else None
 
     def load_reduced(self) -> "ReducedServing | None":
         """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""
