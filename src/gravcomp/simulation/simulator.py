@@ -103,8 +103,9 @@ class Simulator:
     ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
-        If the equilibrium is lost, it is searched for from the straight robot, but only occasionally (see `SearchPace`). If
-        none is found or searched for, the last shape is returned with the status NOT_CONVERGED.
+        If the equilibrium is lost, it is searched for in parts of the change of load, then from the straight robot, but only
+        occasionally (see `SearchPace`). If none is found or searched for, the last shape is returned with the status
+        NOT_CONVERGED.
 
         gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
         cables are released. duration: s since the last step, in which a body with creep has crept (`full_model.creep`); None:
@@ -126,11 +127,14 @@ class Simulator:
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
             state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True)
-        if not state.converged:
-            if self._pace.may_search(gravity, cables):
+        if not state.converged and self._pace.may_search(gravity, cables):
+            last, self.solver.state = self._pace.last_gravity, before
+            if last is not None:
+                state = self.solver.approach(last, gravity, cables)
+            if not state.converged:
                 state = self.solver.solve(gravity, cables)
-            else:
-                state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
+        elif not state.converged:
+            state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
         if state.converged:
             self._pace.found(gravity, cables)
         else:
