@@ -14,13 +14,13 @@ from gravcomp.simulation import RobotModel, Simulator
 G = np.array([-9.81, 0.0, 0.0])
 
 
-def forces(compliance, free, gap, friction=(), wound=(), taut=(), given=(), bend=(), rub=None):
+def forces(compliance, free, gap, friction=(), wound=(), tension=(), given=(), bend=()):
     c = len(gap)
     state = np.full(c, OPEN)
     found, change, settled = contact_forces(
         np.asarray(compliance, dtype=float), np.asarray(free, dtype=float), np.asarray(wound, dtype=float),
-        np.asarray(given, dtype=float), np.asarray(taut, dtype=bool), np.asarray(gap, dtype=float), np.zeros(c),
-        np.asarray(friction, dtype=float), np.asarray(bend, dtype=float), np.zeros((c, 2)) if rub is None else rub, state,
+        np.asarray(given, dtype=float), np.asarray(tension, dtype=float), np.asarray(gap, dtype=float), np.zeros(c),
+        np.asarray(friction, dtype=float), np.asarray(bend, dtype=float), np.zeros(c), np.zeros((c, 2)), state,
     )  # fmt: skip
     assert settled
     return found, change, state
@@ -37,7 +37,7 @@ def test_normal_forces_and_tensions_are_complementary_to_gaps_and_slack():
         m, c = 3, 6
         s = random_compliance(rng, m + c)
         free, gap, wound = rng.standard_normal(m + c), rng.uniform(0, 1, c), rng.standard_normal(m)
-        found, _, state = forces(s, free, gap, wound=wound, taut=np.zeros(m, dtype=bool))
+        found, _, state = forces(s, free, gap, wound=wound, tension=np.zeros(m))
         slack = s @ found + free + np.concatenate([-wound, gap])
         scale = np.abs(found).max()
         assert found.min() >= 0.0
@@ -56,15 +56,13 @@ def test_friction_sticks_below_its_limit_and_slides_against_the_motion_at_it():
         found, _, state = forces(s, free, gap, friction)
         moved = s @ found + free
         normal, rub, slid = found[:c], found[c:].reshape(c, 2), moved[c:].reshape(c, 2)
-        pull = np.linalg.norm(rub, axis=1)
-        assert (pull <= 0.3 * normal + 1e-4 * normal.max()).all()
+        assert (np.abs(rub) <= 0.3 * normal[:, None] + 1e-4 * normal.max()).all()
         for i in range(c):
             kinds.add(int(state[i]))
             if state[i] == STICKING:
-                assert np.linalg.norm(slid[i]) < 1e-4 * np.abs(free).max()
+                assert np.abs(slid[i]).max() < 1e-4 * np.abs(free).max()
             if state[i] == SLIDING:
-                assert rub[i] @ slid[i] < 0.0
-                assert abs(np.cross(rub[i], slid[i])) < 2e-2 * pull[i] * np.linalg.norm(slid[i]) + 1e-9
+                assert (rub[i] * slid[i] <= 1e-6 * np.abs(free).max() * normal.max()).all()
     assert kinds == {OPEN, STICKING, SLIDING}
 
 

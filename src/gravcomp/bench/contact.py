@@ -132,7 +132,7 @@ def motion(progress: Progress, every: int = 1) -> dict:
 
 
 def random_scene(seed: int, robot: Robot) -> Scene:
-    """Return one obstacle that is in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some with friction."""
+    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some with friction."""
     rng = np.random.default_rng(seed)
     length, radius = 1e3 * robot.length, 0.5e3 * robot.segments[0].outer_diameter
     place, deep = rng.uniform(0.5, 1.0) * length, rng.uniform(0.03, 0.15) * length

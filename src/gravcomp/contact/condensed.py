@@ -11,17 +11,18 @@ the forces satisfy
 
     cable:    lambda >= 0,   s = v - wound >= 0,                 lambda s = 0
     normal:   lambda >= 0,   s = gap + v + c lambda >= 0,        lambda s = 0      (c: compliance of a wall that yields)
-    friction: |t| <= mu lambda;  v_t = 0 if less, else t = -mu lambda v_t / |v_t|
+    friction: |t| <= mu lambda along each tangent;  v_t = 0 if less, else against t
 
 with v_t counted from the last equilibrium. Where an obstacle is curved, a normal force turns when the middle of the section moves
 along the tangent `around`: D = lambda x curvature. Where the gap has a minimum along the robot, the place of the force moves
 when the robot tilts there: D = -lambda / g''. These forces D v on the last rows are eliminated first.
 
-For given limits of friction, along and across the direction in which a place pulls or slides, this is a quadratic programme with
-bounds, min f^T S f / 2 + f^T v over tensions, normal forces and friction together. It is solved by a set of states, free or at a
-bound: a linear solve, after which every wrong state changes at once (J. Judice, F. Pires, 1994); when that does not make the
-wrong states fewer, one at a time (K. G. Murty, 1974), which ends for every positive definite S. Limits and directions follow
-from the normal forces and motions found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
+The limits are those of a pyramid around Coulomb's cone: exact along the two tangents, up to the root of 2 too large between them.
+With given limits the conditions are those of a quadratic programme with bounds, min f^T S f / 2 + f^T v over tensions, normal
+forces and friction together. Its states, at a bound or between, are changed all at once, with one linear solve for each change
+(J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped
+and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The
+limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
 """
 
 import numpy as np
@@ -29,22 +30,23 @@ from numba import njit
 
 OPEN, STICKING, SLIDING = 0, 1, 2
 _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among places that the model cannot move on their own
-_PATIENCE, _MOST = 6, 200  # solves without fewer wrong states before one at a time changes; solves in all
+_SWITCHES = 15  # changes of all wrong states at once
+_STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
 _SMALL = 1e-12  # m of slack that is rounding error
 _ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
 
 
 @njit(cache=True)
 def contact_forces(
-    compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, given: np.ndarray, taut: np.ndarray, gap: np.ndarray,
-    yielding: np.ndarray, friction: np.ndarray, bend: np.ndarray, rub: np.ndarray, state: np.ndarray,
+    compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, given: np.ndarray, tension: np.ndarray, gap: np.ndarray,
+    yielding: np.ndarray, friction: np.ndarray, bend: np.ndarray, pressed: np.ndarray, rub: np.ndarray, state: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, bool]:  # fmt: skip
     """Return the forces (k,) of all rows, their changes (k, m) by the tensions, and whether all conditions hold.
 
     compliance S (k, k) and free (k,): of the response. wound (m,): displacement to which each cable is pulled in, NaN: released;
-    given (m,): tensions, which take precedence, or (0,); taut (m,): first guess. gap (c,) in m; yielding (c,): m/N of the walls;
-    friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; rub (c, 2): friction in N and
-    state (c,): first guesses, the latter overwritten with the result. The changes by the tensions hold the places that
+    given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of the walls;
+    friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; pressed (c,) and rub (c, 2):
+    normal forces and friction in N, first guesses; state (c,): the result. The changes by the tensions hold the places that
     touch in contact, and those that stick at rest.
     """
     m, c = len(wound), len(gap)
@@ -73,29 +75,24 @@ def contact_forces(
         q[m + i] += gap[i]
     force = np.zeros(rows)
     low, high = np.full(rows, -np.inf), np.full(rows, np.inf)
-    side = np.zeros(rows, dtype=np.int64)
     for a in range(m):
         if len(given):
-            low[a] = high[a] = force[a] = given[a]
+            low[a] = high[a] = given[a]
         elif np.isfinite(wound[a]):
-            low[a] = 0.0
+            low[a], force[a] = 0.0, tension[a]
             q[a] -= wound[a]
-            side[a] = 0 if taut[a] else -1
         else:
             low[a] = high[a] = 0.0
     for i in range(c):
-        low[m + i] = 0.0
-        side[m + i] = -1 if state[i] == OPEN else 0
-    if rubbing:
-        settled = _rub(w, q, m, c, friction, rub, low, high, side, force, state)
-    else:
-        settled = _bounded(w, q, low, high, side, force)
+        low[m + i], force[m + i] = 0.0, pressed[i]
+    settled = _rub(w, q, m, c, friction, rub, low, high, force) if rubbing else _bounded(w, q, low, high, force)
     for i in range(c):
         k = m + c + 2 * i
-        if side[m + i]:
+        if force[m + i] <= 0.0:
             state[i] = OPEN
         else:
-            state[i] = STICKING if rubbing and high[k] > 0.0 and not side[k] and not side[k + 1] else SLIDING
+            sticks = rubbing and high[k] > 0.0 and abs(force[k]) < high[k] and abs(force[k + 1]) < high[k + 1]
+            state[i] = STICKING if sticks else SLIDING
     # Changes by the tensions.
     held = _held(m, c, rubbing, state)
     change = np.zeros((rows, m))
@@ -150,97 +147,129 @@ def _held(m: int, c: int, rubbing: bool, state: np.ndarray) -> np.ndarray:
 @njit(cache=True)
 def _rub(
     w: np.ndarray, q: np.ndarray, m: int, c: int, friction: np.ndarray, rub: np.ndarray, low: np.ndarray, high: np.ndarray,
-    side: np.ndarray, force: np.ndarray, state: np.ndarray,
+    force: np.ndarray,
 ) -> bool:  # fmt: skip
     """Find forces with friction; returns whether limits and normal forces agree. rub (c, 2): first guess of the friction."""
-    limit, direction = np.zeros((c, 2)), np.zeros((c, 2))
     for i in range(c):
-        pull, k = np.hypot(rub[i, 0], rub[i, 1]), m + c + 2 * i
         for v in range(2):
-            direction[i, v] = abs(rub[i, v]) / pull if pull > 0.0 else np.sqrt(0.5)
-            limit[i, v] = pull * direction[i, v] if friction[i] > 0.0 else 0.0
-            side[k + v] = 0 if state[i] == STICKING or pull == 0.0 else (1 if rub[i, v] > 0.0 else -1)
+            k = m + c + 2 * i + v
+            high[k], low[k] = friction[i] * force[m + i], -friction[i] * force[m + i]
+            force[k] = rub[i, v]
     change = np.inf
     for _ in range(_ROUNDS):
+        if not _bounded(w, q, low, high, force):
+            return False
+        change, largest = 0.0, 1e-300
         for i in range(c):
+            limit = friction[i] * force[m + i]
             for v in range(2):
                 k = m + c + 2 * i + v
-                high[k], low[k] = limit[i, v], -limit[i, v]
-        if not _bounded(w, q, low, high, side, force):
-            return False
-        response = q + w @ force
-        change, largest = 0.0, 0.0
-        for i in range(c):
-            k = m + c + 2 * i
-            most = friction[i] * max(force[m + i], 0.0)
-            toward = force[k : k + 2] if not side[k] and not side[k + 1] else response[k : k + 2]
-            size = np.hypot(toward[0], toward[1])
-            for v in range(2):
-                if size > _SMALL * 1e-3:
-                    direction[i, v] = 0.5 * (direction[i, v] + abs(toward[v]) / size)
-            norm = np.hypot(direction[i, 0], direction[i, 1])
-            for v in range(2):
-                following = most * direction[i, v] / norm
-                change, largest = max(change, abs(following - limit[i, v])), max(largest, most)
-                limit[i, v] = following
-        if change <= _AGREED * largest:
-            return True
-        change /= max(largest, 1e-300)
+                change, largest = max(change, abs(limit - high[k])), max(largest, limit)
+                high[k], low[k] = limit, -limit
+        change /= largest
+        if change <= _AGREED:
+            break
     return change <= _NEARLY
 
 
 @njit(cache=True)
-def _bounded(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, side: np.ndarray, force: np.ndarray) -> bool:
-    """Minimise f^T w f / 2 + q^T f within bounds; returns whether the minimum is found.
+def _bounded(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Minimise f^T w f / 2 + q^T f within bounds low, high (n,); force (n,): a guess, then the result. Returns whether found."""
+    force[:] = np.minimum(np.maximum(force, low), high)
+    start = force.copy()
+    if _switched(w, q, low, high, force):
+        return True
+    force[:] = start
+    return _lowered(w, q, low, high, force)
 
-    low, high (n,); side (n,): -1 at the low bound, 1 at the high one, 0 between: a guess, overwritten; force (n,): the result.
-    """
+
+@njit(cache=True)
+def _switched(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Look for the minimum by changing every force that is wrongly at a bound, or beyond one, at once."""
     n = len(q)
-    index = np.empty(n, dtype=np.int64)
-    fewest, waited, single = n + 1, 0, False
-    for _ in range(_MOST):
+    index, side = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for a in range(n):
+        side[a] = -1 if force[a] <= low[a] else (1 if force[a] >= high[a] else 0)
+    for _ in range(_SWITCHES):
         count = 0
         for a in range(n):
-            if low[a] == high[a]:
-                force[a] = low[a]
-            elif side[a] == 0:
+            if side[a] == 0 and low[a] < high[a]:
                 index[count] = a
                 count += 1
                 force[a] = 0.0
             else:
-                force[a] = low[a] if side[a] < 0 else high[a]
-        known = q + w @ force
-        if count:
-            block, right = np.empty((count, count)), np.empty(count)
-            for a in range(count):
-                right[a] = -known[index[a]]
-                for b in range(count):
-                    block[a, b] = w[index[a], index[b]]
-            solved = np.linalg.solve(block, right)
-            for a in range(count):
-                force[index[a]] = solved[a]
-            known = q + w @ force
-        wrong, scale = 0, np.abs(force).max() * 1e-12
+                force[a] = low[a] if side[a] < 0 or low[a] == high[a] else high[a]
+        _solve_free(w, q, index[:count], force)
+        slope = q + w @ force
+        wrong, rounding = False, 1e-12 * np.abs(force).max()
         for a in range(n):
             if low[a] == high[a]:
                 continue
             following = side[a]
             if side[a] == 0:
-                if force[a] < low[a] - scale:
-                    following = -1
-                elif force[a] > high[a] + scale:
-                    following = 1
-            elif (side[a] < 0 and known[a] < -_SMALL) or (side[a] > 0 and known[a] > _SMALL):
+                following = -1 if force[a] < low[a] - rounding else (1 if force[a] > high[a] + rounding else 0)
+            elif (side[a] < 0 and slope[a] < -_SMALL) or (side[a] > 0 and slope[a] > _SMALL):
                 following = 0
-            if following != side[a]:
-                if not (single and wrong):
-                    side[a] = following
-                wrong += 1
+            wrong |= following != side[a]
+            side[a] = following
         if not wrong:
             return True
-        if wrong < fewest:
-            fewest, waited = wrong, 0
-        else:
-            waited += 1
-            single |= waited > _PATIENCE
+    return False
+
+
+@njit(cache=True)
+def _solve_free(w: np.ndarray, q: np.ndarray, index: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces `index` for which their slopes vanish, those of the others given."""
+    count = len(index)
+    if not count:
+        return
+    known = q + w @ force
+    block, right = np.empty((count, count)), np.empty(count)
+    for a in range(count):
+        right[a] = -known[index[a]]
+        for b in range(count):
+            block[a, b] = w[index[a], index[b]]
+    solved = np.linalg.solve(block, right)
+    for a in range(count):
+        force[index[a]] += solved[a]
+
+
+@njit(cache=True)
+def _lowered(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Look for the minimum by steps that each lower the sum: slower, but they cannot go round in circles."""
+    n = len(q)
+    index = np.empty(n, dtype=np.int64)
+    allowed = _SMALL + 1e-10 * np.abs(q).max()
+    for _ in range(_STEPS):
+        slope = q + w @ force
+        for _ in range(_SWEEPS):
+            for a in range(n):
+                if low[a] < high[a]:
+                    moved = min(max(force[a] - slope[a] / w[a, a], low[a]), high[a]) - force[a]
+                    force[a] = min(max(force[a] + moved, low[a]), high[a])
+                    if moved != 0.0:
+                        for b in range(n):
+                            slope[b] += moved * w[b, a]
+        count = 0
+        for a in range(n):
+            if low[a] < force[a] < high[a]:
+                index[count] = a
+                count += 1
+        aim, slope = force.copy(), q + w @ force
+        _solve_free(w, q, index[:count], aim)
+        share = 1.0
+        for _ in range(_HALVES):
+            clipped = np.minimum(np.maximum(force + share * (aim - force), low), high)
+            change = clipped - force
+            if slope @ change + 0.5 * (change @ (w @ change)) <= 0.0:
+                force[:] = clipped
+                break
+            share *= 0.5
+        slope, left = q + w @ force, 0.0
+        for a in range(n):
+            if low[a] < high[a]:
+                inward = (force[a] <= low[a] and slope[a] > 0.0) or (force[a] >= high[a] and slope[a] < 0.0)
+                left = max(left, 0.0 if inward else abs(slope[a]))
+        if left <= allowed:
+            return True
     return False

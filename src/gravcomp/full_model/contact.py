@@ -124,8 +124,8 @@ class FullContact:
         free[:m] += state.tendons.displacement
         free[m + count : m + count + len(slid)] += slid
         force, change, self.settled = contact_forces(
-            whole, free, wound, given, state.tension > 0.0, places.gap + self.allowed,
-            yielding(arrays, self.surface, places), friction, bend, rub, held,
+            whole, free, wound, given, state.tension, places.gap + self.allowed,
+            yielding(arrays, self.surface, places), friction, bend, pressed, rub, held,
         )  # fmt: skip
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])

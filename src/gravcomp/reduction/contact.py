@@ -152,8 +152,8 @@ def tracked_touching(
             free[a] += point.tendons.displacement[a]
         free[m + count : m + count + len(slid)] += slid
         force, by_tension, settled = contact_forces(
-            whole, free, wound, given, tension > 0.0, places.gap, yielding(touching.scene, touching.surface, places), friction,
-            bend, rub, held,
+            whole, free, wound, given, tension, places.gap, yielding(touching.scene, touching.surface, places), friction,
+            bend, pressed, rub, held,
         )  # fmt: skip
         touching.pull[0] = force[m:] @ directions
         forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + count + len(slid)].copy())
