@@ -19,6 +19,7 @@ from rclpy.timer import Timer
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
@@ -48,7 +49,11 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
-        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
+        scene = self.robot_file.scene
+        if self._dynamic and scene:
+            raise ConfigError(f"{self.robot_file.source}: scene needs the mode static of fem_simulator; mode is dynamic")
+        robot = self.robot_file.robot
+        self._simulator = DynamicSimulator(robot) if self._dynamic else Simulator(robot, scene=scene)
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
         # The first step compiles functions that are not cached yet; do it before the first sample arrives.

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from gravcomp.bench.contact import scene_of, slender_rod
+from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file
+from gravcomp.inverse import ControllerCode, InverseController, Target
 from gravcomp.references.contact_beams import over_peg
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -110,7 +112,7 @@ def test_friction_holds_a_robot_that_is_pushed_along_a_wall(model):
         tips.append(np.linalg.norm(shape.contacts.position[-1] - before.contacts.position[-1]))
         assert shape.is_equilibrium
         assert shape.contacts.sliding.all() == (friction == 0.0)
-    assert tips[1] < 1e-2 * tips[0]
+    assert tips[1] < 2e-2 * tips[0]  # the robot rolls a little where it sticks
 
 
 def test_a_robot_follows_a_curved_tube_that_the_straight_robot_would_cross(model):
@@ -145,3 +147,30 @@ def test_a_rod_over_a_peg_follows_the_closed_form():
     force, tip = over_peg(weight, length, stiffness, gap, place)
     assert shape.contacts.force[:, 0].sum() == pytest.approx(force, rel=1e-2)
     assert -shape.tip_position[0] == pytest.approx(tip, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "message"),
+    [
+        ({"planes": [{"normal": [1, 0, 0], "point_mm": [-3, 0, 0]}]}, "starts 1.5 mm inside 'plane 1'"),
+        ({"tubes": [{"points_mm": [[0, 0, -10], [0, 0, 200]], "radius_mm": [9, 4]}]}, "radius of 'tube 1' is 4 mm"),
+    ],
+)
+def test_a_scene_that_leaves_no_room_for_the_robot_is_refused(model, kinds, message):
+    with pytest.raises(ConfigError, match=message):
+        in_scene(model, **kinds)
+
+
+def test_a_target_behind_a_wall_gives_the_nearest_shape_and_names_the_wall(model):
+    simulator = in_scene(model, planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
+    controller, shape = InverseController(model.robot), simulator.solve(G)
+    behind = Target(np.array([-0.02, 0.0, 0.095]))
+    for _ in range(60):
+        command = controller.step(
+            shape.response, behind, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02,
+            followed=shape.is_equilibrium, contact=shape.contacts.sentence,
+        )  # fmt: skip
+        shape = simulator.step(G, command.displacement)
+    assert command.code == ControllerCode.CONTACT
+    assert "leans on 'table' at (" in command.message
+    assert simulator.solver.contact.depth(simulator.displacements) < 2e-5

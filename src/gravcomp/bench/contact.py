@@ -41,7 +41,7 @@ def slender_rod() -> Robot:
     """Return the rod of the closed forms."""
     material = Material(law="svk", youngs_modulus=_MODULUS, poissons_ratio=0.3, density=_DENSITY)
     segment = Segment(name="rod", length=_LENGTH, outer_diameter=_DIAMETER, material=material)
-    return Robot("slender rod", segments=(segment,), elements=Elements(around=6, along=24))
+    return Robot("slender rod", segments=(segment,), elements=Elements(around=8, along=24))
 
 
 def accuracy(progress: Progress) -> dict:

@@ -20,8 +20,8 @@ when the robot tilts there: D = -lambda / g''. These forces D v on the last rows
 The limits are those of a pyramid around Coulomb's cone: exact along the two tangents, up to the root of 2 too large between them.
 With given limits the conditions are those of a quadratic programme with bounds, min f^T S f / 2 + f^T v over tensions, normal
 forces and friction together. Its states, at a bound or between, are changed all at once, with one linear solve for each change
-(J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped
-and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The
+(J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds,
+clipped and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The
 limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
 """
 
@@ -33,6 +33,7 @@ _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among pl
 _SWITCHES = 15  # changes of all wrong states at once
 _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
 _SMALL = 1e-12  # m of slack that is rounding error
+_AT_LIMIT = 1e-4  # of the limit: friction nearer to it slides
 _ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
 
 
@@ -44,7 +45,7 @@ def contact_forces(
     """Return the forces (k,) of all rows, their changes (k, m) by the tensions, and whether all conditions hold.
 
     compliance S (k, k) and free (k,): of the response. wound (m,): displacement to which each cable is pulled in, NaN: released;
-    given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of the walls;
+    given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of walls;
     friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; pressed (c,) and rub (c, 2):
     normal forces and friction in N, first guesses; state (c,): the result. The changes by the tensions hold the places that
     touch in contact, and those that stick at rest.
@@ -91,7 +92,8 @@ def contact_forces(
         if force[m + i] <= 0.0:
             state[i] = OPEN
         else:
-            sticks = rubbing and high[k] > 0.0 and abs(force[k]) < high[k] and abs(force[k + 1]) < high[k + 1]
+            most = (1.0 - _AT_LIMIT) * high[k] if rubbing else 0.0
+            sticks = rubbing and abs(force[k]) < most and abs(force[k + 1]) < most
             state[i] = STICKING if sticks else SLIDING
     # Changes by the tensions.
     held = _held(m, c, rubbing, state)

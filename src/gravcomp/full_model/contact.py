@@ -155,6 +155,7 @@ class FullContact:
             force=forces[pressed],
             gap=np.array([gap_to(self.scene.arrays, k, point, normal) for k, point in zip(row, position)]),
             sliding=state[row, station] == SLIDING,
+            names=tuple(self.scene.names[self.scene.arrays.obstacle[k]] for k in row),
         )
 
     def _keep(self, places: Places, forces: np.ndarray, pull: np.ndarray) -> None:
