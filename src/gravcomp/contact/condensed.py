@@ -21,8 +21,9 @@ The limits are those of a pyramid around Coulomb's cone: exact along the two tan
 With given limits the conditions are those of a quadratic programme with bounds, min f^T S f / 2 + f^T v over tensions, normal
 forces and friction together. Its states, at a bound or between, are changed all at once, with one linear solve for each change
 (J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds,
-clipped and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The
-limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
+clipped and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient
+steps). The limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is
+bounded.
 """
 
 import numpy as np

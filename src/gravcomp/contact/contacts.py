@@ -9,8 +9,9 @@ import numpy as np
 class Contacts:
     """c places where the robot touches, in soft_base.
 
-    obstacle (c,): number in the scene, and names (c) of them; station (c,): 0 at the base to 1 at the tip; position (c, 3) on the robot's surface in m;
-    normal (c, 3): out of the obstacle; force (c, 3) on the robot in N; gap (c,) in m; sliding (c,): whether it slides or sticks.
+    obstacle (c,): number in the scene; names (c): of the obstacles; station (c,): 0 at the base to 1 at the tip; position (c, 3)
+    on the robot's surface in m; normal (c, 3): out of the obstacle; force (c, 3) on the robot in N; gap (c,) in m; sliding (c,):
+    whether it slides or sticks.
     """
 
     obstacle: np.ndarray

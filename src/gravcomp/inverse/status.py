@@ -43,8 +43,8 @@ def evaluate(
     """Return code and message for a step.
 
     points_missed: largest predicted distance of a weighted point in m; tilt in rad; met (3, m): of `limits.limits_met`, None if
-    no limit is reached; names (m,) of the cables; tolerance (m) and tilt_tolerance (rad): up to which a target is reached; contact:
-    what the robot leans on, in words.
+    no limit is reached; names (m,) of the cables; tolerance (m) and tilt_tolerance (rad): up to which a target is reached;
+    contact: what the robot leans on, in words.
     """
     moving, at_tension, at_travel = (_listed(names, which) for which in met) if met is not None else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
