@@ -21,6 +21,7 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from gravcomp.arm.shape_chain import joint_names, joint_positions
+from gravcomp.config import ConfigError
 from gravcomp.external_loads import LivePayload
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
@@ -53,7 +54,11 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
-        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot.with_assumed_lines())
+        scene = self.robot_file.scene
+        if self._dynamic and scene:
+            raise ConfigError(f"{self.robot_file.source}: scene needs the mode static of fem_simulator; mode is dynamic")
+        robot = self.robot_file.robot.with_assumed_lines()
+        self._simulator = DynamicSimulator(robot) if self._dynamic else Simulator(robot, scene=scene)
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
         # The first step compiles functions that are not cached yet; do it before the first sample arrives.

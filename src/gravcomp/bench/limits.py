@@ -65,6 +65,13 @@ ROWS = {
         Row("image_stack_kb", "stack of the image, bound", "KB", 8.0),
         Row("emulated_residual_pct", "lateral residual with the C code as board, against the Python board", "%", 5.0),
     ),
+    "contact": (
+        Row("contact_error_pct", "tip and force of contact against closed forms, worst", "%", 0.5),
+        Row("penetration_mm", "deepest place in a rigid wall, 200 seeded scenes with motion", "mm", 0.02),
+        Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
+        Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
+        Row("lost_steps", "steps without an equilibrium, share", ""),
+    ),
     "robots": (
         Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),
         Row("robots.*.rest_error_pct", "tip without load and gravity, share of the length", "%", 1e-7),

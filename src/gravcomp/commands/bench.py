@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
+    "contact": "a robot that touches a scene: accuracy, penetration, energy, step times",
     "track": "a wrong model that a tracker of the tip corrects",
     "loads": "external wrenches against SoRoSim; unknown payloads and tip forces that the loop has to find",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
@@ -64,6 +65,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
+    "contact": {"every": 20},
     "track": {"seeds": 1},
     "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},
