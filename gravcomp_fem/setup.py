@@ -28,6 +28,7 @@ setup(
             "inverse_controller = gravcomp_fem.inverse_controller:main",
             "viewer = gravcomp_fem.viewer:main",
             "recorder = gravcomp_fem.recorder:main",
+            "calibrator = gravcomp_fem.calibrator:main",
             "arm_player = gravcomp_fem.arm_player:main",
         ],
     },

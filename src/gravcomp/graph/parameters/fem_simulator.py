@@ -3,6 +3,8 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.external_loads.options import ExternalLoadOptions
+from gravcomp.load_estimation.options import LoadEstimationOptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,3 +34,16 @@ class FemSimulatorParameters:
     joint_prefix: str = parameter("", description="prefix of the joints of shape_joints, as in the URDF", read_only=True)
     base_frame: str = parameter("soft_base", description="frame of the shape", read_only=True)
     tip_frame: str = parameter("soft_tip", description="TF frame of the tip", read_only=True)
+    payload_mass: float = parameter(
+        -1.0,
+        edge="g",
+        minimum=-1.0,
+        maximum=1e5,
+        description="payload at the tip, ramped when it changes; -1: that of the robot file",
+    )
+    external: ExternalLoadOptions = parameter(
+        default_factory=ExternalLoadOptions, description="loads of external/wrench, and how fast loads come and go"
+    )
+    load: LoadEstimationOptions = parameter(
+        default_factory=LoadEstimationOptions, description="an unknown load that is found from measured/tip and measured/tension"
+    )
