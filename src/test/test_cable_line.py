@@ -10,7 +10,7 @@ import yaml
 
 from gravcomp.calibration.apply import calibrated_robot, write_calibrated
 from gravcomp.calibration.fit import cable_compliance
-from gravcomp.calibration.statics import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.canbus.codec import encode
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
@@ -294,7 +294,7 @@ def test_a_calibration_replaces_the_described_line(tmp_path):
     )
     compliance = np.array([0.3e-3, 0.3e-3, 0.3e-3, 0.0, 0.4e-3, 0.4e-3])
     fitted = calibrated_robot(robot, StaticParameters(0.8e6, np.zeros(6), compliance))
-    write_calibrated(path, target, fitted, None)
+    write_calibrated(path, target, robot, fitted, None)
     mine = load_robot_file(target).robot
     assert cable_compliance(mine) == pytest.approx(compliance, abs=1e-6)
     assert mine.cables[0].free_length == pytest.approx(0.2)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from gravcomp.bench import robot_calibration
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
 from gravcomp.holdability import holdability
@@ -28,38 +29,48 @@ FIGURES = (
     "compliance_error_pct",
     "calibrate_s",
 )
-"""Keys of the result. Those of the calibration are None: they are not measured here yet."""
+"""Keys of the result. The last four are those of a calibration, see `robot_calibration`."""
 
 SEEDS = (1, 2, 3)
 _ORIENTATIONS = 20
 
 
-def measure(file: str, every: int = 1, progress: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
+def measure(
+    file: str, every: int = 1, progress: Callable[[str], None] = lambda _: None, *, calibrated: bool = True
+) -> dict[str, Any]:
     """Return the figures of `FIGURES`, the worst over `SEEDS`, and `seeds`: the two shares of each seed.
 
     Held: at the article's five poses and 20 random orientations of the base; moving: during the turns between them at 30 deg/s.
-    every > 1: one seed and so many times fewer random orientations. Raises ConfigError, NoEquilibrium and RuntimeError where the
-    loop does not run.
+    every > 1: one seed and so many times fewer random orientations; calibrated: calibrate as well. Raises ConfigError,
+    NoEquilibrium and RuntimeError where the loop does not run.
     """
     robot_file = load_robot_file(file)
     runs: dict[int, Residuals] = {}
+    calibrations = []
     for seed in SEEDS[:1] if every > 1 else SEEDS:
-        counted = _counted(f"{robot_file.robot.name}: loop, seed {seed}", progress)
-        runs[seed] = residuals(Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every), progress=counted)
+        setup, count = Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every)
+        runs[seed] = residuals(setup, count, progress=_counted(f"{robot_file.robot.name}: loop, seed {seed}", progress))
         progress(f"{robot_file.robot.name}: loop, seed {seed}: held {_pct(runs[seed].held, runs[seed].sag)} % of the sag")
+        if calibrated:
+            progress(f"{robot_file.robot.name}: calibration, seed {seed}")
+            calibrations.append(robot_calibration.measure(setup, count))
     progress(f"{robot_file.robot.name}: whether it can be held")
     shares = {seed: {"held_pct": _pct(run.held, run.sag), "moving_pct": _pct(run.moving, run.sag)} for seed, run in runs.items()}
-    return dict.fromkeys(FIGURES) | {
-        "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),
-        "moving_pct": max(share["moving_pct"] for share in shares.values()),
-        "held_lateral_mm": round(1e3 * max(run.held for run in runs.values()), 3),
-        "moving_lateral_mm": round(1e3 * max(run.moving for run in runs.values()), 3),
-        "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
-        "settle_s": _worst([run.settled for run in runs.values()]),
-        "unholdable": unholdable(robot_file),
-        "similarity_pct": similarity_pct(robot_file, every, progress),
-        "seeds": {str(seed): share for seed, share in shares.items()},
-    }
+    return (
+        dict.fromkeys(FIGURES)
+        | {
+            "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),
+            "moving_pct": max(share["moving_pct"] for share in shares.values()),
+            "held_lateral_mm": round(1e3 * max(run.held for run in runs.values()), 3),
+            "moving_lateral_mm": round(1e3 * max(run.moving for run in runs.values()), 3),
+            "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
+            "settle_s": _worst([run.settled for run in runs.values()]),
+            "unholdable": unholdable(robot_file),
+            "similarity_pct": similarity_pct(robot_file, every, progress),
+            "seeds": {str(seed): share for seed, share in shares.items()},
+        }
+        | (robot_calibration.worst(calibrations) if calibrations else {})
+    )
 
 
 def unholdable(file: RobotFile) -> str | None:

@@ -64,7 +64,10 @@ def build_rod(true: TrueRobot) -> RodModel:
         mass[k] += load.mass
         moment[k] += load.mass * offset
         inertia[k] += load.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    mass[-1] += robot.payload.mass
+    payload, at = robot.payload, np.array(robot.payload.centre)
+    mass[-1] += payload.mass
+    moment[-1] += payload.mass * at
+    inertia[-1] += payload.mass * (at @ at * np.eye(3) - np.outer(at, at))
     centre = moment / np.maximum(mass, 1e-300)[:, None]
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])

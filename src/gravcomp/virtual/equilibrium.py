@@ -297,6 +297,8 @@ def _energy(
         energy += preload[c] * total + 0.5 * spring[c] * stretch * stretch
     for k in range(position.shape[0]):
         for i in range(3):
-            place = position[k, i] + orientation[k, i, 0] * centre[k, 0] + orientation[k, i, 1] * centre[k, 1]
+            place = position[k, i]
+            for j in range(3):
+                place += orientation[k, i, j] * centre[k, j]
             energy -= force[k, i] * place
     return energy

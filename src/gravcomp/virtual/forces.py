@@ -291,15 +291,15 @@ def _add_load(orientation: np.ndarray, force: np.ndarray, centre: np.ndarray, re
     middle = band.shape[1] // 2
     for k in range(orientation.shape[0]):
         r = orientation[k]
-        c0, c1 = centre[k, 0], centre[k, 1]
+        c0, c1, c2 = centre[k, 0], centre[k, 1], centre[k, 2]
         f0 = r[0, 0] * force[k, 0] + r[1, 0] * force[k, 1] + r[2, 0] * force[k, 2]
         f1 = r[0, 1] * force[k, 0] + r[1, 1] * force[k, 1] + r[2, 1] * force[k, 2]
         f2 = r[0, 2] * force[k, 0] + r[1, 2] * force[k, 1] + r[2, 2] * force[k, 2]
         residual[k, 0] -= f0
         residual[k, 1] -= f1
         residual[k, 2] -= f2
-        residual[k, 3] -= c1 * f2
-        residual[k, 4] += c0 * f2
+        residual[k, 3] -= c1 * f2 - c2 * f1
+        residual[k, 4] -= c2 * f0 - c0 * f2
         residual[k, 5] -= c0 * f1 - c1 * f0
         if k > 0:
             row = 6 * (k - 1)
@@ -310,10 +310,12 @@ def _add_load(orientation: np.ndarray, force: np.ndarray, centre: np.ndarray, re
             band[row + 2, middle + 1] += f1
             band[row + 2, middle + 2] -= f0
             # Rows of the moment c x f: the columns are those of the rotation.
-            band[row + 3, middle] += c1 * f1
+            band[row + 3, middle] += c1 * f1 + c2 * f2
             band[row + 3, middle + 1] -= c1 * f0
+            band[row + 3, middle + 2] -= c2 * f0
             band[row + 4, middle - 1] -= c0 * f1
-            band[row + 4, middle] += c0 * f0
+            band[row + 4, middle] += c0 * f0 + c2 * f2
+            band[row + 4, middle + 1] -= c2 * f1
             band[row + 5, middle - 2] -= c0 * f2
             band[row + 5, middle - 1] -= c1 * f2
             band[row + 5, middle] += c0 * f0 + c1 * f1
