@@ -90,12 +90,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {
-        "truth_rate": 50.0,
-        "feedback_rate": 125,
-        "steerable": True,
-        "board": args.board,
-    } | tracker_parameters(args)
+    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True, "board": args.board} | tracker_parameters(args)
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
