@@ -13,6 +13,7 @@ setup(
         (f"share/{package}", ["package.xml"]),
         (f"share/{package}/urdf", sorted(glob("urdf/*.xacro"))),
         (f"share/{package}/config", sorted(glob("config/*"))),
+        (f"share/{package}/launch", sorted(glob("launch/*"))),
     ],
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},

@@ -220,6 +220,13 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
     _write(document, target)
 
 
+def write_mount(source: str | Path, target: str | Path, rpy: tuple[float, float, float]) -> None:
+    """Write the robot's file `source` to `target` with the mount of the IMU: roll, pitch, yaw in rad. Raises ConfigError."""
+    document = _document(source)
+    _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
+    _write(document, target)
+
+
 def _section(mapping: dict, key: str) -> dict:
     """Return the mapping under the key; create it if it is missing or empty."""
     if mapping.get(key) is None:

@@ -51,6 +51,11 @@ class RobotFile:
         scene.refuse_other_units(self.robot.length)
         return scene
 
+    @property
+    def has_joints(self) -> bool:
+        """Whether the motors are joints of a ros2_control robot."""
+        return (self.sections.get("hardware") or {}).get("joints") is not None
+
     def require_motors(self, interface: str) -> None:
         """Raise ConfigError for a file without motors on a bus (python-can's `interface`) that can carry real ones."""
         if interface not in IN_SOFTWARE and not has_motors(dict(self.sections.get("hardware") or {})):
