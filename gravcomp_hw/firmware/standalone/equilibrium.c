@@ -1,0 +1,255 @@
+#include "equilibrium.h"
+
+#include "../core/maths.h"
+#include "../core/memory.h"
+#include "complementarity.h"
+#include "tiled_matrix.h"
+
+// Displacements of the tip as fractions of the length, as in reduction/tracking.py.
+#define GC_LONGEST_STEP 0.12f
+#define GC_TOLERANCE 5e-5f
+#define GC_SLIDING_AT_REST 1e-9f  // m, or N: a change that is rounding error
+
+void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model) {
+  gc_zero(state, sizeof *state);
+  state->model = model;
+  for (uint32_t i = 0; i < model->modes; ++i) {
+    state->factor[i * (i + 1u) / 2u + i] = 1.0f;  // the stiffness at rest is the identity
+  }
+  for (uint32_t i = 0; i < model->cables; ++i) {
+    state->wound[i] = __builtin_nanf("");
+  }
+}
+
+// Update the direction in which cables with friction slide, as Sliding.after in src/gravcomp/cables/friction.py.
+static void slide(gc_equilibrium *state, const float *wound) {
+  for (uint32_t i = 0; i < state->model->cables; ++i) {
+    float change = -state->tension[i];
+    if (gc_finite(wound[i])) {
+      change = wound[i] - (gc_finite(state->wound[i]) ? state->wound[i] : state->cables.displacement[i]);
+    }
+    if (gc_abs(change) > GC_SLIDING_AT_REST) {
+      state->pulling[i] = change > 0.0f ? 1.0f : -1.0f;
+    }
+    state->wound[i] = wound[i];
+  }
+}
+
+// Return how far (m) the tip moves with a change (r,) of the coordinates.
+static float tip_motion(const gc_model *model, const float *change) {
+  float squared = 0.0f;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    const float *row = model->section_change + i * model->modes;
+    float moved = 0.0f;
+    for (uint32_t a = 0; a < model->modes; ++a) {
+      moved += row[a] * change[a];
+    }
+    squared += moved * moved;
+  }
+  return __builtin_sqrtf(squared);
+}
+
+// Write the change (r,) from q to the equilibrium of the linear model, and its tensions (m,). Returns whether there is one.
+static bool linear_step(gc_equilibrium *state, const float *gravity, const float *wound, float *change, float *tension) {
+  const gc_model *model = state->model;
+  const uint32_t r = model->modes, m = model->cables;
+  for (uint32_t a = 0; a < r; ++a) {
+    change[a] = ((model->weight[a] * gravity[0] + model->weight[r + a] * gravity[1]) + model->weight[2u * r + a] * gravity[2]) -
+                state->elasticity.force[a];
+  }
+  gc_solve(state->factor, r, change);
+  float lack[GC_CABLES_MAX];
+  bool held[GC_CABLES_MAX];
+  for (uint32_t i = 0; i < m; ++i) {
+    held[i] = gc_finite(wound[i]);
+    state->taut[i] = held[i] && state->tension[i] > 0.0f;
+    lack[i] = 0.0f;
+    if (held[i]) {
+      float moved = 0.0f;
+      for (uint32_t a = 0; a < r; ++a) {
+        moved += state->cables.jacobian[i][a] * change[a];
+      }
+      lack[i] = (wound[i] - state->cables.displacement[i]) - moved;
+    }
+  }
+  if (!gc_taut_tensions(m, (const float(*)[GC_CABLES_MAX])state->compliance, lack, held, state->taut, tension)) {
+    return false;
+  }
+  for (uint32_t i = 0; i < m; ++i) {
+    for (uint32_t a = 0; a < r; ++a) {
+      change[a] += state->answer[i][a] * tension[i];
+    }
+  }
+  return true;
+}
+
+// Assemble the next part of the stiffness at q; after the last part its factor takes the place of the old one.
+static void assemble(gc_equilibrium *state) {
+  const gc_model *model = state->model;
+  const uint32_t r = model->modes, blocks = model->strains / GC_TILE, part = state->part;
+  if (part == 0u) {
+    gc_zero(state->next, sizeof(float) * r * (r + 1u) / 2u);
+  }
+  gc_elasticity_add_stiffness(model, &state->elasticity, blocks * part / GC_STIFFNESS_PARTS,
+                              blocks * (part + 1u) / GC_STIFFNESS_PARTS, state->next);
+  gc_cables_add_stiffness(model, &state->cables, state->tension, model->pieces * part / GC_STIFFNESS_PARTS,
+                          model->pieces * (part + 1u) / GC_STIFFNESS_PARTS, state->next);
+  state->part = (part + 1u) % GC_STIFFNESS_PARTS;
+  if (state->part == 0u) {
+    float factor[GC_PAIRS_MAX];
+    if (gc_factorise(state->next, r, factor)) {
+      gc_copy(state->factor, factor, sizeof(float) * r * (r + 1u) / 2u);
+    }
+  }
+}
+
+// Evaluate forces and cables at q, and the response of the shape to the tensions.
+static void evaluate(gc_equilibrium *state) {
+  const gc_model *model = state->model;
+  const uint32_t r = model->modes, m = model->cables;
+  gc_elasticity_at(model, state->q, &state->elasticity);
+  gc_cables_at(model, state->q, state->pulling, &state->cables);
+  assemble(state);
+  for (uint32_t i = 0; i < m; ++i) {
+    gc_copy(state->answer[i], state->cables.force_jacobian[i], sizeof(float) * r);
+    gc_solve(state->factor, r, state->answer[i]);
+  }
+  for (uint32_t i = 0; i < m; ++i) {
+    for (uint32_t k = 0; k < m; ++k) {
+      float sum = i == k ? state->cables.stretch[i] : 0.0f;
+      for (uint32_t a = 0; a < r; ++a) {
+        sum += state->cables.jacobian[i][a] * state->answer[k][a];
+      }
+      state->compliance[i][k] = sum;
+    }
+  }
+  state->evaluated = true;
+}
+
+// Write what the tip's section says of position and direction, and their response, at q plus the correction.
+static void observe(const gc_equilibrium *state, gc_shape *shape) {
+  const gc_model *model = state->model;
+  const uint32_t r = model->modes, m = model->cables;
+  float section[9], moved[9][GC_CABLES_MAX];
+  for (uint32_t i = 0; i < 9u; ++i) {
+    const float *row = model->section_change + i * r;
+    float value = 0.0f;
+    for (uint32_t a = 0; a < r; ++a) {
+      value += row[a] * (state->q[a] + state->correction[a]);
+    }
+    section[i] = model->section_rest[i] + value;
+    for (uint32_t k = 0; k < m; ++k) {
+      float change = 0.0f;
+      for (uint32_t a = 0; a < r; ++a) {
+        change += row[a] * state->answer[k][a];
+      }
+      moved[i][k] = change;
+    }
+  }
+  const float *f1 = section + 3, *f2 = section + 6;
+  float d[3] = {f1[1] * f2[2] - f1[2] * f2[1], f1[2] * f2[0] - f1[0] * f2[2], f1[0] * f2[1] - f1[1] * f2[0]};
+  const float inverse = 1.0f / __builtin_sqrtf((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    d[i] *= inverse;
+    shape->tip[i] = section[i];
+    shape->direction[i] = d[i];
+  }
+  for (uint32_t k = 0; k < m; ++k) {
+    float turned[3], along = 0.0f;
+    for (uint32_t i = 0; i < 3u; ++i) {
+      const uint32_t a = (i + 1u) % 3u, b = (i + 2u) % 3u;
+      turned[i] = (moved[3u + a][k] * f2[b] - moved[3u + b][k] * f2[a]) + (f1[a] * moved[6u + b][k] - f1[b] * moved[6u + a][k]);
+      along += d[i] * turned[i];
+    }
+    for (uint32_t i = 0; i < 3u; ++i) {
+      shape->effector_compliance[i][k] = moved[i][k];
+      shape->effector_compliance[3u + i][k] = (turned[i] - d[i] * along) * inverse;
+    }
+  }
+}
+
+// Write tensions and displacements of the cables, and their compliance.
+static void describe_cables(const gc_equilibrium *state, const float *tension, gc_shape *shape) {
+  const gc_model *model = state->model;
+  for (uint32_t i = 0; i < model->cables; ++i) {
+    float moved = 0.0f;
+    for (uint32_t a = 0; a < model->modes; ++a) {
+      moved += state->cables.jacobian[i][a] * state->correction[a];
+    }
+    shape->tension[i] = tension[i];
+    shape->displacement[i] = (state->cables.displacement[i] + moved) + state->cables.stretch[i] * tension[i];
+    for (uint32_t k = 0; k < model->cables; ++k) {
+      shape->compliance[i][k] = state->compliance[i][k];
+    }
+  }
+}
+
+// Step to the new load from the last shape. Returns the motion of the tip in m, NaN where there is no step.
+static float step_to_load(gc_equilibrium *state, const float *gravity, const float *wound) {
+  const gc_model *model = state->model;
+  float change[GC_MODES_MAX], tension[GC_CABLES_MAX];
+  if (!linear_step(state, gravity, wound, change, tension)) {
+    return __builtin_nanf("");
+  }
+  const float size = tip_motion(model, change), longest = GC_LONGEST_STEP * model->settings->length;
+  if (!gc_finite(size)) {
+    return size;
+  }
+  const float share = size > longest ? longest / size : 1.0f;
+  for (uint32_t a = 0; a < model->modes; ++a) {
+    state->q[a] += share * change[a];
+  }
+  for (uint32_t i = 0; i < model->cables; ++i) {
+    state->tension[i] += share * (tension[i] - state->tension[i]);
+  }
+  return size;
+}
+
+// Whether the shape is inside the range that the model was trained for.
+static bool inside(const gc_model *model, const float *q, const float *correction) {
+  float squared = 0.0f;
+  for (uint32_t a = 0; a < model->modes; ++a) {
+    const float x = q[a] + correction[a];
+    squared += x * x;
+  }
+  return squared <= model->settings->reach * model->settings->reach;
+}
+
+void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, gc_shape *shape) {
+  const gc_model *model = state->model;
+  const float length = model->settings->length;
+  if (model->slides) {
+    slide(state, wound);
+  }
+  const float size = state->evaluated ? step_to_load(state, gravity, wound) : 0.0f;
+  float tension[GC_CABLES_MAX];
+  bool found = gc_finite(size) && inside(model, state->q, state->correction);
+  if (found) {
+    evaluate(state);
+    found = linear_step(state, gravity, wound, state->correction, tension);
+  }
+  const float corrected = found ? tip_motion(model, state->correction) : 0.0f;
+  found = found && gc_finite(corrected) && inside(model, state->q, state->correction);
+  if (!found) {
+    // Without a usable shape: back to the last equilibrium, where forces and cables are evaluated in the next call.
+    gc_copy(state->q, state->safe_q, sizeof state->q);
+    gc_copy(state->tension, state->safe_tension, sizeof state->tension);
+    gc_zero(state->correction, sizeof state->correction);
+    state->evaluated = false;
+    shape->converged = false;
+    shape->left = length;
+    return;
+  }
+  const float larger = gc_max(size, corrected);
+  shape->left = larger > 0.0f ? corrected * (corrected / larger) : 0.0f;
+  shape->converged = shape->left <= GC_TOLERANCE * length && size <= GC_LONGEST_STEP * length;
+  gc_copy(state->tension, tension, sizeof state->tension);
+  if (shape->converged) {
+    observe(state, shape);
+    describe_cables(state, tension, shape);
+    for (uint32_t a = 0; a < model->modes; ++a) {
+      state->safe_q[a] = state->q[a] + state->correction[a];
+    }
+    gc_copy(state->safe_tension, tension, sizeof state->safe_tension);
+  }
+}
