@@ -1,29 +1,54 @@
 #include "elasticity.h"
 
-// Add B q of one tile of four rows to their rows of J, and its transpose to the rows j of J. Returns the tile's end in `b`.
+// Four strains of one entry, in registers.
+typedef struct {
+  float x, y, z, w;
+} four;
+
+#define GC_INLINE static inline __attribute__((always_inline))
+
+GC_INLINE four loaded(const float *from) { return (four){from[0], from[1], from[2], from[3]}; }
+
+GC_INLINE void store(float *to, four value) {
+  to[0] = value.x;
+  to[1] = value.y;
+  to[2] = value.z;
+  to[3] = value.w;
+}
+
+// Return sum + factor b.
+GC_INLINE four added(four sum, float factor, four b) {
+  return (four){sum.x + factor * b.x, sum.y + factor * b.y, sum.z + factor * b.z, sum.w + factor * b.w};
+}
+
+// Add B q of one tile of four rows to their rows of J, and its transpose to the rows j of J. Returns the end of the tile.
 //
 // to (r, 4): J of the block; i: first row of the tile.
 static const float *tile_product(const float *restrict b, const float *restrict q, uint32_t i, float (*restrict to)[GC_TILE]) {
   const float q_0 = q[i], q_1 = q[i + 1u], q_2 = q[i + 2u], q_3 = q[i + 3u];
-  float row_0[GC_TILE] = {0.0f}, row_1[GC_TILE] = {0.0f}, row_2[GC_TILE] = {0.0f}, row_3[GC_TILE] = {0.0f};
+  four row_0 = loaded(to[i]), row_1 = loaded(to[i + 1u]), row_2 = loaded(to[i + 2u]), row_3 = loaded(to[i + 3u]);
   for (uint32_t j = 0; j < i; ++j, b += GC_TILE * GC_TILE) {
     const float q_j = q[j];
-    for (uint32_t k = 0; k < GC_TILE; ++k) {
-      const float b_0 = b[k], b_1 = b[4u + k], b_2 = b[8u + k], b_3 = b[12u + k];
-      row_0[k] += b_0 * q_j;
-      row_1[k] += b_1 * q_j;
-      row_2[k] += b_2 * q_j;
-      row_3[k] += b_3 * q_j;
-      to[j][k] += (b_0 * q_0 + b_1 * q_1) + (b_2 * q_2 + b_3 * q_3);
-    }
+    four column = loaded(to[j]), entry = loaded(b);
+    row_0 = added(row_0, q_j, entry), column = added(column, q_0, entry), entry = loaded(b + 4);
+    row_1 = added(row_1, q_j, entry), column = added(column, q_1, entry), entry = loaded(b + 8);
+    row_2 = added(row_2, q_j, entry), column = added(column, q_2, entry), entry = loaded(b + 12);
+    row_3 = added(row_3, q_j, entry), column = added(column, q_3, entry);
+    store(to[j], column);
   }
-  for (uint32_t k = 0; k < GC_TILE; ++k, ++b) {
-    to[i][k] += row_0[k] + ((b[0] * q_0 + b[4] * q_1) + (b[12] * q_2 + b[24] * q_3));
-    to[i + 1u][k] += row_1[k] + ((b[4] * q_0 + b[8] * q_1) + (b[16] * q_2 + b[28] * q_3));
-    to[i + 2u][k] += row_2[k] + ((b[12] * q_0 + b[16] * q_1) + (b[20] * q_2 + b[32] * q_3));
-    to[i + 3u][k] += row_3[k] + ((b[24] * q_0 + b[28] * q_1) + (b[32] * q_2 + b[36] * q_3));
-  }
-  return b + 36;
+  four entry = loaded(b);
+  row_0 = added(row_0, q_0, entry), entry = loaded(b + 4);
+  row_0 = added(row_0, q_1, entry), row_1 = added(row_1, q_0, entry), entry = loaded(b + 8);
+  row_1 = added(row_1, q_1, entry), entry = loaded(b + 12);
+  row_0 = added(row_0, q_2, entry), row_2 = added(row_2, q_0, entry), entry = loaded(b + 16);
+  row_1 = added(row_1, q_2, entry), row_2 = added(row_2, q_1, entry), entry = loaded(b + 20);
+  row_2 = added(row_2, q_2, entry), entry = loaded(b + 24);
+  row_0 = added(row_0, q_3, entry), row_3 = added(row_3, q_0, entry), entry = loaded(b + 28);
+  row_1 = added(row_1, q_3, entry), row_3 = added(row_3, q_1, entry), entry = loaded(b + 32);
+  row_2 = added(row_2, q_3, entry), row_3 = added(row_3, q_2, entry), entry = loaded(b + 36);
+  row_3 = added(row_3, q_3, entry);
+  store(to[i], row_0), store(to[i + 1u], row_1), store(to[i + 2u], row_2), store(to[i + 3u], row_3);
+  return b + 40;
 }
 
 void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at) {
@@ -40,51 +65,53 @@ void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at) 
     for (uint32_t i = 0; i < r; i += GC_TILE) {
       b = tile_product(b, q, i, jacobian);
     }
-    float strain[GC_TILE] = {0.0f};
+    four strain = {0.0f, 0.0f, 0.0f, 0.0f};
     for (uint32_t i = 0; i < r; ++i) {
-      const float half = 0.5f * q[i];
-      for (uint32_t k = 0; k < GC_TILE; ++k) {
-        strain[k] += half * jacobian[i][k];
-      }
+      strain = added(strain, 0.5f * q[i], loaded(jacobian[i]));
     }
     const uint32_t first = GC_TILE * block;
-    for (uint32_t k = 0; k < GC_TILE; ++k) {
-      if (first < r) {
-        jacobian[first + k][k] += 1.0f;
-        strain[k] += q[first + k];
-      }
-      at->strain[first + k] = strain[k];
+    if (first < r) {  // the strains of the coordinates themselves
+      strain.x += q[first], strain.y += q[first + 1u], strain.z += q[first + 2u], strain.w += q[first + 3u];
+      jacobian[first][0] += 1.0f, jacobian[first + 1u][1] += 1.0f;
+      jacobian[first + 2u][2] += 1.0f, jacobian[first + 3u][3] += 1.0f;
     }
+    store(at->strain + first, strain);
     for (uint32_t i = 0; i < r; ++i) {
-      at->force[i] += (jacobian[i][0] * strain[0] + jacobian[i][1] * strain[1]) +
-                      (jacobian[i][2] * strain[2] + jacobian[i][3] * strain[3]);
+      const four row = loaded(jacobian[i]);
+      at->force[i] = (((at->force[i] + row.x * strain.x) + row.y * strain.y) + row.z * strain.z) + row.w * strain.w;
     }
   }
 }
 
-// Return x . y + e . b of four strains.
-static inline float entry(const float *restrict x, const float *restrict y, const float *restrict e, const float *restrict b) {
-  return ((x[0] * y[0] + x[1] * y[1]) + (x[2] * y[2] + x[3] * y[3])) +
-         ((e[0] * b[0] + e[1] * b[1]) + (e[2] * b[2] + e[3] * b[3]));
+// Return sum + x . y + e . b of four strains.
+GC_INLINE float entry_of(float sum, four x, four y, four e, const float *b) {
+  sum = (((sum + x.x * y.x) + x.y * y.y) + x.z * y.z) + x.w * y.w;
+  return (((sum + e.x * b[0]) + e.y * b[1]) + e.z * b[2]) + e.w * b[3];
 }
 
-void gc_elasticity_add_stiffness(const gc_model *model, const gc_elasticity *at, uint32_t first, uint32_t end, float *matrix) {
-  const uint32_t r = model->modes;
-  for (uint32_t block = first; block < end; ++block) {
-    const float *b = model->quadratic + (size_t)block * (r * (r + 1u) / 2u) * GC_TILE;
+void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, float *matrix) {
+  const uint32_t r = model->modes, pairs = r * (r + 1u) / 2u;
+  const float *b = model->quadratic;
+  for (uint32_t k = 0; k < pairs; ++k) {
+    matrix[k] = 0.0f;
+  }
+  for (uint32_t block = 0; block < model->strains / GC_TILE; ++block) {
     const float(*jacobian)[GC_TILE] = at->jacobian[block];
-    const float *strain = at->strain + GC_TILE * block;
+    const four strain = loaded(at->strain + GC_TILE * block);
     float *to = matrix;
     for (uint32_t i = 0; i < r; i += GC_TILE) {
+      const four row_0 = loaded(jacobian[i]), row_1 = loaded(jacobian[i + 1u]);
+      const four row_2 = loaded(jacobian[i + 2u]), row_3 = loaded(jacobian[i + 3u]);
       for (uint32_t j = 0; j < i; ++j, b += GC_TILE * GC_TILE, to += GC_TILE) {
-        to[0] += entry(jacobian[i], jacobian[j], strain, b);
-        to[1] += entry(jacobian[i + 1u], jacobian[j], strain, b + 4);
-        to[2] += entry(jacobian[i + 2u], jacobian[j], strain, b + 8);
-        to[3] += entry(jacobian[i + 3u], jacobian[j], strain, b + 12);
+        const four column = loaded(jacobian[j]);
+        to[0] = entry_of(to[0], row_0, column, strain, b);
+        to[1] = entry_of(to[1], row_1, column, strain, b + 4);
+        to[2] = entry_of(to[2], row_2, column, strain, b + 8);
+        to[3] = entry_of(to[3], row_3, column, strain, b + 12);
       }
       for (uint32_t a = 0; a < GC_TILE; ++a) {
         for (uint32_t c = 0; c <= a; ++c, b += GC_TILE, ++to) {
-          *to += entry(jacobian[i + a], jacobian[i + c], strain, b);
+          *to = entry_of(*to, loaded(jacobian[i + a]), loaded(jacobian[i + c]), strain, b);
         }
       }
     }

@@ -13,10 +13,10 @@ typedef struct {
   float force[GC_MODES_MAX];
 } gc_elasticity;
 
-// Compute the elasticity at q (r,). Reads all of B once: 2 r^2 k multiply-adds / 2.
+// Compute the elasticity at q (r,). Reads B once.
 void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at);
 
-// Add the stiffness of the strains' blocks first <= b < end to a matrix (r, r), stored by tiles.
-void gc_elasticity_add_stiffness(const gc_model *model, const gc_elasticity *at, uint32_t first, uint32_t end, float *matrix);
+// Write the stiffness (r, r) by tiles.
+void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, float *matrix);
 
 #endif

@@ -7,7 +7,7 @@
 
 // Displacements of the tip as fractions of the length, as in reduction/tracking.py.
 #define GC_LONGEST_STEP 0.12f
-#define GC_TOLERANCE 5e-5f
+#define GC_TOLERANCE 1e-2f  // what is left at most; the next call takes it away
 #define GC_SLIDING_AT_REST 1e-9f  // m, or N: a change that is rounding error
 
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model) {
@@ -53,17 +53,17 @@ static float tip_motion(const gc_model *model, const float *change) {
 static bool linear_step(gc_equilibrium *state, const float *gravity, const float *wound, float *change, float *tension) {
   const gc_model *model = state->model;
   const uint32_t r = model->modes, m = model->cables;
+  const float(*of_load)[GC_MODES_MAX] = (const float(*)[GC_MODES_MAX])(state->answer + m);
   for (uint32_t a = 0; a < r; ++a) {
-    change[a] = ((model->weight[a] * gravity[0] + model->weight[r + a] * gravity[1]) + model->weight[2u * r + a] * gravity[2]) -
-                state->elasticity.force[a];
+    change[a] = ((of_load[0][a] * gravity[0] + of_load[1][a] * gravity[1]) + of_load[2][a] * gravity[2]) - of_load[3][a];
   }
-  gc_solve(state->factor, r, change);
   float lack[GC_CABLES_MAX];
   bool held[GC_CABLES_MAX];
+  gc_zero(lack, sizeof lack);
+  gc_zero(held, sizeof held);
   for (uint32_t i = 0; i < m; ++i) {
     held[i] = gc_finite(wound[i]);
     state->taut[i] = held[i] && state->tension[i] > 0.0f;
-    lack[i] = 0.0f;
     if (held[i]) {
       float moved = 0.0f;
       for (uint32_t a = 0; a < r; ++a) {
@@ -83,37 +83,49 @@ static bool linear_step(gc_equilibrium *state, const float *gravity, const float
   return true;
 }
 
-// Assemble the next part of the stiffness at q; after the last part its factor takes the place of the old one.
-static void assemble(gc_equilibrium *state) {
+// Solve for the answers of q to the tensions, to gravity and to the elastic forces.
+static void solve_answers(gc_equilibrium *state) {
   const gc_model *model = state->model;
-  const uint32_t r = model->modes, blocks = model->strains / GC_TILE, part = state->part;
-  if (part == 0u) {
-    gc_zero(state->next, sizeof(float) * r * (r + 1u) / 2u);
+  const uint32_t r = model->modes, m = model->cables;
+  const float *loads[GC_ANSWERS_MAX];
+  for (uint32_t i = 0; i < m; ++i) {
+    loads[i] = state->cables.force_jacobian[i];
   }
-  gc_elasticity_add_stiffness(model, &state->elasticity, blocks * part / GC_STIFFNESS_PARTS,
-                              blocks * (part + 1u) / GC_STIFFNESS_PARTS, state->next);
-  gc_cables_add_stiffness(model, &state->cables, state->tension, model->pieces * part / GC_STIFFNESS_PARTS,
-                          model->pieces * (part + 1u) / GC_STIFFNESS_PARTS, state->next);
-  state->part = (part + 1u) % GC_STIFFNESS_PARTS;
-  if (state->part == 0u) {
-    float factor[GC_PAIRS_MAX];
-    if (gc_factorise(state->next, r, factor)) {
-      gc_copy(state->factor, factor, sizeof(float) * r * (r + 1u) / 2u);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    loads[m + i] = model->weight + i * r;
+  }
+  loads[m + 3u] = state->elasticity.force;
+  for (uint32_t first = 0; first < m + 4u; first += GC_COLUMNS) {
+    float columns[GC_MODES_MAX][GC_COLUMNS];
+    const uint32_t count = m + 4u - first < GC_COLUMNS ? m + 4u - first : GC_COLUMNS;
+    for (uint32_t a = 0; a < r; ++a) {
+      for (uint32_t c = 0; c < GC_COLUMNS; ++c) {
+        columns[a][c] = c < count ? loads[first + c][a] : 0.0f;
+      }
+    }
+    gc_solve(state->factor, r, columns);
+    for (uint32_t a = 0; a < r; ++a) {
+      for (uint32_t c = 0; c < count; ++c) {
+        state->answer[first + c][a] = columns[a][c];
+      }
     }
   }
 }
 
-// Evaluate forces and cables at q, and the response of the shape to the tensions.
-static void evaluate(gc_equilibrium *state) {
+// Evaluate forces, cables and stiffness at q, and the response of the shape to the tensions. Returns false where the stiffness
+// is not positive definite.
+static bool evaluate(gc_equilibrium *state) {
   const gc_model *model = state->model;
   const uint32_t r = model->modes, m = model->cables;
+  float matrix[GC_PAIRS_MAX];
   gc_elasticity_at(model, state->q, &state->elasticity);
   gc_cables_at(model, state->q, state->pulling, &state->cables);
-  assemble(state);
-  for (uint32_t i = 0; i < m; ++i) {
-    gc_copy(state->answer[i], state->cables.force_jacobian[i], sizeof(float) * r);
-    gc_solve(state->factor, r, state->answer[i]);
+  gc_elasticity_stiffness(model, &state->elasticity, matrix);
+  gc_cables_add_stiffness(model, &state->cables, state->tension, matrix);
+  if (!gc_factorise(matrix, r, state->factor)) {
+    return false;
   }
+  solve_answers(state);
   for (uint32_t i = 0; i < m; ++i) {
     for (uint32_t k = 0; k < m; ++k) {
       float sum = i == k ? state->cables.stretch[i] : 0.0f;
@@ -123,7 +135,7 @@ static void evaluate(gc_equilibrium *state) {
       state->compliance[i][k] = sum;
     }
   }
-  state->evaluated = true;
+  return true;
 }
 
 // Write what the tip's section says of position and direction, and their response, at q plus the correction.
@@ -202,49 +214,49 @@ static float step_to_load(gc_equilibrium *state, const float *gravity, const flo
   for (uint32_t i = 0; i < model->cables; ++i) {
     state->tension[i] += share * (tension[i] - state->tension[i]);
   }
-  return size;
+  return share * size;
 }
 
-// Whether the shape is inside the range that the model was trained for.
+// Whether the shape q plus a correction, NULL: none, is inside the range that the model was trained for.
 static bool inside(const gc_model *model, const float *q, const float *correction) {
   float squared = 0.0f;
   for (uint32_t a = 0; a < model->modes; ++a) {
-    const float x = q[a] + correction[a];
+    const float x = q[a] + (correction != NULL ? correction[a] : 0.0f);
     squared += x * x;
   }
   return squared <= model->settings->reach * model->settings->reach;
 }
 
-void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, gc_shape *shape) {
+void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *wound, gc_shape *shape) {
   const gc_model *model = state->model;
   const float length = model->settings->length;
+  state->loaded = state->loaded < GC_LOADING_STEPS ? state->loaded + 1u : GC_LOADING_STEPS;
+  shape->loaded = state->loaded == GC_LOADING_STEPS;
+  const float share = (float)state->loaded / (float)GC_LOADING_STEPS;
+  const float gravity[3] = {share * full_gravity[0], share * full_gravity[1], share * full_gravity[2]};
   if (model->slides) {
     slide(state, wound);
   }
   const float size = state->evaluated ? step_to_load(state, gravity, wound) : 0.0f;
   float tension[GC_CABLES_MAX];
-  bool found = gc_finite(size) && inside(model, state->q, state->correction);
-  if (found) {
-    evaluate(state);
-    found = linear_step(state, gravity, wound, state->correction, tension);
-  }
+  bool found = gc_finite(size) && inside(model, state->q, NULL) && evaluate(state) &&
+               linear_step(state, gravity, wound, state->correction, tension);
   const float corrected = found ? tip_motion(model, state->correction) : 0.0f;
-  found = found && gc_finite(corrected) && inside(model, state->q, state->correction);
+  found = found && gc_finite(corrected);
+  state->evaluated = found;
   if (!found) {
-    // Without a usable shape: back to the last equilibrium, where forces and cables are evaluated in the next call.
+    // Without a usable shape: back to the last equilibrium, which the next call evaluates.
     gc_copy(state->q, state->safe_q, sizeof state->q);
     gc_copy(state->tension, state->safe_tension, sizeof state->tension);
-    gc_zero(state->correction, sizeof state->correction);
-    state->evaluated = false;
     shape->converged = false;
     shape->left = length;
     return;
   }
   const float larger = gc_max(size, corrected);
   shape->left = larger > 0.0f ? corrected * (corrected / larger) : 0.0f;
-  shape->converged = shape->left <= GC_TOLERANCE * length && size <= GC_LONGEST_STEP * length;
-  gc_copy(state->tension, tension, sizeof state->tension);
+  shape->converged = shape->left <= GC_TOLERANCE * length && inside(model, state->q, state->correction);
   if (shape->converged) {
+    gc_copy(state->tension, tension, sizeof state->tension);
     observe(state, shape);
     describe_cables(state, tension, shape);
     for (uint32_t a = 0; a < model->modes; ++a) {

@@ -1,21 +1,24 @@
 // Equilibrium of the reduced model under gravity and the cables' displacements, tracked with the same work at every sample.
 //
-// src/gravcomp/reduction/tracking.py takes Newton steps until the equilibrium is found. Here every call evaluates forces and
-// cables exactly at one shape, and uses a stiffness that is assembled a part at a time over the last GC_STIFFNESS_PARTS
-// calls (a chord method): first a step to the new load from the last shape, then a correction from the exact forces at the
-// shape that it reaches. The correction's size over the step's says how fast this converges, and so what is left.
+// src/gravcomp/reduction/tracking.py takes Newton steps until the equilibrium is found. Here every call takes one step to the
+// new load, evaluates forces and stiffness at the shape that it reaches, and corrects the result by a second step from there.
+// The next call starts from the evaluated shape. The size of the correction over that of the step says how fast this converges,
+// and so what is left.
 #ifndef GC_EQUILIBRIUM_H
 #define GC_EQUILIBRIUM_H
 
 #include "cables.h"
 #include "elasticity.h"
 
-#define GC_STIFFNESS_PARTS 8u
+#define GC_LOADING_STEPS 100u  // calls after a reset over which gravity rises from zero
 #define GC_EFFECTOR_ROWS 6u  // position and direction of the tip
+
+#define GC_ANSWERS_MAX (GC_CABLES_MAX + 4u)
 
 // Shape of the robot and its linear response to the tensions, as gravcomp.full_model.shape.Response.
 typedef struct {
   bool converged;                                             // false: the last equilibrium
+  bool loaded;                                                // the whole gravity acts
   float tip[3];                                               // m, soft_base
   float direction[3];                                         // of the tip
   float tension[GC_CABLES_MAX];                               // N
@@ -33,16 +36,15 @@ typedef struct {
   float q[GC_MODES_MAX];     // where forces and cables were evaluated last
   float tension[GC_CABLES_MAX];
   float correction[GC_MODES_MAX];  // from q to the equilibrium
-  float answer[GC_CABLES_MAX][GC_MODES_MAX];
+  float answer[GC_ANSWERS_MAX][GC_MODES_MAX];  // of q to unit tensions (m), to gravity (3), to the elastic forces (1)
   float compliance[GC_CABLES_MAX][GC_CABLES_MAX];
   float factor[GC_PAIRS_MAX];
-  float next[GC_PAIRS_MAX];      // stiffness that is being assembled
   float safe_q[GC_MODES_MAX];    // last equilibrium
   float safe_tension[GC_CABLES_MAX];
   float pulling[GC_CABLES_MAX];  // direction of sliding
   float wound[GC_CABLES_MAX];    // m, last input, NaN: released
   bool taut[GC_CABLES_MAX];
-  uint32_t part;   // of the stiffness, assembled next
+  uint32_t loaded;  // calls since the reset, up to GC_LOADING_STEPS
   bool evaluated;  // forces and cables belong to q
 } gc_equilibrium;
 
@@ -50,6 +52,7 @@ typedef struct {
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model);
 
 // Track the equilibrium to gravity (3,) in m/s^2 in soft_base and to cables pulled in to `wound` (m,) in m, NaN: released.
+// After a reset gravity rises from zero over GC_LOADING_STEPS calls; `loaded` of the shape is false until then.
 // Where none is found the shape is the last equilibrium, from which the next call starts.
 void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, gc_shape *shape);
 

@@ -8,7 +8,7 @@
 // Number of floats of all tables, without the numbers of the pieces' cables.
 static size_t float_count(uint32_t r, uint32_t k, uint32_t m, uint32_t s) {
   const size_t pairs = (size_t)r * (r + 1u) / 2u;
-  return pairs * k + (size_t)s * 3u * r + (3u + GC_SECTION_ROWS) * (size_t)r + GC_SECTION_ROWS + (size_t)s * 3u +
+  return pairs * (k + m) + (size_t)s * 3u * r + (3u + GC_SECTION_ROWS) * (size_t)r + GC_SECTION_ROWS + (size_t)s * 3u +
          (size_t)m * 6u + GC_SETTINGS_FLOATS;
 }
 
@@ -76,6 +76,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   gc_model opened;
   opened.modes = r, opened.strains = k, opened.cables = m, opened.pieces = s;
   opened.quadratic = next, next += (size_t)r * (r + 1u) / 2u * k;
+  opened.cable_stiffness = next, next += (size_t)r * (r + 1u) / 2u * m;
   opened.piece_change = next, next += (size_t)s * 3u * r;
   opened.weight = next, next += 3u * r;
   opened.section_change = next, next += GC_SECTION_ROWS * r;

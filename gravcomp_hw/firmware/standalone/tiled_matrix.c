@@ -51,17 +51,26 @@ bool gc_factorise(const float *matrix, uint32_t r, float *factor) {
   return true;
 }
 
-void gc_solve(const float *factor, uint32_t r, float *column) {
+void gc_solve(const float *factor, uint32_t r, float (*columns)[GC_COLUMNS]) {
   for (uint32_t i = 0; i < r; ++i) {
     const float *row = factor + i * (i + 1u) / 2u;
-    column[i] = (column[i] - dot(row, column, i)) * row[i];
+    float x = columns[i][0], y = columns[i][1], z = columns[i][2], w = columns[i][3];
+    for (uint32_t j = 0; j < i; ++j) {
+      const float l = row[j];
+      x -= l * columns[j][0], y -= l * columns[j][1], z -= l * columns[j][2], w -= l * columns[j][3];
+    }
+    const float inverse = row[i];
+    columns[i][0] = x * inverse, columns[i][1] = y * inverse, columns[i][2] = z * inverse, columns[i][3] = w * inverse;
   }
   for (uint32_t i = r; i-- > 0u;) {
-    const float *row = factor + i * (i + 1u) / 2u;
-    const float x = column[i] * row[i];
-    column[i] = x;
-    for (uint32_t j = 0; j < i; ++j) {
-      column[j] -= row[j] * x;
+    const float *entry = factor + i * (i + 1u) / 2u + i;
+    const float inverse = *entry;
+    float x = columns[i][0], y = columns[i][1], z = columns[i][2], w = columns[i][3];
+    for (uint32_t k = i + 1u; k < r; ++k) {
+      entry += k;
+      const float l = *entry;
+      x -= l * columns[k][0], y -= l * columns[k][1], z -= l * columns[k][2], w -= l * columns[k][3];
     }
+    columns[i][0] = x * inverse, columns[i][1] = y * inverse, columns[i][2] = z * inverse, columns[i][3] = w * inverse;
   }
 }

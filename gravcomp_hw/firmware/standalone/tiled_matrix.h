@@ -9,7 +9,8 @@
 // inverses of its diagonal in their places. Returns false where A is not positive definite; `factor` is then undefined.
 bool gc_factorise(const float *matrix, uint32_t r, float *factor);
 
-// Replace the column b (r,) by A^-1 b.
-void gc_solve(const float *factor, uint32_t r, float *column);
+// Replace the columns B (r, GC_COLUMNS) by A^-1 B. The columns of a row are handled together: the factor is read once.
+#define GC_COLUMNS 4u
+void gc_solve(const float *factor, uint32_t r, float (*columns)[GC_COLUMNS]);
 
 #endif

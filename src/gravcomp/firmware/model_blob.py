@@ -36,8 +36,9 @@ def truncated(model: ReducedModel, modes: int) -> ReducedModel:
         model,
         basis=model.basis[:, :modes],
         coordinates_of=model.coordinates_of[:modes],
-        force_norm=model.force_norm[:modes, :modes],
+        force_norm=np.ascontiguousarray(model.force_norm[:modes, :modes]),
         elasticity=elasticity,
+        deviation=model.deviation._replace(gradient=np.ascontiguousarray(model.deviation.gradient[:modes])),
         weight=model.weight[:modes],
         cables=model.cables._replace(change=np.ascontiguousarray(model.cables.change[:, :modes])),
         section_change=np.ascontiguousarray(model.section_change[..., :modes]),
@@ -57,6 +58,7 @@ def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension:
     missing = -linear.shape[1] % TILE
     tables = (
         _by_tiles(np.pad(quadratic, ((0, 0), (0, missing))), modes),
+        _cable_stiffness(model)[:, _tile_order(modes)],
         cables.change,
         model.weight.T,
         model.section_change[-1].reshape(9, modes),
@@ -85,16 +87,32 @@ def with_crc(blob: bytes) -> bytes:
 
 def blob_bytes(modes: int, strains: int, cables: int, pieces: int, settings: int) -> int:
     """Return the number of bytes of a blob with these counts."""
-    floats = modes * (modes + 1) // 2 * strains + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces + 6 * cables + settings
+    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces + 6 * cables + settings
     return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
+
+
+def _cable_stiffness(model: ReducedModel) -> np.ndarray:
+    """Return the stiffness (m, r (r + 1) / 2) of each cable under unit tension at rest, without the part along its pieces."""
+    cables, modes = model.cables, model.size
+    change = cables.change.reshape(-1, 3, modes) / np.sqrt(np.linalg.norm(cables.rest, axis=1))[:, None, None]
+    whole = np.zeros((len(cables.rest_length), modes, modes))
+    for i in range(len(whole)):
+        rows = change[cables.cable == i].reshape(-1, modes)
+        whole[i] = rows.T @ rows
+    return whole[(slice(None), *np.tril_indices(modes))]
 
 
 def _by_tiles(quadratic: np.ndarray, modes: int) -> np.ndarray:
     """Return B^T (r (r + 1) / 2, k), its rows in the order of the tiles, by blocks of four strains."""
+    order = _tile_order(modes)
+    return quadratic[order].reshape(len(order), -1, TILE).transpose(1, 0, 2)
+
+
+def _tile_order(modes: int) -> list[int]:
+    """Return the positions, row by row in a lower triangle, of the entries in the order of the tiles."""
     order = []
     for first in range(0, modes, TILE):
         rows = range(first, first + TILE)
         order += [i * (i + 1) // 2 + j for j in range(first) for i in rows]
         order += [i * (i + 1) // 2 + j for i in rows for j in range(first, i + 1)]
-    tiles = quadratic[order]
-    return tiles.reshape(len(order), -1, TILE).transpose(1, 0, 2)
+    return order
