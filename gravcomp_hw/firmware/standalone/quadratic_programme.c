@@ -7,6 +7,7 @@
 #define GC_ACTIVE_MAX GC_BOUNDS_MAX
 #define GC_ELASTIC 1e-4f   // inverse cost of a row's violation, as the inverse problem's on the host
 #define GC_MISSED 2e-5f    // a bound that is missed by less is kept
+#define GC_FARTHEST 1e12f  // a multiplier that may grow so far belongs to bounds that contradict one another
 #define GC_DEPENDENT 1e-6f // of its square: what is left of a bound's row that depends on the others
 
 // The problem in v = L^T y + L^-1 g: |v| is least under lower <= m v <= upper.
@@ -68,25 +69,52 @@ static bool set_up(const gc_programme *programme, distance_problem *p) {
   return true;
 }
 
-// Write the multipliers (count,) with which all active bounds hold. Returns false where their rows depend on one another.
-static bool multipliers(const distance_problem *p, const active_set *active, float elastic, float *wanted) {
+// What `multipliers` found.
+typedef enum { INDEPENDENT, LAST_DEPENDS, DEPENDENT } dependence;
+
+// Return the scalar product of two active bounds' rows, with what an elastic bound gives way.
+static float gram(const distance_problem *p, const active_set *active, uint32_t a, uint32_t b, float elastic) {
+  const uint32_t i = active->which[a], k = active->which[b];
+  float sum = 0.0f;
+  for (uint32_t c = 0; c < p->n; ++c) {
+    sum += p->m[i][c] * p->m[k][c];
+  }
+  return active->side[a] * active->side[b] * sum + (a == b && i >= p->n ? elastic : 0.0f);
+}
+
+// Replace b (count,) by the solution of L^T x = b.
+static void backward(uint32_t count, const float (*factor)[GC_ACTIVE_MAX], float *b) {
+  for (uint32_t a = count; a-- > 0u;) {
+    for (uint32_t c = a + 1u; c < count; ++c) {
+      b[a] -= factor[c][a] * b[c];
+    }
+    b[a] /= factor[a][a];
+  }
+}
+
+// Write the multipliers (count,) with which all active bounds hold. Where the row of the last one depends on the others, write
+// the change of the multipliers that leaves v as it is and raises that of the last one by 1.
+static dependence multipliers(const distance_problem *p, const active_set *active, float elastic, float *wanted) {
   float factor[GC_ACTIVE_MAX][GC_ACTIVE_MAX];
   for (uint32_t a = 0; a < active->count; ++a) {
     const uint32_t i = active->which[a];
-    const float bound = active->side[a] > 0.0f ? p->upper[i] : -p->lower[i];
-    float right = -bound;
+    float right = active->side[a] > 0.0f ? -p->upper[i] : p->lower[i];
     for (uint32_t b = 0; b <= a; ++b) {
-      const uint32_t k = active->which[b];
-      float left = a == b && i >= p->n ? elastic : 0.0f;
-      for (uint32_t c = 0; c < p->n; ++c) {
-        left += (active->side[a] * p->m[i][c]) * (active->side[b] * p->m[k][c]);
-      }
-      const float whole = left;
+      const float whole = gram(p, active, a, b, elastic);
+      float left = whole;
       for (uint32_t c = 0; c < b; ++c) {
         left -= factor[a][c] * factor[b][c];
       }
       if (a == b && !(left > GC_DEPENDENT * whole)) {
-        return false;
+        if (a + 1u < active->count) {
+          return DEPENDENT;
+        }
+        for (uint32_t c = 0; c < a; ++c) {
+          wanted[c] = -factor[a][c];
+        }
+        backward(a, (const float(*)[GC_ACTIVE_MAX])factor, wanted);
+        wanted[a] = 1.0f;
+        return LAST_DEPENDS;
       }
       factor[a][b] = a == b ? gc_sqrt(left) : left / factor[b][b];
     }
@@ -95,33 +123,25 @@ static bool multipliers(const distance_problem *p, const active_set *active, flo
     }
     wanted[a] = right / factor[a][a];
   }
-  for (uint32_t a = active->count; a-- > 0u;) {
-    for (uint32_t b = a + 1u; b < active->count; ++b) {
-      wanted[a] -= factor[b][a] * wanted[b];
-    }
-    wanted[a] /= factor[a][a];
-  }
-  return true;
+  backward(active->count, (const float(*)[GC_ACTIVE_MAX])factor, wanted);
+  return INDEPENDENT;
 }
 
-// Go toward the wanted multipliers until one becomes negative, and release that bound. Returns false where none does.
-static bool released(active_set *active, const float *wanted) {
-  float share = 1.0f;
+// Change the multipliers along `change` until one becomes 0, at most by `share` of it, and release that bound. Returns false
+// where none does.
+static bool released(active_set *active, const float *change, float share) {
   uint32_t blocking = active->count;
   for (uint32_t a = 0; a < active->count; ++a) {
-    if (wanted[a] < 0.0f) {
-      const float reach = active->multiplier[a] / (active->multiplier[a] - wanted[a]);
-      if (blocking == active->count || reach < share) {
-        share = reach;
-        blocking = a;
-      }
+    if (active->multiplier[a] + share * change[a] < 0.0f) {
+      share = active->multiplier[a] / -change[a];
+      blocking = a;
     }
   }
   if (blocking == active->count) {
     return false;
   }
   for (uint32_t a = 0; a < active->count; ++a) {
-    active->multiplier[a] = gc_max(0.0f, active->multiplier[a] + share * (wanted[a] - active->multiplier[a]));
+    active->multiplier[a] = gc_max(0.0f, active->multiplier[a] + share * change[a]);
   }
   --active->count;
   for (uint32_t a = blocking; a < active->count; ++a) {
@@ -180,14 +200,21 @@ static bool missed(const distance_problem *p, active_set *active, float elastic,
 // Solve with bounds of the rows that give way by `elastic`, 0: that do not. Returns false where they contradict one another
 // or the steps do not suffice.
 static bool solved(const distance_problem *p, float elastic, active_set *active, float *v, uint32_t *steps) {
-  float wanted[GC_ACTIVE_MAX];
+  float wanted[GC_ACTIVE_MAX], change[GC_ACTIVE_MAX];
   active->count = 0;
   for (uint32_t step = 0; step < GC_QP_STEPS_MAX; ++step) {
     ++*steps;
-    if (!multipliers(p, active, elastic, wanted)) {
-      return false;
+    const dependence found = multipliers(p, active, elastic, wanted);
+    if (found == LAST_DEPENDS && released(active, wanted, GC_FARTHEST)) {
+      continue;
     }
-    if (released(active, wanted)) {
+    if (found != INDEPENDENT) {
+      return false;  // the bounds contradict one another
+    }
+    for (uint32_t a = 0; a < active->count; ++a) {
+      change[a] = wanted[a] - active->multiplier[a];
+    }
+    if (released(active, change, 1.0f)) {
       continue;
     }
     gc_copy(active->multiplier, wanted, sizeof(float) * active->count);
