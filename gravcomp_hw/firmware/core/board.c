@@ -10,7 +10,7 @@
 #define DRIVE_PERIOD 2000u     // us, of the board's own loops
 #define ZERO_PERIOD 10000u     // us between two frames of zeros
 #define ZERO_TIME 1000000u     // us for which a board on the motors' bus sends zeros after its host has died
-#define LATEST_IMU 150000u     // us without a sample after which the loop on the board holds
+#define START_TIME 1000000u    // us; the motors' controllers start meanwhile
 #define TWIN_FRAMES 3u         // whole frames of another board
 #define TWIN_TIME 1000000u     // us without such frames until they are forgotten
 #define MOTORS_A_FRAME 4u
@@ -107,7 +107,7 @@ static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *
     }
   }
   const bool free = board->state == GC_IDLE || board->state == GC_RELEASED || board->state == GC_HOLDING;
-  if (free) {
+  if (free && !board->supply_low) {
     gc_board_enter(board, GC_FOLLOWING);
   }
   if (board->state == GC_FOLLOWING && is_between(board)) {
@@ -163,7 +163,7 @@ static void take_from_host(gc_board *board, const gc_frame *frame) {
     }
   } else if (frame->id >= GC_ID_MODEL_FIRST && frame->id <= GC_ID_MODEL_LAST && board->receiver != NULL) {
     gc_frame reply;
-    if (board->receiver(board->controller_context, frame, &reply)) {
+    if (board->receiver(board->receiver_context, frame, &reply)) {
       gc_queue_put(&board->queues[0], &reply);
     }
   } else {
@@ -204,22 +204,36 @@ void gc_board_sample(gc_board *board, const gc_sample *sample) {
       gc_queue_put(&board->queues[0], &frames[i]);
     }
   }
-  if (board->state != GC_STANDALONE || board->controller == NULL) {
-    return;
+  if (board->state == GC_STANDALONE) {
+    board->job = own;
+    board->job_waits = true;
   }
-  float displacement[GC_MOTORS_MOST] = {0.0f};
-  float tension[GC_MOTORS_MOST] = {0.0f};
-  if (!board->controller(board->controller_context, &own, motors_present(board), displacement, tension)) {
-    return;
-  }
+}
+
+bool gc_board_job(gc_board *board, gc_sample *sample) {
+  const bool waits = board->job_waits;
+  *sample = board->job;
+  board->job_waits = false;
+  return waits;
+}
+
+void gc_board_targets(gc_board *board, const float *displacement, const float *tension) {
+  const float least = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MIN);
+  const float most = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MAX);
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    if (is_present(board, index) && gc_finite(displacement[index]) && gc_finite(tension[index])) {
-      const float least = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MIN);
-      const float most = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MAX);
+    const bool usable = gc_finite(displacement[index]) && gc_finite(tension[index]);
+    if (board->state == GC_STANDALONE && is_present(board, index) && usable) {
       board->motors[index].target = gc_clamp(displacement[index], least, most);
       board->motors[index].tension = tension[index];
     }
   }
+}
+
+void gc_board_supply(gc_board *board, bool low) {
+  if (low && !board->supply_low && board->state != GC_IDLE && board->state != GC_FAULT) {
+    gc_board_enter(board, GC_RELEASED);
+  }
+  board->supply_low = low;
 }
 
 void gc_board_bus_off(gc_board *board, uint32_t bus, bool off) {
@@ -321,7 +335,7 @@ static void finish_homing(gc_board *board) {
     board->faults |= GC_FAULT_HOMING;
     gc_board_enter(board, GC_FAULT);
   } else if (board->homing.phase == GC_HOMED) {
-    if (gc_parameter_int(&board->parameters, GC_AT_START) == 1 && board->controller != NULL) {
+    if (gc_parameter_int(&board->parameters, GC_AT_START) == 1 && board->has_controller) {
       gc_board_run(board);
     } else {
       board->went_silent = false;  // held until the host takes over
@@ -383,6 +397,7 @@ uint16_t gc_board_faults(const gc_board *board) {
   faults |= board->heater.hot ? (uint32_t)GC_FAULT_HOT : 0u;
   faults |= board->went_silent ? (uint32_t)GC_FAULT_HOST : 0u;
   faults |= board->bus_off[0] || board->bus_off[1] ? (uint32_t)GC_FAULT_BUS : 0u;
+  faults |= board->supply_low ? (uint32_t)GC_FAULT_SUPPLY : 0u;
   faults |= is_twin(board) ? (uint32_t)GC_FAULT_TWIN : 0u;
   return (uint16_t)faults;
 }
@@ -399,6 +414,21 @@ static void send_state(gc_board *board) {
   gc_queue_put(&board->queues[0], &frame);
   board->passing = 0u;
   board->clamped = 0u;
+}
+
+// The robot without a PC begins when its motors answer.
+static void begin_alone(gc_board *board) {
+  if (board->begun || gc_parameter_int(&board->parameters, GC_AT_START) != 1 || board->now < START_TIME) {
+    return;
+  }
+  bool all = motors_present(board) != 0u;
+  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
+    all = all && (!is_present(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
+  }
+  if (all && !board->supply_low && board->state != GC_FAULT) {
+    board->begun = true;
+    gc_board_home(board);
+  }
 }
 
 static void watch_twin(gc_board *board) {
@@ -418,6 +448,9 @@ void gc_board_tick(gc_board *board, uint32_t now) {
   board->now = now;
   gc_imu_watch(&board->imu, now);
   gc_heater_tick(&board->heater, &board->parameters, now);
+  if (board->supply_low) {
+    board->heater.duty = 0u;
+  }
   watch_motors(board);
   watch_host(board);
   const bool own = board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
@@ -435,6 +468,7 @@ void gc_board_tick(gc_board *board, uint32_t now) {
       gc_board_enter(board, GC_IDLE);
     }
   }
+  begin_alone(board);
   watch_twin(board);
   watch_queues(board);
   if ((int32_t)(now - board->next_status) >= 0) {

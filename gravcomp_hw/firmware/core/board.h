@@ -47,7 +47,7 @@ enum {
   GC_FAULT_TWIN = 0x0200,          // another board sends the same frames
   GC_FAULT_PARAMETERS = 0x0400,    // no stored parameters: defaults
   GC_FAULT_WATCHDOG = 0x0800,      // the last reset came from the watchdog
-  GC_FAULT_SUPPLY = 0x1000,        // the last reset came from the supply
+  GC_FAULT_SUPPLY = 0x1000,        // the supply is too low, or caused the last reset
   GC_FAULT_MODEL = 0x2000,         // no whole model on the board
   GC_FAULT_HOMING = 0x4000,        // homing failed
   GC_FAULT_FRAMES = 0x8000,        // frames were lost because a queue was full
@@ -57,7 +57,8 @@ enum { GC_RESET_POWER, GC_RESET_SUPPLY, GC_RESET_WATCHDOG, GC_RESET_SOFTWARE, GC
 
 #define GC_BUSES 2u
 
-// Computes targets (m) and expected tensions (N) of the motors, whose bits are in `motors`, from a sample; false: hold.
+// The loop on the board: targets (m) and expected tensions (N) of the motors, whose bits are in `motors`, from a sample; false:
+// hold. A board calls it below its interrupts, between gc_board_job and gc_board_targets.
 typedef bool gc_controller(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
 
 // Takes a frame of the host for the controller; true when `reply` is to be sent.
@@ -69,9 +70,9 @@ typedef struct {
   uint32_t unique_id[3];
   uint32_t image_check;
   uint8_t reset_cause;
-  gc_controller *controller;
+  bool has_controller;  // the loop on the board is there
   gc_receiver *receiver;
-  void *controller_context;
+  void *receiver_context;
 
   uint32_t now;  // us
   gc_state state;
@@ -86,6 +87,7 @@ typedef struct {
   bool bus_off[GC_BUSES];
   bool host_seen;
   bool went_silent;     // the host has stopped
+  bool begun;           // the robot without a PC has begun to home
   uint32_t host_time;   // us, of the last currents
   uint32_t sent;        // us, of the last currents to the motors
   bool pending;         // the host's currents wait for the next tick
@@ -96,13 +98,16 @@ typedef struct {
   uint32_t next_state;
   uint32_t rejected;  // frames with a wrong length or check
   uint32_t slowest;   // us, longest tick, measured by the board
+  bool supply_low;    // the supply is below its limit
+  bool job_waits;     // the loop on the board has a sample to work on
+  gc_sample job;
   uint32_t dropped;   // frames that found a queue full
   uint8_t clamped;    // motors whose current was limited since the last BoardState
   bool restart;       // a restart was requested
 } gc_board;
 
-// Begin with the stored parameters. The caller has set storage, unique_id, image_check, reset_cause and controller; the rest of
-// the memory is zero. Where `storage.erase` is NULL the defaults count.
+// Begin with the stored parameters. The caller has set storage, unique_id, image_check, reset_cause, has_controller and
+// receiver; the rest of the memory is zero. Where `storage.erase` is NULL the defaults count.
 void gc_board_start(gc_board *board);
 
 // Advance to `now` (us); called each GC_TICK.
@@ -113,6 +118,15 @@ void gc_board_receive(gc_board *board, uint32_t bus, const gc_frame *frame);
 
 // Take a sample of the IMU: counts, temperature and stamp are set.
 void gc_board_sample(gc_board *board, const gc_sample *sample);
+
+// Give the sample that the loop on the board has to work on; false when there is none.
+bool gc_board_job(gc_board *board, gc_sample *sample);
+
+// Take the result for eight motors, as of gc_controller.
+void gc_board_targets(gc_board *board, const float *displacement, const float *tension);
+
+// Take note that the supply is too low, or enough again: no current and no heater meanwhile.
+void gc_board_supply(gc_board *board, bool low);
 
 // Take note that a bus is off, or on again.
 void gc_board_bus_off(gc_board *board, uint32_t bus, bool off);

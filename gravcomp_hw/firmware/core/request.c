@@ -151,7 +151,7 @@ static uint8_t run(gc_board *board) {
   if ((board->state != GC_HOLDING || board->homing.phase != GC_HOMED) && drives(board)) {
     return GC_WRONG_STATE;
   }
-  if (board->controller == NULL || !all_have_zeros(board)) {
+  if (!board->has_controller || !all_have_zeros(board)) {
     return GC_WRONG_STATE;
   }
   if (!all_answer(board)) {

@@ -60,17 +60,19 @@ class ClosedLoop:
         heating: bool = True,
         warm: bool = True,
         tracker: VirtualTrackerParameters | None = None,
+        board: str = "virtual",
     ):
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none. Raises
-        RuntimeError where the bridge does not start.
+        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none;
+        board: of the virtual robot, see there. Raises RuntimeError where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
-            _truth(setup, warm and heating), setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion
-        )
+            _truth(setup, warm and heating), setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion,
+            board=board,
+        )  # fmt: skip
         self._bridge = Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
