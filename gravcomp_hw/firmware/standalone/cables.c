@@ -14,16 +14,17 @@ static void subtract_row(const float *restrict change, const float *tangent, flo
   }
 }
 
-// Return row . q of r numbers.
-static float along(const float *restrict row, const float *restrict q, uint32_t r) {
-  float s_0 = 0.0f, s_1 = 0.0f, s_2 = 0.0f, s_3 = 0.0f;
-  for (uint32_t a = 0; a < r; a += GC_TILE) {
-    s_0 += row[a] * q[a];
-    s_1 += row[a + 1u] * q[a + 1u];
-    s_2 += row[a + 2u] * q[a + 2u];
-    s_3 += row[a + 3u] * q[a + 3u];
+// Write D q (3,) of a piece; change (3, r): D.
+static void moved_by(const float *restrict change, const float *restrict q, uint32_t r, float *moved) {
+  const float *of_x = change, *of_y = change + r, *of_z = change + 2u * r;
+  float x = 0.0f, y = 0.0f, z = 0.0f;
+  for (uint32_t a = 0; a < r; a += GC_TILE, q += GC_TILE, of_x += GC_TILE, of_y += GC_TILE, of_z += GC_TILE) {
+    const float q_0 = q[0], q_1 = q[1], q_2 = q[2], q_3 = q[3];
+    x += (of_x[0] * q_0 + of_x[1] * q_1) + (of_x[2] * q_2 + of_x[3] * q_3);
+    y += (of_y[0] * q_0 + of_y[1] * q_1) + (of_y[2] * q_2 + of_y[3] * q_3);
+    z += (of_z[0] * q_0 + of_z[1] * q_1) + (of_z[2] * q_2 + of_z[3] * q_3);
   }
-  return (s_0 + s_1) + (s_2 + s_3);
+  moved[0] = x, moved[1] = y, moved[2] = z;
 }
 
 // Return the angle (rad) between the unit vectors a and b: accurate near 0, where the arc cosine is not.
@@ -86,9 +87,10 @@ void gc_cables_at(const gc_model *model, const float *q, const float *pulling, g
   for (uint32_t s = 0; s < model->pieces; ++s) {
     const float *change = model->piece_change + (size_t)s * 3u * r;
     const uint32_t i = model->piece_cable[s];
-    const float x = model->piece_rest[3u * s] + along(change, q, r);
-    const float y = model->piece_rest[3u * s + 1u] + along(change + r, q, r);
-    const float z = model->piece_rest[3u * s + 2u] + along(change + 2u * r, q, r);
+    float moved[3];
+    moved_by(change, q, r, moved);
+    const float *rest = model->piece_rest + 3u * s;
+    const float x = rest[0] + moved[0], y = rest[1] + moved[1], z = rest[2] + moved[2];
     const float length = __builtin_sqrtf((x * x + y * y) + z * z), inverse = 1.0f / length;
     at->length[s] = length;
     at->displacement[i] -= length;
@@ -107,13 +109,18 @@ void gc_cables_at(const gc_model *model, const float *q, const float *pulling, g
 }
 
 void gc_cables_add_stiffness(const gc_model *model, const gc_cables *at, const float *tension, float *matrix) {
-  const uint32_t pairs = model->modes * (model->modes + 1u) / 2u;
-  for (uint32_t i = 0; i < model->cables; ++i) {
-    const float pull = tension[i] * at->mean_share[i];
-    const float *from = model->cable_stiffness + (size_t)i * pairs;
-    for (uint32_t k = 0; pull > 0.0f && k + 2u <= pairs; k += 2u) {
-      matrix[k] += pull * from[k];
-      matrix[k + 1u] += pull * from[k + 1u];
+  const uint32_t pairs = model->modes * (model->modes + 1u) / 2u, m = model->cables;
+  const float *from = model->cable_stiffness;
+  float pull[GC_CABLES_MAX];
+  for (uint32_t i = 0; i < m; ++i) {
+    pull[i] = tension[i] * at->mean_share[i];
+  }
+  for (uint32_t k = 0; k < pairs; ++k) {
+    float sum = matrix[k];
+    for (uint32_t i = 0; i < m; ++i) {
+      sum += pull[i] * from[i];
     }
+    matrix[k] = sum;
+    from += m;
   }
 }

@@ -18,7 +18,8 @@ GC_INLINE void store(float *to, four value) {
 
 // Return sum + factor b.
 GC_INLINE four added(four sum, float factor, four b) {
-  return (four){sum.x + factor * b.x, sum.y + factor * b.y, sum.z + factor * b.z, sum.w + factor * b.w};
+  const float x = factor * b.x, y = factor * b.y, z = factor * b.z, w = factor * b.w;
+  return (four){sum.x + x, sum.y + y, sum.z + z, sum.w + w};
 }
 
 // Add B q of one tile of four rows to their rows of J, and its transpose to the rows j of J. Returns the end of the tile.
@@ -103,11 +104,18 @@ void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, flo
       const four row_0 = loaded(jacobian[i]), row_1 = loaded(jacobian[i + 1u]);
       const four row_2 = loaded(jacobian[i + 2u]), row_3 = loaded(jacobian[i + 3u]);
       for (uint32_t j = 0; j < i; ++j, b += GC_TILE * GC_TILE, to += GC_TILE) {
+        // The sums of the four rows do not depend on one another: the processor need not wait for any.
         const four column = loaded(jacobian[j]);
-        to[0] = entry_of(to[0], row_0, column, strain, b);
-        to[1] = entry_of(to[1], row_1, column, strain, b + 4);
-        to[2] = entry_of(to[2], row_2, column, strain, b + 8);
-        to[3] = entry_of(to[3], row_3, column, strain, b + 12);
+        four sum = loaded(to);
+        sum = added(sum, column.x, (four){row_0.x, row_1.x, row_2.x, row_3.x});
+        sum = added(sum, column.y, (four){row_0.y, row_1.y, row_2.y, row_3.y});
+        sum = added(sum, column.z, (four){row_0.z, row_1.z, row_2.z, row_3.z});
+        sum = added(sum, column.w, (four){row_0.w, row_1.w, row_2.w, row_3.w});
+        sum = added(sum, strain.x, (four){b[0], b[4], b[8], b[12]});
+        sum = added(sum, strain.y, (four){b[1], b[5], b[9], b[13]});
+        sum = added(sum, strain.z, (four){b[2], b[6], b[10], b[14]});
+        sum = added(sum, strain.w, (four){b[3], b[7], b[11], b[15]});
+        store(to, sum);
       }
       for (uint32_t a = 0; a < GC_TILE; ++a) {
         for (uint32_t c = 0; c <= a; ++c, b += GC_TILE, ++to) {

@@ -16,7 +16,7 @@ typedef struct {
 // Compute the elasticity at q (r,). Reads B once.
 void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at);
 
-// Write the stiffness (r, r) by tiles.
+// Write the stiffness (r, r) at q by tiles.
 void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, float *matrix);
 
 #endif

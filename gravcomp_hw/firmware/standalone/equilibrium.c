@@ -117,12 +117,11 @@ static void solve_answers(gc_equilibrium *state) {
 static bool evaluate(gc_equilibrium *state) {
   const gc_model *model = state->model;
   const uint32_t r = model->modes, m = model->cables;
-  float matrix[GC_PAIRS_MAX];
   gc_elasticity_at(model, state->q, &state->elasticity);
   gc_cables_at(model, state->q, state->pulling, &state->cables);
-  gc_elasticity_stiffness(model, &state->elasticity, matrix);
-  gc_cables_add_stiffness(model, &state->cables, state->tension, matrix);
-  if (!gc_factorise(matrix, r, state->factor)) {
+  gc_elasticity_stiffness(model, &state->elasticity, state->stiffness);
+  gc_cables_add_stiffness(model, &state->cables, state->tension, state->stiffness);
+  if (!gc_factorise(state->stiffness, r, state->factor)) {
     return false;
   }
   solve_answers(state);

@@ -38,6 +38,7 @@ typedef struct {
   float correction[GC_MODES_MAX];  // from q to the equilibrium
   float answer[GC_ANSWERS_MAX][GC_MODES_MAX];  // of q to unit tensions (m), to gravity (3), to the elastic forces (1)
   float compliance[GC_CABLES_MAX][GC_CABLES_MAX];
+  float stiffness[GC_PAIRS_MAX];
   float factor[GC_PAIRS_MAX];
   float safe_q[GC_MODES_MAX];    // last equilibrium
   float safe_tension[GC_CABLES_MAX];

@@ -56,7 +56,7 @@ typedef enum {
 typedef struct {
   uint32_t modes, strains, cables, pieces;
   const float *quadratic;         // [k / 4][r (r + 1) / 2][4] B of every block of four strains, by tiles
-  const float *cable_stiffness;   // [m][r (r + 1) / 2] stiffness of each cable under unit tension, by tiles
+  const float *cable_stiffness;   // [r (r + 1) / 2][m] stiffness of each cable under unit tension, by tiles
   const float *piece_change;      // [s][3][r] D: change of the piece by the coordinates
   const float *weight;            // [3][r] force of unit gravity
   const float *section_change;    // [9][r] tip section p, f1, f2

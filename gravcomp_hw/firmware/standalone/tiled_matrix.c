@@ -18,35 +18,46 @@ static void by_rows(const float *matrix, uint32_t r, float *rows) {
   }
 }
 
-// Return x . y of n numbers, in four partial sums.
-static float dot(const float *restrict x, const float *restrict y, uint32_t n) {
-  float s_0 = 0.0f, s_1 = 0.0f, s_2 = 0.0f, s_3 = 0.0f;
-  uint32_t i = 0;
-  for (; i + 4u <= n; i += 4u) {
-    s_0 += x[i] * y[i];
-    s_1 += x[i + 1u] * y[i + 1u];
-    s_2 += x[i + 2u] * y[i + 2u];
-    s_3 += x[i + 3u] * y[i + 3u];
+// Subtract the products with row j of the factor from column j of four rows: entry -= row[k] other[k] for k < j.
+static void reduce(float *const *rows, const float *restrict other, uint32_t j) {
+  const float *restrict a = rows[0], *restrict b = rows[1], *restrict c = rows[2], *restrict d = rows[3];
+  float x = rows[0][j], y = rows[1][j], z = rows[2][j], w = rows[3][j];
+  for (uint32_t k = 0; k < j; ++k) {
+    const float l = other[k];
+    x -= a[k] * l;
+    y -= b[k] * l;
+    z -= c[k] * l;
+    w -= d[k] * l;
   }
-  for (; i < n; ++i) {
-    s_0 += x[i] * y[i];
-  }
-  return (s_0 + s_1) + (s_2 + s_3);
+  rows[0][j] = x, rows[1][j] = y, rows[2][j] = z, rows[3][j] = w;
 }
 
 bool gc_factorise(const float *matrix, uint32_t r, float *factor) {
   by_rows(matrix, r, factor);
-  for (uint32_t i = 0; i < r; ++i) {
-    float *row = factor + i * (i + 1u) / 2u;
+  for (uint32_t i = 0; i < r; i += GC_TILE) {
+    float *rows[GC_TILE];
+    for (uint32_t a = 0; a < GC_TILE; ++a) {
+      rows[a] = factor + (i + a) * (i + a + 1u) / 2u;
+    }
     for (uint32_t j = 0; j < i; ++j) {
       const float *other = factor + j * (j + 1u) / 2u;
-      row[j] = (row[j] - dot(row, other, j)) * other[j];
+      reduce(rows, other, j);
+      for (uint32_t a = 0; a < GC_TILE; ++a) {
+        rows[a][j] *= other[j];
+      }
     }
-    const float pivot = row[i] - dot(row, row, i);
-    if (!(pivot > 0.0f)) { // also for NaN
-      return false;
+    for (uint32_t a = 0; a < GC_TILE; ++a) {
+      for (uint32_t c = 0; c <= a; ++c) {
+        float left = rows[a][i + c];
+        for (uint32_t k = 0; k < i + c; ++k) {
+          left -= rows[a][k] * rows[c][k];
+        }
+        if (a == c && !(left > 0.0f)) {  // also for NaN
+          return false;
+        }
+        rows[a][i + c] = a == c ? 1.0f / __builtin_sqrtf(left) : left * rows[c][i + c];
+      }
     }
-    row[i] = 1.0f / __builtin_sqrtf(pivot);
   }
   return true;
 }

@@ -13,7 +13,8 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 MAGIC, VERSION = b"GCMB", 1
 TILE = 4
-MODES_MAX, STRAINS_MAX, CABLES_MAX, PIECES_MAX = 48, 96, 9, 192
+SETTINGS = 74  # floats of gc_settings
+MODES_MAX, STRAINS_MAX, PIECES_MAX = 48, 96, 192
 _HEADER = struct.Struct("<4sIII16s8I")
 _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis
 
@@ -23,10 +24,10 @@ def robot_digest(robot: Robot) -> bytes:
     return bytes.fromhex(content_key(robot))
 
 
-def truncated(model: ReducedModel, modes: int) -> ReducedModel:
-    """Return the model on its first modes, a multiple of four, with the strains of these and the principal ones."""
+def truncated(model: ReducedModel, modes: int, extra: int) -> ReducedModel:
+    """Return the model on its first modes, a multiple of four, with the strains of these and the first `extra` principal ones."""
     r, m = model.elasticity.linear.shape
-    strains = np.r_[0:modes, r:m]
+    strains = np.r_[0:modes, r : min(m, r + extra)]
     pairs = modes * (modes + 1) // 2
     elasticity = StrainPolynomials(
         np.ascontiguousarray(model.elasticity.linear[:modes, strains]),
@@ -58,7 +59,7 @@ def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension:
     missing = -linear.shape[1] % TILE
     tables = (
         _by_tiles(np.pad(quadratic, ((0, 0), (0, missing))), modes),
-        _cable_stiffness(model)[:, _tile_order(modes)],
+        _cable_stiffness(model)[:, _tile_order(modes)].T,
         cables.change,
         model.weight.T,
         model.section_change[-1].reshape(9, modes),
@@ -85,7 +86,7 @@ def with_crc(blob: bytes) -> bytes:
     return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
 
 
-def blob_bytes(modes: int, strains: int, cables: int, pieces: int, settings: int) -> int:
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, settings: int = SETTINGS) -> int:
     """Return the number of bytes of a blob with these counts."""
     floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces + 6 * cables + settings
     return _HEADER.size + 4 * floats + -(-pieces // 4) * 4

@@ -6,12 +6,15 @@ import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import RobotFile
+from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse.target import Target, direction_weight, straight_target
 from gravcomp.orientation import quaternion as quat
 
 SAMPLE_PERIOD = 0.01  # s, of the board's IMU
+CABLES_MAX = 9
+"""Room for cables in the firmware (GC_CABLES_MAX)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,6 +24,7 @@ class LoopParameters:
     robot_file: RobotFile
     estimator: ImuEstimatorParameters
     controller: InverseControllerParameters
+    hardware: Hardware
 
     @classmethod
     def of(cls, file: RobotFile) -> "LoopParameters":
@@ -33,7 +37,8 @@ class LoopParameters:
             InverseControllerParameters, "inverse_controller"
         )
         assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
-        return cls(file, estimator, controller)
+        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        return cls(file, estimator, controller, hardware)
 
     @property
     def straight(self) -> Target:
@@ -52,6 +57,18 @@ def least_tensions(parameters: LoopParameters) -> np.ndarray:
     return np.minimum(np.maximum(own, robot.limits.tension_min), robot.limits.tension_max)
 
 
+def motor_numbers(parameters: LoopParameters) -> list[int]:
+    """Return the number, 1 to 8, of each cable's motor on the board's bus. Raises ConfigError for motors that are shared."""
+    hardware = parameters.hardware
+    if not hardware.transmission.direct:
+        raise ConfigError(
+            f"{parameters.robot_file.source}: motors move several cables, or cables several motors;"
+            " the loop on the board needs one motor for each cable"
+        )
+    numbers = {cable: motor.can_id for motor in hardware.motors for cable in motor.ratios}
+    return [numbers[name] for name in parameters.robot_file.robot.cable_names]
+
+
 def settings(parameters: LoopParameters, reach: float, joystick_bend: float, target: Target | None = None) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
@@ -63,6 +80,7 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, tar
         raise ConfigError("the target has points of the backbone; the board keeps position and direction of the tip only")
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
     calibration, prediction = parameters.estimator.calibration, parameters.estimator.prediction
+    numbers = motor_numbers(parameters)
     limits, rest, sensor, spikes = robot.limits, orientation.rest, orientation.sensor, orientation.spikes
     values: list[float] = [
         robot.length, reach, SAMPLE_PERIOD,
@@ -79,5 +97,6 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, tar
         rest.time_constant, rest.gyro_deviation, rest.accel_deviation, rest.accel_drift, rest.minimum_time, rest.largest_bias,
         sensor.gyro_range, sensor.accel_range, sensor.delay, sensor.stuck_time, sensor.largest_gap,
         spikes.gyro, spikes.accel, spikes.ratio, spikes.time_constant, float(spikes.longest),
+        *numbers, *[0] * (CABLES_MAX - len(numbers)),
     ]  # fmt: skip
     return np.array(values, dtype="<f4")
