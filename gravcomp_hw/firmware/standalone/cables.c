@@ -110,17 +110,16 @@ void gc_cables_at(const gc_model *model, const float *q, const float *pulling, g
 
 void gc_cables_add_stiffness(const gc_model *model, const gc_cables *at, const float *tension, float *matrix) {
   const uint32_t pairs = model->modes * (model->modes + 1u) / 2u, m = model->cables;
-  const float *from = model->cable_stiffness;
-  float pull[GC_CABLES_MAX];
-  for (uint32_t i = 0; i < m; ++i) {
-    pull[i] = tension[i] * at->mean_share[i];
-  }
-  for (uint32_t k = 0; k < pairs; ++k) {
-    float sum = matrix[k];
-    for (uint32_t i = 0; i < m; ++i) {
-      sum += pull[i] * from[i];
+  for (uint32_t first = 0; first < m; first += 3u) {  // three tensions stay in registers
+    float pull[3] = {0.0f, 0.0f, 0.0f};
+    const uint32_t count = m - first < 3u ? m - first : 3u, second = count > 1u ? 1u : 0u, third = count > 2u ? 2u : 0u;
+    for (uint32_t i = 0; i < count; ++i) {
+      pull[i] = tension[first + i] * at->mean_share[first + i];
     }
-    matrix[k] = sum;
-    from += m;
+    const float a = pull[0], b = pull[1], c = pull[2];
+    const float *from = model->cable_stiffness + first;
+    for (uint32_t k = 0; k < pairs; ++k, from += m) {
+      matrix[k] += (a * from[0] + b * from[second]) + c * from[third];
+    }
   }
 }

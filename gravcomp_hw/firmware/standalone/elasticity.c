@@ -1,5 +1,7 @@
 #include "elasticity.h"
 
+#include "kernels.h"
+
 // Four strains of one entry, in registers.
 typedef struct {
   float x, y, z, w;
@@ -27,16 +29,9 @@ GC_INLINE four added(four sum, float factor, four b) {
 // to (r, 4): J of the block; i: first row of the tile.
 static const float *tile_product(const float *restrict b, const float *restrict q, uint32_t i, float (*restrict to)[GC_TILE]) {
   const float q_0 = q[i], q_1 = q[i + 1u], q_2 = q[i + 2u], q_3 = q[i + 3u];
+  gc_tile_products(b, q, q + i, i, to, to + i);
+  b += GC_TILE * GC_TILE * i;
   four row_0 = loaded(to[i]), row_1 = loaded(to[i + 1u]), row_2 = loaded(to[i + 2u]), row_3 = loaded(to[i + 3u]);
-  for (uint32_t j = 0; j < i; ++j, b += GC_TILE * GC_TILE) {
-    const float q_j = q[j];
-    four column = loaded(to[j]), entry = loaded(b);
-    row_0 = added(row_0, q_j, entry), column = added(column, q_0, entry), entry = loaded(b + 4);
-    row_1 = added(row_1, q_j, entry), column = added(column, q_1, entry), entry = loaded(b + 8);
-    row_2 = added(row_2, q_j, entry), column = added(column, q_2, entry), entry = loaded(b + 12);
-    row_3 = added(row_3, q_j, entry), column = added(column, q_3, entry);
-    store(to[j], column);
-  }
   four entry = loaded(b);
   row_0 = added(row_0, q_0, entry), entry = loaded(b + 4);
   row_0 = added(row_0, q_1, entry), row_1 = added(row_1, q_0, entry), entry = loaded(b + 8);
@@ -101,27 +96,23 @@ void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, flo
     const four strain = loaded(at->strain + GC_TILE * block);
     float *to = matrix;
     for (uint32_t i = 0; i < r; i += GC_TILE) {
-      const four row_0 = loaded(jacobian[i]), row_1 = loaded(jacobian[i + 1u]);
-      const four row_2 = loaded(jacobian[i + 2u]), row_3 = loaded(jacobian[i + 3u]);
-      for (uint32_t j = 0; j < i; ++j, b += GC_TILE * GC_TILE, to += GC_TILE) {
-        // The sums of the four rows do not depend on one another: the processor need not wait for any.
-        const four column = loaded(jacobian[j]);
-        four sum = loaded(to);
-        sum = added(sum, column.x, (four){row_0.x, row_1.x, row_2.x, row_3.x});
-        sum = added(sum, column.y, (four){row_0.y, row_1.y, row_2.y, row_3.y});
-        sum = added(sum, column.z, (four){row_0.z, row_1.z, row_2.z, row_3.z});
-        sum = added(sum, column.w, (four){row_0.w, row_1.w, row_2.w, row_3.w});
-        sum = added(sum, strain.x, (four){b[0], b[4], b[8], b[12]});
-        sum = added(sum, strain.y, (four){b[1], b[5], b[9], b[13]});
-        sum = added(sum, strain.z, (four){b[2], b[6], b[10], b[14]});
-        sum = added(sum, strain.w, (four){b[3], b[7], b[11], b[15]});
-        store(to, sum);
-      }
-      for (uint32_t a = 0; a < GC_TILE; ++a) {
-        for (uint32_t c = 0; c <= a; ++c, b += GC_TILE, ++to) {
-          *to = entry_of(*to, loaded(jacobian[i + a]), loaded(jacobian[i + c]), strain, b);
-        }
-      }
+      gc_tile_stiffness(b, jacobian + i, jacobian, at->strain + GC_TILE * block, i, to);
+      b += GC_TILE * GC_TILE * i;
+      to += GC_TILE * i;
+      const four r_0 = loaded(jacobian[i]), r_1 = loaded(jacobian[i + 1u]);
+      const four r_2 = loaded(jacobian[i + 2u]), r_3 = loaded(jacobian[i + 3u]);
+      to[0] = entry_of(to[0], r_0, r_0, strain, b);
+      to[1] = entry_of(to[1], r_1, r_0, strain, b + 4);
+      to[2] = entry_of(to[2], r_1, r_1, strain, b + 8);
+      to[3] = entry_of(to[3], r_2, r_0, strain, b + 12);
+      to[4] = entry_of(to[4], r_2, r_1, strain, b + 16);
+      to[5] = entry_of(to[5], r_2, r_2, strain, b + 20);
+      to[6] = entry_of(to[6], r_3, r_0, strain, b + 24);
+      to[7] = entry_of(to[7], r_3, r_1, strain, b + 28);
+      to[8] = entry_of(to[8], r_3, r_2, strain, b + 32);
+      to[9] = entry_of(to[9], r_3, r_3, strain, b + 36);
+      b += 40;
+      to += 10;
     }
   }
 }

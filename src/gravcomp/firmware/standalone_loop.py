@@ -101,6 +101,12 @@ class StandaloneLoop:
         """Bend toward (x, y), each from -1 to 1, in place of the stored target."""
         self._library.gc_loop_joystick(self._at, True, x, y)
 
+    @property
+    def gravity(self) -> np.ndarray:
+        """The estimated gravity (3,) in m/s^2 in soft_base."""
+        self._library.gc_loop_read(self._at, self._result)
+        return np.array(self._result.gravity, dtype=float)
+
     def read(self) -> LoopResult:
         """Return the last results."""
         result, m = self._result, self._cables
