@@ -4,7 +4,7 @@ The costs are those of the Cortex-M4 Technical Reference Manual (r0p1, tables 3-
 or store by itself (1 behind another one of the same kind), 1 + n for n registers, 14 for a division or root of floats, 3 for a
 fused or chained multiply-add, 12 for a division of integers, 3 for a taken branch; one more for a float that the next instruction
 of the unit uses. The flash of the STM32F407 has 5 wait states at 168 MHz (RM0090 section 3.5); of its accelerator the cache of
-64 lines of instructions, 16 bytes each, is modelled, its prefetching is not. The model's tables pass by the cache of data.
+64 lines of instructions, 16 bytes each, and its reading ahead are modelled. The model's tables pass by the cache of data.
 """
 
 import bisect
@@ -27,7 +27,7 @@ MEMORY_AT = 0x20008000
 
 _FLASH, _FLASH_SIZE, _RAM, _RAM_SIZE = 0x08000000, 0x100000, 0x20000000, 0x20000
 _STACK, _STACK_SIZE = 0x10000000, 0x10000
-_RETURN, _LINE, _WAIT, _INSTRUCTION_LINES = 0x08007FF0, 4, 5, 64
+_RETURN, _LINE, _WAIT, _WAIT_BEHIND, _INSTRUCTION_LINES = 0x08007FF0, 4, 5, 1, 64
 _TAKEN = 2
 _CHAINED = ("vmla", "vmls", "vfma", "vfms", "vnmla", "vnmls", "vfnma", "vfnms")
 _BRANCHES = frozenset(
@@ -52,21 +52,25 @@ class Cycles:
 
 
 class _Lines:
-    """A cache of lines of 16 bytes that replaces the one that was used longest ago."""
+    """The accelerator's cache of instructions: lines of 16 bytes, replaced when they were used longest ago.
+
+    A line behind the last one is read ahead while that one's four instructions run, which takes four cycles at least.
+    """
 
     def __init__(self, count: int):
-        self._count, self._lines = count, collections.OrderedDict[int, None]()
+        self._count, self._lines, self._last = count, collections.OrderedDict[int, None](), -1
         self.waits = 0
 
     def touch(self, first: int, last: int) -> None:
         for line in range(first >> _LINE, (last >> _LINE) + 1):
             if line in self._lines:
                 self._lines.move_to_end(line)
-                continue
-            self.waits += _WAIT
-            self._lines[line] = None
-            if len(self._lines) > self._count:
-                self._lines.popitem(last=False)
+            else:
+                self.waits += _WAIT_BEHIND if line == self._last + 1 else _WAIT
+                self._lines[line] = None
+                if len(self._lines) > self._count:
+                    self._lines.popitem(last=False)
+            self._last = line
 
 
 class Processor:
