@@ -44,8 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--board",
         default="virtual",
         choices=BOARDS,
-        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the bus of the"
-        " host and the motors",
+        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the"
+        " host's bus and the motors",
     )
     add_tracker_argument(parser)
     add_seed_argument(parser)
@@ -74,7 +74,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.launcher import Graph
     from gravcomp.launcher.domain import private_domain
-    from gravcomp.launcher.robot_graph import LOOP, RobotGraph, private_channels
+    from gravcomp.launcher.robot_graph import RobotGraph, private_channels
     from gravcomp.virtual.described import described
 
     if not _SHORTEST <= args.duration <= 86400.0:
@@ -90,7 +90,12 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True, "board": args.board} | tracker_parameters(args)
+    motion: dict[str, Any] = {
+        "truth_rate": 50.0,
+        "feedback_rate": 125,
+        "steerable": True,
+        "board": args.board,
+    } | tracker_parameters(args)
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
@@ -102,14 +107,15 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
     graph = RobotGraph(args.robot, "udp_multicast", channels, parameters={"virtual_robot": motion}, seed=args.seed)
-    nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
+    loop = graph.loop(virtual=True)
+    nodes = [spec.executable for spec in loop] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
         judge = graph.node(
             "gravcomp_hw", "judge", duration=args.duration, relax_time=relax_time, settle_time=min(4.0, 0.15 * args.duration),
             start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes,
         )  # fmt: skip
-        specs = [*graph.loop(), judge]
+        specs = [*loop, judge]
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()

@@ -53,7 +53,10 @@ def orientations(count: int, seed: int) -> list[np.ndarray]:
 
 
 def residuals(setup: Setup, count: int = 20, orientation_seed: int = 1, board: str = "virtual") -> Residuals:
-    """Run the loop through the five poses and `count` random ones, with this board of the virtual robot. Raises ConfigError, NoEquilibrium, RuntimeError."""
+    """Run the loop through the five poses and `count` random ones, with this board of the virtual robot.
+
+    Raises ConfigError, NoEquilibrium, RuntimeError.
+    """
     wanted = orientations(count, orientation_seed)
     rest = _REACTION + _PERIODS * 2.0 * math.pi / first_frequency(build_rod(setup.true_robot)) + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
