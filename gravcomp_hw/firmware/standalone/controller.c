@@ -4,7 +4,8 @@
 #include "../core/memory.h"
 #include "trigonometry.h"
 
-#define GC_LONGEST_INTERVAL 0.1f     // s: the linear response is not valid farther
+#define GC_FARTHEST 0.1f             // of the length: farthest that the winches may move the tip in a step
+#define GC_LONGEST_INTERVAL 0.1f     // s in which cables are paid out in one step after a pause
 #define GC_LARGEST_DAMPING 1e4f      // damping.py
 #define GC_SMALLEST_CHANGE 5e-5f     // of the length
 #define GC_BACK_AND_FORTH -0.3f
@@ -148,11 +149,25 @@ static void take(gc_inverse_controller *controller, const gc_inverse_problem *pr
   gc_copy(controller->change, change, sizeof change);
 }
 
+// Return the time in s in which no winch alone moves the tip farther than GC_FARTHEST of the length.
+static float longest_interval(const gc_model *model, const gc_shape *shape) {
+  float ratio = 0.0f;
+  for (uint32_t k = 0; k < model->cables; ++k) {
+    float squared = 0.0f;
+    for (uint32_t i = 0; i < 3u; ++i) {
+      squared += shape->effector_compliance[i][k] * shape->effector_compliance[i][k];
+    }
+    ratio = gc_max(ratio, gc_sqrt(squared) / shape->compliance[k][k]);
+  }
+  const float speed = model->settings->displacement_rate * ratio;
+  return speed > 0.0f ? GC_FARTHEST * model->settings->length / speed : GC_LONGEST_INTERVAL;
+}
+
 void gc_inverse_step(gc_inverse_controller *controller, const gc_shape *shape, const gc_target *target, float interval) {
   const gc_model *model = controller->model;
   const uint32_t m = model->cables;
   float largest = 0.0f;
-  interval = gc_clamp(interval, 0.0f, GC_LONGEST_INTERVAL);
+  interval = gc_clamp(interval, 0.0f, longest_interval(model, shape));
   for (uint32_t i = 0; i < m; ++i) {
     if (!controller->started) {
       controller->displacement[i] = shape->displacement[i];

@@ -179,6 +179,43 @@ static void observe(const gc_equilibrium *state, gc_shape *shape) {
   }
 }
 
+// Write the response of the backbone's length to the tensions.
+static void observe_length(const gc_equilibrium *state, gc_shape *shape) {
+  const gc_model *model = state->model;
+  const uint32_t r = model->modes;
+  float row[GC_MODES_MAX], before[3] = {0.0f, 0.0f, 0.0f};
+  for (uint32_t a = 0; a < r; ++a) {
+    row[a] = 0.0f;
+  }
+  for (uint32_t point = 0; point < model->points; ++point) {
+    const float *change = model->point_change + (size_t)point * 3u * r;
+    float now[3], along[3], length = 0.0f;
+    for (uint32_t i = 0; i < 3u; ++i) {
+      now[i] = model->point_rest[3u * point + i];
+      for (uint32_t a = 0; a < r; ++a) {
+        now[i] += change[i * r + a] * (state->q[a] + state->correction[a]);
+      }
+      along[i] = now[i] - before[i];
+      length += along[i] * along[i];
+      before[i] = now[i];
+    }
+    const float inverse = point > 0u ? 1.0f / __builtin_sqrtf(length) : 0.0f;
+    for (uint32_t i = 0; point > 0u && i < 3u; ++i) {
+      const float *earlier = change - 3u * r;
+      const float part = along[i] * inverse;
+      for (uint32_t a = 0; a < r; ++a) {
+        row[a] += part * (change[i * r + a] - earlier[i * r + a]);
+      }
+    }
+  }
+  for (uint32_t k = 0; k < model->cables; ++k) {
+    shape->lengthening[k] = 0.0f;
+    for (uint32_t a = 0; a < r; ++a) {
+      shape->lengthening[k] += row[a] * state->answer[k][a];
+    }
+  }
+}
+
 // Write tensions and displacements of the cables, and their compliance.
 static void describe_cables(const gc_equilibrium *state, const float *tension, gc_shape *shape) {
   const gc_model *model = state->model;
@@ -257,6 +294,7 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
   if (shape->converged) {
     gc_copy(state->tension, tension, sizeof state->tension);
     observe(state, shape);
+    observe_length(state, shape);
     describe_cables(state, tension, shape);
     for (uint32_t a = 0; a < model->modes; ++a) {
       state->safe_q[a] = state->q[a] + state->correction[a];

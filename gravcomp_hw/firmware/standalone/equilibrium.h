@@ -25,6 +25,7 @@ typedef struct {
   float displacement[GC_CABLES_MAX];                          // m, at the winch
   float compliance[GC_CABLES_MAX][GC_CABLES_MAX];             // m/N, of the displacements
   float effector_compliance[GC_EFFECTOR_ROWS][GC_CABLES_MAX]; // of tip and direction
+  float lengthening[GC_CABLES_MAX];  // m/N, of the backbone's length from point to point
   float left;                                                 // m, estimated distance of the tip from the equilibrium
 } gc_shape;
 

@@ -19,6 +19,7 @@
 #define GC_CABLES_MAX 9u
 #define GC_PIECES_MAX 192u
 #define GC_PAIRS_MAX (GC_MODES_MAX * (GC_MODES_MAX + 1u) / 2u)
+#define GC_POINTS_MAX 64u
 #define GC_ROBOT_BYTES 16u
 
 // First bytes of a blob. crc: CRC-32 (IEEE 802.3) of all bytes after this field.
@@ -33,7 +34,8 @@ typedef struct {
   uint32_t cables;               // m
   uint32_t pieces;               // s
   uint32_t settings;             // number of floats of gc_settings
-  uint32_t reserved[3];
+  uint32_t points;               // n, of the backbone
+  uint32_t reserved[2];
 } gc_model_header;
 
 // Why a blob is refused.
@@ -54,7 +56,7 @@ typedef enum {
 // Symmetric matrices are stored by tiles: for every four rows 4 t to 4 t + 3 the columns j < 4 t, each with its four
 // entries, then the ten entries of the lower triangle on the diagonal, row by row.
 typedef struct {
-  uint32_t modes, strains, cables, pieces;
+  uint32_t modes, strains, cables, pieces, points;
   const float *quadratic;         // [k / 4][r (r + 1) / 2][4] B of every block of four strains, by tiles
   const float *cable_stiffness;   // [r (r + 1) / 2][m] stiffness of each cable under unit tension, by tiles
   const float *piece_change;      // [s][3][r] D: change of the piece by the coordinates
@@ -62,6 +64,8 @@ typedef struct {
   const float *section_change;    // [9][r] tip section p, f1, f2
   const float *section_rest;      // [9]
   const float *piece_rest;        // [s][3] m
+  const float *point_change;      // [n][3][r] change of the backbone's points
+  const float *point_rest;        // [n][3] m
   const float *rest_length;       // [m] m
   const float *axial_compliance;  // [m] m/N
   const float *friction;          // [m] coefficient
@@ -80,6 +84,6 @@ typedef struct {
 gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, const uint8_t *robot);
 
 // Return the number of bytes of a blob with these counts, all of them within the maxima.
-size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces);
+size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces, uint32_t points);
 
 #endif

@@ -3,6 +3,7 @@
 #include "../core/maths.h"
 
 #define GC_SEPARATE 1e-3f      // delta: cables that turn the tip in place by less than a thirtieth do not count
+#define GC_LEAST_SHORTENING 1e-5f  // of the square of the tip's motion
 #define GC_REGULAR 1e-7f       // of the trace: what makes the inverse exist
 #define GC_POWER_STEPS 24u     // of the power iteration, whose estimate enters only times GC_SEPARATE
 
@@ -72,32 +73,32 @@ static void apply(matrix3 d, float *x, float *y, float *z) {
 }
 
 void gc_keep_turned_in_place(const gc_shape *shape, uint32_t m, const float *axis, float (*rows)[GC_CABLES_MAX], float *offset) {
-  float across[3][GC_CABLES_MAX], turn[3][GC_CABLES_MAX];
+  float moved_by[3][GC_CABLES_MAX], turn[3][GC_CABLES_MAX];
   for (uint32_t k = 0; k < m; ++k) {
     const float root = 1.0f / gc_sqrt(shape->compliance[k][k]);
-    float along = 0.0f;
+    float along = -shape->lengthening[k];
     for (uint32_t i = 0; i < 3u; ++i) {
       along += axis[i] * shape->effector_compliance[i][k];
     }
     for (uint32_t i = 0; i < 3u; ++i) {
-      across[i][k] = root * (shape->effector_compliance[i][k] - along * axis[i]);
+      moved_by[i][k] = root * (shape->effector_compliance[i][k] - along * axis[i]);
       turn[i][k] = root * shape->effector_compliance[3u + i][k];
     }
   }
   matrix3 moved, inverted, both, whole, d;
-  product(m, across, across, moved);
+  product(m, moved_by, moved_by, moved);
   const float size = (moved[0][0] + moved[1][1]) + moved[2][2];
   if (!(size > 0.0f)) {
     return;
   }
   for (uint32_t i = 0; i < 3u; ++i) {
     for (uint32_t j = 0; j < 3u; ++j) {
-      moved[i][j] += size * axis[i] * axis[j];
+      moved[i][j] += GC_LEAST_SHORTENING * size * axis[i] * axis[j];
       moved[i][j] /= size;  // of order one: the products of the inverse neither overflow nor vanish
     }
     moved[i][i] += GC_REGULAR;
   }
-  product(m, turn, across, both);
+  product(m, turn, moved_by, both);
   product(m, turn, turn, whole);
   const float largest = largest_eigenvalue(whole);
   matrix3 alone, sum;

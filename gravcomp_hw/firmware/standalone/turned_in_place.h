@@ -1,4 +1,4 @@
-// The part of the tip's direction that the cables can turn without moving the tip across (inverse/programme.py on the host).
+// The part of the tip's direction that the cables can turn without moving the tip across or shortening the robot (inverse/programme.py on the host).
 #ifndef GC_TURNED_IN_PLACE_H
 #define GC_TURNED_IN_PLACE_H
 

@@ -1,14 +1,13 @@
 """The loop on the board: its C code in float32 against the host's loop in double precision, its time, memory and estimator."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 from gravcomp.description import RobotFile, load_robot_file
 from gravcomp.firmware.cycles import Cycles, loop_cycles, sample_bytes
 from gravcomp.firmware.image import build_image
-from gravcomp.firmware.loop_on_host import LOADING_STEPS, run_on_host, turning_gravity
+from gravcomp.firmware.loop_on_host import APPROACH_STEPS, LOADING_STEPS, run_on_host, turning_gravity
 from gravcomp.firmware.model_fit import Fit, fit
 from gravcomp.firmware.model_settings import SAMPLE_PERIOD, LoopParameters
 from gravcomp.firmware.stack import largest_stack
@@ -18,6 +17,7 @@ from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.offline import estimate_recording
 from gravcomp.recordings.imu import Recording, read_recording
+from gravcomp.recordings.imu.broad_folder import broad_files
 from gravcomp.reduction import load
 from gravcomp.training import build
 
@@ -30,7 +30,7 @@ _PER_G, _GRAVITY = 5460.0, 9.80665  # counts of the range of 6 g
 _COUNTS_PER_RAD_S = 32767.0 / np.radians(2000.0)
 
 
-def run(progress: Progress, *, every: int = 1, broad: Path | None = None) -> dict:
+def run(progress: Progress, *, every: int = 1) -> dict:
     """Return all figures for the article's robot; `every`: of the paths and trials only every so many."""
     file = load_robot_file("article")
     progress("model of the board")
@@ -42,7 +42,7 @@ def run(progress: Progress, *, every: int = 1, broad: Path | None = None) -> dic
         **accuracy(progress, file, found, every),
         **memory(progress, found),
         **step_time(progress, file, found),
-        **estimator(progress, file, found, broad, every),
+        **estimator(progress, file, found, every),
     }
 
 
@@ -69,12 +69,14 @@ def accuracy(progress: Progress, file: RobotFile, found: Fit, every: int = 1) ->
             loop = StandaloneLoop(found.blob)
             for _ in range(LOADING_STEPS - 1):
                 loop.follow(SAMPLE_PERIOD, gravities[0])
-            for gravity, host_tip, host_command in zip(gravities, host.tip, host.command):
+            for step, (gravity, host_tip, host_command) in enumerate(zip(gravities, host.tip, host.command)):
                 loop.follow(SAMPLE_PERIOD, gravity)
                 result = loop.read()
+                steps = max(steps, result.solver_steps)
+                if step < APPROACH_STEPS:
+                    continue
                 tip = max(tip, float(np.linalg.norm(result.tip - host_tip)))
                 command = max(command, float(np.abs(result.displacement - host_command).max()))
-                steps = max(steps, result.solver_steps)
     return {"board_tip_mm": round(1e3 * tip, 4), "board_command_mm": round(1e3 * command, 4), "board_solver_steps": steps}
 
 
@@ -118,9 +120,9 @@ def _counts(file: RobotFile, path: np.ndarray, step: int) -> tuple[list[int], in
     return [int(round(float(value))) for value in (*force, *rate)], round(1e6 * SAMPLE_PERIOD) * step
 
 
-def estimator(progress: Progress, file: RobotFile, found: Fit, broad: Path | None, every: int = 1) -> dict:
-    """Return `board_deg`: largest angle between the gravity of both estimators over BROAD's trials in a folder; None: not there."""
-    trials = sorted(broad.glob("*.npz"))[::every] if broad and broad.is_dir() else []
+def estimator(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:
+    """Return `board_deg`: largest angle between the gravity of both estimators over BROAD's trials; None: there are none."""
+    trials = broad_files()[::every]
     worst: float | None = None
     for path in trials:
         progress(f"estimator on the board, {path.stem}")

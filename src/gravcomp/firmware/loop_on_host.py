@@ -12,6 +12,11 @@ from gravcomp.simulation import Simulator
 LOADING_STEPS = 100
 """Steps over which gravity rises after a start, on the board as well (GC_LOADING_STEPS)."""
 
+APPROACH_STEPS = 400
+"""Steps of `turning_gravity` before it turns at its rate."""
+
+_SLOW = np.radians(20.0)  # rad/s, before that
+
 
 @dataclasses.dataclass(frozen=True)
 class HostRun:
@@ -54,15 +59,13 @@ def turning_gravity(rate: float, seed: int, steps: int, gravity: float = 9.81) -
     """
     rng = np.random.default_rng(seed)
     path = [np.array([0.0, 0.0, -gravity])]
-    for step in range(steps + _APPROACH):
+    for step in range(steps + APPROACH_STEPS):
         if step % round(1.0 / SAMPLE_PERIOD) == 0:
             axis = rng.normal(size=3)
             axis /= np.linalg.norm(axis)
-        angle = SAMPLE_PERIOD * (rate if step >= _APPROACH else _SLOW)
+        angle = SAMPLE_PERIOD * (rate if step >= APPROACH_STEPS else _SLOW)
         before = path[-1]
         along = axis * (axis @ before)
         path.append(along + np.cos(angle) * (before - along) + np.sin(angle) * np.cross(axis, before))
     return np.array(path)
 
-
-_APPROACH, _SLOW = 400, np.radians(20.0)  # steps, rad/s

@@ -14,7 +14,7 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 MAGIC, VERSION = b"GCMB", 1
 TILE = 4
 SETTINGS = 74  # floats of gc_settings
-MODES_MAX, STRAINS_MAX, PIECES_MAX = 48, 96, 192
+MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX = 48, 96, 192, 64
 _HEADER = struct.Struct("<4sIII16s8I")
 _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis
 
@@ -65,6 +65,8 @@ def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension:
         model.section_change[-1].reshape(9, modes),
         model.section_rest[-1],
         cables.rest,
+        model.section_change[:-1, 0],
+        model.section_rest[:-1, 0],
         cables.rest_length,
         cables.axial_compliance,
         cables.friction,
@@ -76,7 +78,8 @@ def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension:
     count = len(cables.cable)
     body = b"".join(np.ascontiguousarray(table, dtype="<f4").tobytes() for table in tables)
     body += cables.cable.astype("u1").tobytes() + bytes(-count % 4)
-    counts = (modes, linear.shape[1] + missing, len(cables.rest_length), count, len(settings), 0, 0, 0)
+    points = len(model.section_rest) - 1
+    counts = (modes, linear.shape[1] + missing, len(cables.rest_length), count, len(settings), points, 0, 0)
     header = _HEADER.pack(MAGIC, VERSION, _HEADER.size + len(body), 0, robot_digest(robot), *counts)
     return with_crc(header + body)
 
@@ -86,9 +89,10 @@ def with_crc(blob: bytes) -> bytes:
     return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
 
 
-def blob_bytes(modes: int, strains: int, cables: int, pieces: int, settings: int = SETTINGS) -> int:
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int) -> int:
     """Return the number of bytes of a blob with these counts."""
-    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces + 6 * cables + settings
+    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
+    floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
     return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
 
 

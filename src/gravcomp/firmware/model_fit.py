@@ -8,12 +8,12 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.config import ConfigError
 from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
-from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
+from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, POINTS_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
 from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.store import Reduction
+from gravcomp.reduction.store import Reduction, load, why_not
 from gravcomp.reduction.tracking import ReducedTracker
 
 SLOT_BYTES = 384 * 1024
@@ -71,6 +71,16 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
 
 
+def blob_for(parameters: LoopParameters) -> bytes:
+    """Return the blob of a robot. Raises ConfigError where it does not fit, or its reduced model is not built."""
+    model = RobotModel(parameters.robot)
+    reduction = load(model)
+    if reduction is None:
+        reason = why_not(model) or "it is not built: run ./gravcomp model build"
+        raise ConfigError(f"{parameters.source}: there is no reduced model for the board: {reason}")
+    return fit(model, reduction, parameters).blob
+
+
 def cost(model: ReducedModel) -> tuple[int, float]:
     """Return the multiply-adds of a step and its estimated time in ms at 168 MHz."""
     r, k = model.elasticity.linear.shape
@@ -88,7 +98,7 @@ def cost(model: ReducedModel) -> tuple[int, float]:
 
 def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -> None:
     """Raise ConfigError for a robot that the loop on the board does not model, whatever the basis."""
-    source, points, cables = parameters.robot_file.source, len(whole.deviation.weight), len(whole.cables.rest_length)
+    source, points, cables = parameters.source, len(whole.deviation.weight), len(whole.cables.rest_length)
     if points:
         adds = 9 * points * whole.size * (whole.size + 3)
         raise ConfigError(
@@ -99,6 +109,8 @@ def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -
         raise ConfigError(f"{source}: a material creeps; the loop on the board has no memory of the material")
     if cables > min(CABLES_MAX, 8):
         raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
+    if len(whole.section_rest) - 1 > POINTS_MAX:
+        raise ConfigError(f"{source}: has {len(whole.section_rest) - 1} points of the backbone; the firmware has room for {POINTS_MAX}")
     if len(whole.cables.cable) > PIECES_MAX:
         raise ConfigError(f"{source}: its cables have {len(whole.cables.cable)} pieces; the firmware has room for {PIECES_MAX}")
 
@@ -121,7 +133,7 @@ def fits(model: ReducedModel) -> bool:
 
 def _bytes(model: ReducedModel) -> int:
     r, k = model.elasticity.linear.shape
-    return blob_bytes(r, k + -k % TILE, len(model.cables.rest_length), len(model.cables.cable))
+    return blob_bytes(r, k + -k % TILE, len(model.cables.rest_length), len(model.cables.cable), len(model.section_rest) - 1)
 
 
 def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:
@@ -141,6 +153,6 @@ def _too_big(whole: ReducedModel, parameters: LoopParameters) -> str:
     """Return why not even the smallest basis fits."""
     smallest = truncated(whole, TILE, 0)
     return (
-        f"{parameters.robot_file.source}: no basis fits: {TILE} modes take {_bytes(smallest) / 1024:.0f} of {SLOT_BYTES // 1024} KB"
+        f"{parameters.source}: no basis fits: {TILE} modes take {_bytes(smallest) / 1024:.0f} of {SLOT_BYTES // 1024} KB"
         f" and {cost(smallest)[1]:.1f} of {LONGEST_MS:g} ms"
     )

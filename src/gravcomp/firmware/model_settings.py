@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
-from gravcomp.description import RobotFile
+from gravcomp.description import Robot, RobotFile
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
@@ -19,9 +19,10 @@ CABLES_MAX = 9
 
 @dataclasses.dataclass(frozen=True)
 class LoopParameters:
-    """What the loop takes from a robot file, beside its model."""
+    """What the loop takes from a robot file: `source` is its path."""
 
-    robot_file: RobotFile
+    source: str
+    robot: Robot
     estimator: ImuEstimatorParameters
     controller: InverseControllerParameters
     hardware: Hardware
@@ -38,12 +39,12 @@ class LoopParameters:
         )
         assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        return cls(file, estimator, controller, hardware)
+        return cls(file.source, file.robot, estimator, controller, hardware)
 
     @property
     def straight(self) -> Target:
         """The straight robot with the controller's weights, which the board keeps until another target arrives."""
-        length = self.robot_file.robot.length
+        length = self.robot.length
         weight = direction_weight(length, self.controller.tip_direction_weight)
         return straight_target(
             length, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight
@@ -52,7 +53,7 @@ class LoopParameters:
 
 def least_tensions(parameters: LoopParameters) -> np.ndarray:
     """Return the lower bounds (m,) of the tensions in N, as the inverse controller's."""
-    robot, option = parameters.robot_file.robot, parameters.controller.inverse.pretension
+    robot, option = parameters.robot, parameters.controller.inverse.pretension
     own = [option if cable.pretension is None else cable.pretension for cable in robot.cables]
     return np.minimum(np.maximum(own, robot.limits.tension_min), robot.limits.tension_max)
 
@@ -62,11 +63,11 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
     hardware = parameters.hardware
     if not hardware.transmission.direct:
         raise ConfigError(
-            f"{parameters.robot_file.source}: motors move several cables, or cables several motors;"
+            f"{parameters.source}: motors move several cables, or cables several motors;"
             " the loop on the board needs one motor for each cable"
         )
     numbers = {cable: motor.can_id for motor in hardware.motors for cable in motor.ratios}
-    return [numbers[name] for name in parameters.robot_file.robot.cable_names]
+    return [numbers[name] for name in parameters.robot.cable_names]
 
 
 def settings(parameters: LoopParameters, reach: float, joystick_bend: float, target: Target | None = None) -> np.ndarray:
@@ -75,7 +76,7 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, tar
     reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; target: that is stored, default: the straight
     robot. Raises ConfigError for a target that the board cannot keep.
     """
-    robot, wanted = parameters.robot_file.robot, target or parameters.straight
+    robot, wanted = parameters.robot, target or parameters.straight
     if wanted.backbone_station.size:
         raise ConfigError("the target has points of the backbone; the board keeps position and direction of the tip only")
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
@@ -85,7 +86,8 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, tar
     values: list[float] = [
         robot.length, reach, SAMPLE_PERIOD,
         limits.tension_max, limits.tension_rate, limits.displacement_min, limits.displacement_max, limits.displacement_rate,
-        options.axial_weight, options.energy_weight, options.proximal_weight, options.slack, options.tolerance,
+        options.axial_weight, options.energy_weight, options.proximal_weight, options.slack_of(robot.length),
+        options.tolerance_of(robot.length),
         options.tilt_tolerance,
         *wanted.tip_position, *wanted.direction_or_zeros, wanted.tip_position_weight, wanted.tip_direction_weight, joystick_bend,
         *quat.normalised(quat.from_roll_pitch_yaw(*robot.imu_mount.rpy)),
