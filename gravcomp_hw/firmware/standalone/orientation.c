@@ -75,7 +75,7 @@ static void start(gc_orientation *filter, const float *gyro, const float *accel,
   gc_zero(state->velocity, sizeof state->velocity);
   filter->contradicted = false;
   state->rest.started = false;
-  state->rest.still = state->rest.calm = 0.0f;
+  state->rest.still = state->rest.calm = 0u;
   gc_copy(state->last_gyro, gyro, sizeof state->last_gyro);
   state->period = 0.0f;
   filter->started = true;
@@ -189,7 +189,7 @@ static advance_result advance(gc_orientation *filter, const gc_filter_step *step
     }
   } else {
     state->rest.started = false;
-    state->rest.still = state->rest.calm = 0.0f;
+    state->rest.still = state->rest.calm = 0u;
   }
   predict(filter, step);
   if (step->accel_usable) {

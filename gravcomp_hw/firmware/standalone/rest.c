@@ -16,7 +16,15 @@ bool gc_rest_agrees(const gc_rest *rest, const float *bias, const float *bias_st
   return agrees;
 }
 
-bool gc_rest_calm(const gc_rest *rest, const gc_settings *settings) { return rest->calm >= settings->rest_minimum_time; }
+// Whether a time in us is at least that for which the conditions of rest must hold.
+static bool lasted(uint32_t time, const gc_settings *settings) {
+  return (int32_t)time >= gc_round(1e6f * settings->rest_minimum_time);
+}
+
+bool gc_rest_calm(const gc_rest *rest, const gc_settings *settings) { return lasted(rest->calm, settings); }
+
+// Return the sum of two times in us, held below what wraps.
+static uint32_t longer(uint32_t time, uint32_t passed) { return time < 1000000000u ? time + passed : time; }
 
 bool gc_rest_take(gc_rest *rest, const gc_settings *settings, float dt, const float *gyro, const float *accel,
                   const float *bias, const float *bias_std) {
@@ -47,13 +55,14 @@ bool gc_rest_take(gc_rest *rest, const gc_settings *settings, float dt, const fl
       calm = false;
     }
   }
-  rest->calm = calm ? rest->calm + dt : 0.0f;
-  rest->still = still ? rest->still + dt : 0.0f;
+  const uint32_t passed = (uint32_t)gc_round(1e6f * dt);
+  rest->calm = calm ? longer(rest->calm, passed) : 0u;
+  rest->still = still ? longer(rest->still, passed) : 0u;
   if (!calm) {
     gc_copy(rest->calm_reference, rest->mean_accel, sizeof rest->calm_reference);
   }
   if (!still) {
     gc_copy(rest->reference, rest->mean_accel, sizeof rest->reference);
   }
-  return rest->still >= settings->rest_minimum_time;
+  return lasted(rest->still, settings);
 }

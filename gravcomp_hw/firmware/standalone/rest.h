@@ -12,7 +12,7 @@ typedef struct {
   float mean_gyro[3];   // rad/s
   float mean_accel[3];  // m/s^2
   float reference[3], calm_reference[3];
-  float still, calm;  // s
+  uint32_t still, calm;  // us: whole numbers, so that the conditions hold from the same sample on as on the host
 } gc_rest;
 
 // Take a sample `dt` s after the last one, and return whether the sensor rests. gyro, bias, bias_std (3,) in rad/s; accel (3,) in

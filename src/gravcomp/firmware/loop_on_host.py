@@ -68,4 +68,3 @@ def turning_gravity(rate: float, seed: int, steps: int, gravity: float = 9.81) -
         along = axis * (axis @ before)
         path.append(along + np.cos(angle) * (before - along) + np.sin(angle) * np.cross(axis, before))
     return np.array(path)
-

@@ -110,7 +110,9 @@ def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -
     if cables > min(CABLES_MAX, 8):
         raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
     if len(whole.section_rest) - 1 > POINTS_MAX:
-        raise ConfigError(f"{source}: has {len(whole.section_rest) - 1} points of the backbone; the firmware has room for {POINTS_MAX}")
+        raise ConfigError(
+            f"{source}: has {len(whole.section_rest) - 1} points of the backbone; the firmware has room for {POINTS_MAX}"
+        )
     if len(whole.cables.cable) > PIECES_MAX:
         raise ConfigError(f"{source}: its cables have {len(whole.cables.cable)} pieces; the firmware has room for {PIECES_MAX}")
 

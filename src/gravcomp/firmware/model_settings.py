@@ -34,8 +34,9 @@ class LoopParameters:
         def section(kind: type, name: str) -> object:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
 
-        estimator, controller = section(ImuEstimatorParameters, "imu_estimator"), section(
-            InverseControllerParameters, "inverse_controller"
+        estimator, controller = (
+            section(ImuEstimatorParameters, "imu_estimator"),
+            section(InverseControllerParameters, "inverse_controller"),
         )
         assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
@@ -46,9 +47,7 @@ class LoopParameters:
         """The straight robot with the controller's weights, which the board keeps until another target arrives."""
         length = self.robot.length
         weight = direction_weight(length, self.controller.tip_direction_weight)
-        return straight_target(
-            length, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight
-        )
+        return straight_target(length, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight)
 
 
 def least_tensions(parameters: LoopParameters) -> np.ndarray:

@@ -102,6 +102,11 @@ class StandaloneLoop:
         self._library.gc_loop_joystick(self._at, True, x, y)
 
     @property
+    def address(self) -> int:
+        """Where the loop's state is in memory."""
+        return self._at
+
+    @property
     def gravity(self) -> np.ndarray:
         """The estimated gravity (3,) in m/s^2 in soft_base."""
         self._library.gc_loop_read(self._at, self._result)
