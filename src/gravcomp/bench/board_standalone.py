@@ -120,7 +120,7 @@ def _counts(file: RobotFile, path: np.ndarray, step: int) -> tuple[list[int], in
     before, now = path[step - 1], path[step]
     turn = -np.cross(before, now) / (now @ now) / SAMPLE_PERIOD
     force, rate = back @ (-now) / _GRAVITY * _PER_G, back @ turn * _COUNTS_PER_RAD_S
-    return [int(round(float(value))) for value in (*force, *rate)], round(1e6 * SAMPLE_PERIOD) * step
+    return [round(float(value)) for value in (*force, *rate)], round(1e6 * SAMPLE_PERIOD) * step
 
 
 def estimator(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:

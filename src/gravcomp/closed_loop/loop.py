@@ -75,9 +75,9 @@ class ClosedLoop:
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none;
-        board: of the virtual robot, see there; or "standalone": the firmware's loop in C computes the commands in place of filter,
-        simulator and inverse problem, which needs a reduced model. Raises RuntimeError where the bridge does not start, ConfigError
-        for a robot that does not fit the board.
+        board: of the virtual robot, see there; or "standalone": the firmware's loop in C computes the commands in place of
+        filter, simulator and inverse problem, which needs a reduced model. Raises RuntimeError where the bridge does not start,
+        ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(

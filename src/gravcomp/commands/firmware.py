@@ -127,9 +127,10 @@ def _model(args: argparse.Namespace) -> int:
         "reduction_error_mm": round(1e3 * found.reduction_error, 4),
     }
     sentence = (
-        f"{path}: {figures['modes']} of {figures['modes_of_reduced_model']} modes, {found.strains} strains; {len(found.blob) / 1024:.0f} of"
-        f" {SLOT_BYTES // 1024} KB of flash; {1e-3 * found.multiply_adds:.0f} thousand multiply-adds a step, about"
-        f" {found.milliseconds:.1f} of {LONGEST_MS:g} ms; the tip is up to {1e3 * found.error:.4f} mm from that of the whole reduced model"
+        f"{path}: {figures['modes']} of {figures['modes_of_reduced_model']} modes, {found.strains} strains;"
+        f" {len(found.blob) / 1024:.0f} of {SLOT_BYTES // 1024} KB of flash; {1e-3 * found.multiply_adds:.0f} thousand multiply-adds a"
+        f" step, about {found.milliseconds:.1f} of {LONGEST_MS:g} ms; the tip is up to {1e3 * found.error:.4f} mm from that of the"
+        " whole reduced model"
     )
     output.result(figures, sentence)
     return 0

@@ -38,7 +38,7 @@ _BRANCHES = frozenset(
 
 @dataclasses.dataclass(frozen=True)
 class Cycles:
-    """Cycles of a call: executed, waited for the flash's data and for its code; by_function: of those executed; stack in bytes."""
+    """Cycles of a call: executed, waited for the flash's data and for its code; by_function: of those executed."""
 
     executed: int
     data_waits: int

@@ -117,8 +117,10 @@ class StandaloneLoop:
         result, m = self._result, self._cables
         self._library.gc_loop_read(self._at, result)
         return LoopResult(
-            *(np.array(values, dtype=float) for values in (result.gravity, result.tip)),
-            *(np.array(values[:m], dtype=float) for values in (result.displacement, result.tension)),
+            gravity=np.array(result.gravity, dtype=float),
+            tip=np.array(result.tip, dtype=float),
+            displacement=np.array(result.displacement[:m], dtype=float),
+            tension=np.array(result.tension[:m], dtype=float),
             left=result.left,
             code=result.code,
             converged=bool(result.converged),
