@@ -25,6 +25,9 @@ from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.firmware.model_fit import blob_for
+from gravcomp.firmware.model_settings import LoopParameters
+from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
@@ -56,6 +59,10 @@ _RELEASE_SLACK = 0.05
 """Of the robot's length: released cables are paid out so far beyond their paths that no motion of the robot makes them taut."""
 
 
+STANDALONE = "standalone"
+"""Board on which the firmware's loop runs."""
+
+
 class ClosedLoop:
     """State of the loop. `shape` is the last result of the simulator."""
 
@@ -76,8 +83,9 @@ class ClosedLoop:
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
-        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. Raises RuntimeError
-        where the bridge does not start.
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there; or "standalone": the
+        firmware's loop in C computes the commands in place of filter, simulator and inverse problem, which needs a reduced model.
+        Raises RuntimeError where the bridge does not start, ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -86,8 +94,9 @@ class ClosedLoop:
             setup.virtual_hardware,
             seed=setup.seed,
             motion=motion,
-            board=board,
+            board="virtual" if board == STANDALONE else board,
         )
+        self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == STANDALONE else None
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
@@ -205,6 +214,8 @@ class ClosedLoop:
         estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
         if not isinstance(estimate, Problem):
             self._gravity = np.array(estimate.gravity)
+        if self._on_board is not None:
+            self._on_board.weigh(stamp_ns // 1000, sample.angular_rate, sample.specific_force)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
         # The model starts at rest and relaxed, and creeps from then on.
@@ -259,6 +270,10 @@ class ClosedLoop:
         return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free))), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
+        if self._on_board is not None:
+            self._on_board.follow(SAMPLE_PERIOD)
+            result = self._on_board.read()
+            return result.displacement, result.tension
         command = self._problem.step(
             shape.response,
             target,
@@ -292,6 +307,11 @@ class ClosedLoop:
                 self._sent,
             )
         )
+
+
+def _parameters(setup: Setup) -> LoopParameters:
+    """Return what the loop on the board takes from the setup."""
+    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware)
 
 
 def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:
