@@ -29,6 +29,8 @@ def add_wrench_arguments(parser: argparse.ArgumentParser) -> None:
 
 def wrenches_of(args: argparse.Namespace) -> "tuple[Wrench, ...]":
     """Return the wrenches of the arguments. Raises ValueError for those that cannot be used."""
+    import numpy as np
+
     from gravcomp.full_model.wrench import Wrench
 
     for name, given in (("--wrench-at", args.wrench_at), ("--wrench-frame", args.wrench_frame)):
@@ -47,7 +49,7 @@ def wrenches_of(args: argparse.Namespace) -> "tuple[Wrench, ...]":
         if not 0.0 <= station <= 1.0:
             raise ValueError(f"--wrench-at is {station:g}; allowed: 0 at the base to 1 at the tip")
         frame = args.wrench_frame[number] if number < len(args.wrench_frame) else "fixed"
-        found.append(Wrench(force, moment, station, follower=frame == "follower"))
+        found.append(Wrench(np.array(force), np.array(moment), station, follower=frame == "follower"))
     return tuple(found)
 
 
