@@ -16,9 +16,12 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.time import Time
 from rclpy.timer import Timer
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from gravcomp.arm.shape_chain import joint_names, joint_positions
+from gravcomp.config import ConfigError
 from gravcomp.external_loads import LivePayload
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
@@ -51,7 +54,11 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
-        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
+        scene = self.robot_file.scene
+        if self._dynamic and scene:
+            raise ConfigError(f"{self.robot_file.source}: scene needs the mode static of fem_simulator; mode is dynamic")
+        robot = self.robot_file.robot.with_assumed_lines()
+        self._simulator = DynamicSimulator(robot) if self._dynamic else Simulator(robot, scene=scene)
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
         # The first step compiles functions that are not cached yet; do it before the first sample arrives.
@@ -68,6 +75,9 @@ class FemSimulator(ManagedNode):
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
         self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
+        robot = self.robot_file.robot
+        self._chain_names = joint_names(self.parameters.joint_prefix, len(robot.effectors.backbone_station))
+        self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
         self._loads = LoadInputs(self, self.robot_file.robot, self.parameters)
 
     def activate(self) -> None:
@@ -98,8 +108,9 @@ class FemSimulator(ManagedNode):
         if self._builder is not None:
             self._builder.terminate()
             self._builder.wait()
-        for publisher in (self._deformation, self._tip, self._markers):
-            self.destroy_publisher(publisher)
+        for publisher in (self._deformation, self._tip, self._markers, self._chain):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
         self._transforms.destroy()
         self._loads.destroy()
 
@@ -209,6 +220,9 @@ class FemSimulator(ManagedNode):
         if self._markers.get_subscription_count():
             self._markers.publish(self._robot_markers.of(shape, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
+        if self._chain is not None:
+            positions = joint_positions(shape.backbone_position, self.robot_file.robot.length)
+            self._chain.publish(JointState(header=header, name=self._chain_names, position=positions))
 
     def _refuse(self, sentence: str) -> None:
         self._refused += 1

@@ -44,8 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--board",
         default="virtual",
         choices=BOARDS,
-        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the bus of the"
-        " host and the motors",
+        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the"
+        " host's bus and the motors",
     )
     add_tracker_argument(parser)
     add_seed_argument(parser)

@@ -170,6 +170,14 @@ class Robot:
         """Return the elongation in m/N of the cable from capstan to end under a tension that is the same along it."""
         return self.line_length(cable) / cable.stiffness
 
+    def with_assumed_lines(self) -> "Robot":
+        """Return the robot as the loop takes it: with the lines of `CableLine.assumed` where nothing is said of a line.
+
+        An unknown line stretches. With its most probable stretch in the model, only the deviation from it remains as an error.
+        """
+        cables = tuple(cable.assumed(self.limits.tension_max, self.length) for cable in self.cables)
+        return self if cables == self.cables else dataclasses.replace(self, cables=cables)
+
     def with_material(self, **changes: Any) -> "Robot":
         """Return the robot with these fields of every segment's (or the body's) material changed; caps keep theirs."""
         return self.with_materials([dataclasses.replace(material, **changes) for material in self.materials])

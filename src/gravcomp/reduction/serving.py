@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 
+from gravcomp.contact.contacts import Contacts
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
@@ -22,9 +23,10 @@ from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.reduced_loads import ReducedLoads
-from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.reduced_model import ReducedModel, fields
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 
 # Largest tip error of the reduced model as a fraction of the length; below half of it, the reduced model is used again.
@@ -55,6 +57,8 @@ class ReducedServing:
         self._tolerance = _TOLERANCE * model.length
         self._tracker = ReducedTracker(reduced, model.length)
         self._loads = ReducedLoads(model, reduced.basis)
+        if full.contact is not None:
+            self._tracker.contact = ReducedContact(full.contact, full.contact.changes(fields(model, reduced.basis)))
         self.reset()
 
     def reset(self) -> None:
@@ -238,4 +242,5 @@ class ReducedServing:
             model="reduced",
             status=ShapeStatus.OK,
             message=self._beyond_range,
+            contacts=Contacts.none() if self._tracker.contact is None else self._tracker.contact.contacts(state.q),
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.contact.contacts import Contacts
+from gravcomp.contact.start import refuse_start
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.contact import FullContact
@@ -45,17 +46,19 @@ class Simulator:
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None):
         """reduced: use the reduced model if one is built; scene: what the robot touches.
 
-        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact.
+        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact, ConfigError for a
+        scene in which the robot cannot be.
         """
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
         self.scene = scene
         if scene:
+            refuse_start(scene, self.robot)
             self.solver.contact = FullContact(self.model, scene)
         self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
-        self._serving = self.load_reduced() if reduced and not scene else None
+        self._serving = self.load_reduced() if reduced else None
 
     def load_reduced(self) -> "ReducedServing | None":
         """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""

@@ -120,6 +120,8 @@ class MovingRod:
             self._compliance,
             model.length,
             model.stiffness,
+            model.filament,
+            model.curve,
             model.rest_strain,
             self.mass,
             self.centre,

@@ -227,13 +227,13 @@ class VirtualRobot:
 
     def _act(self) -> list[can.Message]:
         """Do what is due at this tick and return the frames that are sent."""
-        sent = []
+        sent: list[can.Message] = []
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
             for section, force in self._pushes.items():
                 self._rod.load[section] = orientation @ force
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
-        behind = []  # frames of motors that the board passes on
+        behind: list[can.Message] = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:
             for motor, bus, values in zip(self._hardware.motors, self._bus_of_motor, self._motors.feedback()):
                 frame = c610.feedback(motor.can_id, **values)

@@ -92,6 +92,7 @@ def _reached(
             tension=shape.cable_tension,
             interval=0.02,
             followed=shape.is_equilibrium,
+            contact=shape.contacts.sentence,
         )
         shape = simulator.step(gravity, command.displacement, wrench=wrenches)
         if shape.is_equilibrium and np.linalg.norm(shape.tip_position - before) < 1e-8:

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         contacts = shape.contacts
         figures["contacts"] = [
             {
-                "obstacle": simulator.scene.names[contacts.obstacle[i]],
+                "obstacle": contacts.names[i],
                 "station": contacts.station[i],
                 "position_mm": (1e3 * contacts.position[i]).tolist(),
                 "gap_mm": 1e3 * contacts.gap[i],

@@ -27,14 +27,14 @@ class ImageBoard:
         image: Image | None = None,
     ):
         self.machine = Machine(image or build_image(), unique_id)
-        self._settle()
+        self._now = 0
         self.set(settings or {})
 
     def restart(self, cause: int = 0) -> None:
         """Start as after a reset of this cause (core/board.h)."""
         self.machine.flash.words_left = None
         self.machine.reset(_CAUSES[cause])
-        self._settle()
+        self._now = 0
 
     def set(self, settings: Mapping[str, float]) -> None:
         """Set parameters by name, without a request. Raises ConfigError for an unknown name or a value out of range."""
@@ -59,7 +59,7 @@ class ImageBoard:
             self._now = (self._now + TICK) & 0xFFFFFFFF
             self.machine.tick(self._now)
             if len(self.machine.resets) != resets:
-                self._settle()
+                self._now = 0
                 return
 
     def receive(self, message: can.Message, bus: int = HOST_BUS) -> None:
@@ -93,9 +93,6 @@ class ImageBoard:
     def faults(self) -> int:
         """Bits of the present faults."""
         return self.machine.call("gc_board_faults", self.machine.symbols["board"]) & 0xFFFF
-
-    def _settle(self) -> None:
-        self._now = 0
 
 
 def _wire(message: can.Message) -> WireFrame:

@@ -26,6 +26,12 @@ class FemSimulatorParameters:
     marker_rate: float = parameter(
         10.0, unit="Hz", minimum=0.0, maximum=10.0, description="rate of robot/markers and TF; 0: neither is published"
     )
+    shape_joints: bool = parameter(
+        False,
+        description="publish the shape as the joints of the URDF's chain in joint_states, at marker_rate",
+        read_only=True,
+    )
+    joint_prefix: str = parameter("", description="prefix of the joints of shape_joints, as in the URDF", read_only=True)
     base_frame: str = parameter("soft_base", description="frame of the shape", read_only=True)
     tip_frame: str = parameter("soft_tip", description="TF frame of the tip", read_only=True)
     payload_mass: float = parameter(
