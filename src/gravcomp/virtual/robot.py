@@ -124,7 +124,7 @@ class VirtualRobot:
         self._pushes[section] = np.asarray(force, dtype=float)
 
     def attach(self, mass: float, centre: np.ndarray | None = None) -> None:
-        """Fix a payload of `mass` kg to the tip, beside the described one; centre (3,) m: in the axes of the tip."""
+        """Fix a payload of `mass` kg to the tip, in addition to the described one; centre (3,) m: in the axes of the tip."""
         self._rod.attach(mass, np.zeros(3) if centre is None else np.asarray(centre, dtype=float))
 
     def inject(self, fault: Fault) -> None:
