@@ -125,7 +125,7 @@ def motion(progress: Progress, every: int = 1) -> dict:
             whole += abs(float(model.nodal_weight @ (simulator.displacements - moved) @ gravity))
             before, moved = shape, simulator.displacements.copy()
         touched += bool(len(before.contacts))
-        gained = max(gained, net / whole)
+        gained = max(gained, net / whole) if whole else gained
     return {
         "penetration_mm": 1e3 * deepest, "contact_energy": gained, "contact_scenes": touched, "lost_steps": lost / max(steps, 1),
     }  # fmt: skip

@@ -57,7 +57,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
-    "contact": {"every": 20},
+    "contact": {"every": 19},
     "track": {"seeds": 1},
     "estimator": {"every": 13},
     "streams": {"every": 5},
