@@ -25,6 +25,7 @@ from gravcomp.contact.surface import contact_surface
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.turning_loads import TurningFactor
 from gravcomp.mechanics.block_matrix import BlockCholesky
 from gravcomp.mesh.sections import section_functionals
 from gravcomp.scene.distance import gap_to
@@ -90,7 +91,7 @@ class FullContact:
         return all_gaps(self.scene.arrays, self.surface, sections, reach, np.zeros((*shape, 2)), np.zeros((*shape, 3)))
 
     def respond(
-        self, state: Equilibrium, factor: BlockCholesky, out: np.ndarray, cables: CableInput
+        self, state: Equilibrium, factor: BlockCholesky | TurningFactor, out: np.ndarray, cables: CableInput
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the step (3 n_free,) and the tensions (m,) for the forces `out` (3 n_free,) without cables and contact.
 

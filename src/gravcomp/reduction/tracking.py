@@ -16,6 +16,7 @@ from numba import njit
 from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.contact import ReducedContact, tracked_touching
@@ -79,11 +80,16 @@ class ReducedTracker:
         return self._point.strain
 
     def track(
-        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, creep: tuple[float, np.ndarray] | None = None
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        iterations: int = 4,
+        creep: tuple[float, np.ndarray] | None = None,
+        force: np.ndarray | None = None,
     ) -> ReducedState:
         """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`.
 
-        creep: of `Memory.stress`; None: the branches have relaxed.
+        creep: of `Memory.stress`; None: the branches have relaxed. force (r,): acts in addition to the weight.
         """
         stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
@@ -91,6 +97,8 @@ class ReducedTracker:
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
         wound, given = cables.arrays(state.tension.size)
         weight = self.model.weight @ gravity
+        if force is not None:
+            weight = weight + force
         if self.contact is not None:
             return self._touching(gravity, weight, wound, given, 1.0 + stiffer, offset, iterations)
         converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
@@ -112,6 +120,22 @@ class ReducedTracker:
             return replace(state, residual=np.inf, converged=False)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
+
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present state.
+
+        Raises NotPositiveDefinite where the state is not stable.
+        """
+        body, point, state = self._body, self._point, self.state
+        matrix = elastic_stiffness(body, point, state.q, point.strain, 1.0, self._kept)
+        add_stiffness(body.cables, point.tendons, state.tension, matrix)
+        definite, factor = factorise(matrix)
+        if not definite:
+            raise NotPositiveDefinite("the reduced stiffness is not positive definite")
+        columns = body.tip.T.copy()
+        solve(factor, columns)
+        compliance: np.ndarray = body.tip @ columns
+        return compliance
 
     def _touching(
         self, gravity: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray, scale: float, offset: np.ndarray,
