@@ -3,11 +3,14 @@
 import numpy as np
 
 from gravcomp.virtual.backbone import backbone_poses
+from gravcomp.virtual.contact import slots
+from gravcomp.virtual.contact_force import touching_of
 from gravcomp.virtual.equilibrium import RodShape
 from gravcomp.virtual.forces import half_bandwidth
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel, strains
 from gravcomp.virtual.routing import tendon_lengths
+from gravcomp.virtual.surroundings import RodSurroundings, Touches, touches_of
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
 from gravcomp.virtual.time_step import MOST_ITERATIONS, time_step
 
@@ -15,9 +18,14 @@ from gravcomp.virtual.time_step import MOST_ITERATIONS, time_step
 class MovingRod:
     """State of the moving rod. The arrays are changed in place by each step."""
 
-    def __init__(self, model: RodModel, material: RodMaterial, friction: TendonFriction):
-        """Start unloaded and at rest, the base at the origin, the tendons slack."""
+    def __init__(
+        self, model: RodModel, material: RodMaterial, friction: TendonFriction, surroundings: RodSurroundings | None = None
+    ):
+        """Start unloaded and at rest, the base at the origin, the tendons slack. Without `surroundings` nothing is around it."""
         self.model, self.material, self.friction = model, material, friction
+        self._around = around = surroundings or RodSurroundings.none(model)
+        self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
+        self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
         n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
         self.orientation, self.position = model.unloaded()
         self.velocity = np.zeros((n + 1, 6))
@@ -57,6 +65,11 @@ class MovingRod:
         return np.where(taut, self._wound - self.tension / np.where(taut, spring, 1.0), self.shortened)
 
     @property
+    def touches(self) -> Touches:
+        """The places where the rod touches walls at present."""
+        return touches_of(self._touching, self._around.walls, self.orientation, self.position)
+
+    @property
     def tension_share(self) -> np.ndarray:
         """Share (m, n) of the tension at the capstan that arrives in each element."""
         friction = self.friction
@@ -82,6 +95,8 @@ class MovingRod:
         self._slip_strain[:] = self.strain[:, 3:5]
         self.tension = shape.tension.copy()
         self._compliance[:] = 0.0
+        self._held[:] = 0.0
+        self._touching.count[0] = 0
         taut = (self.tension > 0.0) & (self.tendon_stiffness > 0.0)
         self._wound[taut] = self.shortened[taut] + self.tension[taut] / self.tendon_stiffness[taut]
 
@@ -136,6 +151,13 @@ class MovingRod:
             self._direction,
             self._chord,
             self._band,
+            self._around.walls,
+            self._around.surface,
+            self._around.rigid,
+            self._around.depth,
+            self._held,
+            self._touching,
+            self._checked,
         )
         self._wound[:] = wound
         if not possible:
@@ -163,5 +185,7 @@ class MovingRod:
         for rates in (self.velocity, self._acceleration, self._velocity_rate):
             rates[:] = 0.0
         self._sliding[:] = 0.0
+        self._held[:] = 0.0
+        self._touching.count[0] = 0
         self.tension[:] = 0.0
         self._measure()
