@@ -1,18 +1,23 @@
 """Reading a robot file (YAML): its sections, and the robot."""
 
 import dataclasses
+import functools
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.default_hardware import has_motors, with_motors
 from gravcomp.description.robot import Robot
+from gravcomp.scene import SceneSection
+
+if TYPE_CHECKING:
+    from gravcomp.scene.scene import Scene
 
 IN_SOFTWARE = ("udp_multicast", "virtual")
 """Interfaces of python-can without hardware."""
 
-SECTIONS = ("robot", "hardware", "virtual_robot", "nodes")
+SECTIONS = ("robot", "scene", "hardware", "virtual_robot", "nodes")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +38,15 @@ class RobotFile:
             raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
         section = dict(self.sections.get(name) or {})
         return section if name != "hardware" or has_motors(section) else with_motors(section, self.robot)
+
+    @functools.cached_property
+    def scene(self) -> "Scene":
+        """What the section `scene` describes; without one, a scene without obstacles. Its files are read. Raises ConfigError."""
+        from gravcomp.scene.scene import Scene
+
+        scene = Scene(_scene_section(self.sections, self.source), self.source)
+        scene.refuse_other_units(self.robot.length)
+        return scene
 
     def require_motors(self, interface: str) -> None:
         """Raise ConfigError for a file without motors on a bus (python-can's `interface`) that can carry real ones."""
@@ -73,7 +87,13 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
     if "robot" not in document:
         raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
     robot = from_mapping(Robot, _with_whole_path(document["robot"], path), source=str(path), key="robot")
+    _scene_section(document, str(path))
     return RobotFile(str(path), robot, document)
+
+
+def _scene_section(document: dict, source: str) -> SceneSection:
+    """Return the section `scene` of a robot file. Raises ConfigError."""
+    return from_mapping(SceneSection, document.get("scene"), source=source, key="scene")
 
 
 def _with_whole_path(section: Any, path: Path) -> Any:

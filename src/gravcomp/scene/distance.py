@@ -1,0 +1,243 @@
+"""Signed distances from points to the obstacles of a scene; compiled, because they are asked for in every step of a model.
+
+The gap is positive in free space and negative inside an obstacle; its gradient is the unit normal out of the obstacle. A tube is
+the envelope of the balls of radius r(t) around its centre line c(t): with
+
+    F(x) = max over t of r(t) - |x - c(t)|,
+
+F is the exact distance to its wall for a point inside, and -F for one outside, as long as the maximum is unique. The gap of the
+surface from a file is in `surface_distance`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from gravcomp.scene.surface_distance import SurfaceArrays, surface_gap
+
+PLANE, SPHERE, BOX, TUBE, SURFACE = range(5)
+
+_NEWTON_STEPS = 30
+
+
+class SceneArrays(NamedTuple):
+    """Obstacles in `soft_base`, SI.
+
+    obstacle (k,): its number in the scene (a hollow cuboid is six planes of one number); kind (k,); rotation (k, 3, 3) and origin
+    (k, 3): x = rotation y + origin for y in the obstacle's own frame; size (k, 3): half edges of a cuboid, or the radius; sign
+    (k,): 1 where the robot is outside, -1 inside; first and last (k,): its curve pieces; closed (k,): as in `TubeWall`;
+    stiffness (k,) in Pa, infinite: rigid; friction (k,). curve (c, 4, 4): coefficients of x, y, z, radius (columns) of each
+    piece by descending powers of the place in it, 0 to 1; samples (c, s, 4): x, y, z, radius at s places of each piece;
+    surface: `SurfaceArrays` of all meshes.
+    """
+
+    obstacle: np.ndarray
+    kind: np.ndarray
+    rotation: np.ndarray
+    origin: np.ndarray
+    size: np.ndarray
+    sign: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    closed: np.ndarray
+    stiffness: np.ndarray
+    friction: np.ndarray
+    curve: np.ndarray
+    samples: np.ndarray
+    surface: SurfaceArrays
+
+
+@njit(cache=True)
+def nearest(scene: SceneArrays, point: np.ndarray, normal: np.ndarray) -> tuple[float, int]:
+    """Return the smallest gap (m) at a point (3,) and its row in `scene`, and write the normal (3,); inf, -1 in an empty scene."""
+    best, row = np.inf, -1
+    other = np.zeros(3)
+    normal[:] = 0.0
+    for k in range(len(scene.kind)):
+        gap = gap_to(scene, k, point, other)
+        if gap < best:
+            best, row = gap, k
+            normal[:] = other
+    return best, row
+
+
+@njit(cache=True)
+def gap_to(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) -> float:
+    """Return the gap in m between a point (3,) and row k of `scene`, and write its normal (3,), a unit vector into free space."""
+    r = scene.rotation[k]
+    x, y, z = point[0] - scene.origin[k, 0], point[1] - scene.origin[k, 1], point[2] - scene.origin[k, 2]
+    own = np.empty(3)
+    for i in range(3):
+        own[i] = r[0, i] * x + r[1, i] * y + r[2, i] * z
+    here = np.empty(3)
+    kind = scene.kind[k]
+    if kind == PLANE:
+        here[0], here[1], here[2] = 0.0, 0.0, 1.0
+        gap = own[2]
+    elif kind == SPHERE:
+        gap = scene.sign[k] * (_from_centre(own, here, scene.sign[k]) - scene.size[k, 0])
+    elif kind == BOX:
+        gap = _box(own, scene.size[k], here)
+    elif kind == TUBE:
+        gap = _tube(scene, k, own, here)
+    else:
+        gap = scene.sign[k] * surface_gap(scene.surface, scene.first[k], own, here)
+        for i in range(3):
+            here[i] *= scene.sign[k]
+    for i in range(3):
+        normal[i] = r[i, 0] * here[0] + r[i, 1] * here[1] + r[i, 2] * here[2]
+    return gap
+
+
+@njit(cache=True)
+def _from_centre(own: np.ndarray, normal: np.ndarray, sign: float) -> float:
+    """Return the distance (m) from the origin, and write sign times the direction from there; any direction at the origin."""
+    length = np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+    for i in range(3):
+        normal[i] = sign * own[i] / length if length > 0.0 else (1.0 if i == 0 else 0.0)
+    return length
+
+
+@njit(cache=True)
+def _box(own: np.ndarray, half: np.ndarray, normal: np.ndarray) -> float:
+    """Return the gap to a solid cuboid."""
+    outside, deepest, face = 0.0, -np.inf, 0
+    for i in range(3):
+        beyond = abs(own[i]) - half[i]
+        normal[i] = max(beyond, 0.0) * (1.0 if own[i] >= 0.0 else -1.0)
+        outside += normal[i] ** 2
+        if beyond > deepest:
+            deepest, face = beyond, i
+    if outside > 0.0:
+        length = np.sqrt(outside)
+        for i in range(3):
+            normal[i] /= length
+        return length
+    normal[:] = 0.0
+    normal[face] = 1.0 if own[face] >= 0.0 else -1.0
+    return deepest
+
+
+@njit(cache=True)
+def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> float:
+    """Return the gap to the wall of a tube."""
+    first, last, places = scene.first[k], scene.last[k], scene.samples.shape[1]
+    best, place = -np.inf, 0.0
+    for piece in range(first, last):
+        for s in range(places):
+            c = scene.samples[piece, s]
+            value = c[3] - np.sqrt((own[0] - c[0]) ** 2 + (own[1] - c[1]) ** 2 + (own[2] - c[2]) ** 2)
+            if value > best:
+                best, place = value, piece + s / (places - 1)
+    width = 1.0 / (places - 1)
+    low, high = max(place - width, float(first)), min(place + width, float(last))
+    t = place
+    d = np.empty(3)
+    slope = 0.0
+    for _ in range(_NEWTON_STEPS):
+        value, slope, curvature = _along(scene, last, t, own, d)
+        if slope > 0.0:
+            low = t
+        else:
+            high = t
+        following = t - slope / curvature if curvature < 0.0 else 0.5 * (low + high)
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        if abs(following - t) < 1e-14 * (1.0 + abs(t)):
+            break
+        t = following
+    value, slope, _ = _along(scene, last, t, own, d)
+    length = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
+    if scene.sign[k] < 0.0:
+        end = (t <= first + 1e-12 and slope < 0.0) or (t >= last - 1e-12 and slope > 0.0 and not scene.closed[k])
+        if end:
+            beyond = _past_end(scene, last, t, t > 0.5 * (first + last), d, value + length, normal)
+            if beyond > 0.0:
+                return beyond
+    for i in range(3):
+        normal[i] = scene.sign[k] * d[i] / length if length > 0.0 else 0.0
+    if length == 0.0:  # on the centre line every direction is as good
+        _across(scene, last, t, normal)
+    return -scene.sign[k] * value
+
+
+@njit(cache=True)
+def _along(scene: SceneArrays, last: int, t: float, own: np.ndarray, d: np.ndarray) -> tuple[float, float, float]:
+    """Return r - |x - c| and its first and second derivatives at the place t (piece + share), and write d = x - c."""
+    piece = min(int(t), last - 1)
+    s = t - piece
+    a = scene.curve[piece]
+    square, along, bend, moved = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        c = ((a[0, i] * s + a[1, i]) * s + a[2, i]) * s + a[3, i]
+        c1 = (3.0 * a[0, i] * s + 2.0 * a[1, i]) * s + a[2, i]
+        c2 = 6.0 * a[0, i] * s + 2.0 * a[1, i]
+        d[i] = own[i] - c
+        square += d[i] * d[i]
+        along += d[i] * c1
+        bend += d[i] * c2
+        moved += c1 * c1
+    r = ((a[0, 3] * s + a[1, 3]) * s + a[2, 3]) * s + a[3, 3]
+    r1 = (3.0 * a[0, 3] * s + 2.0 * a[1, 3]) * s + a[2, 3]
+    r2 = 6.0 * a[0, 3] * s + 2.0 * a[1, 3]
+    length = np.sqrt(square)
+    if length < 1e-12:
+        return r - length, r1, 0.0
+    return r - length, r1 + along / length, r2 + (bend - moved) / length + along * along / length**3
+
+
+@njit(cache=True)
+def _past_end(scene: SceneArrays, last: int, t: float, far: bool, d: np.ndarray, radius: float, normal: np.ndarray) -> float:
+    """Return the distance to the rim of an open end for a point beyond it, d (3,) from its centre, and write its direction.
+
+    0 for a point that is not beyond.
+    """
+    tangent = np.empty(3)
+    _tangent(scene, last, t, tangent)
+    if not far:
+        tangent *= -1.0
+    axial = d[0] * tangent[0] + d[1] * tangent[1] + d[2] * tangent[2]
+    if axial <= 0.0:
+        return 0.0
+    across = d - axial * tangent
+    rho = np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    gap = np.sqrt(axial**2 + (rho - radius) ** 2)
+    for i in range(3):
+        normal[i] = (axial * tangent[i] + ((rho - radius) * across[i] / rho if rho > 0.0 else 0.0)) / gap
+    if rho == 0.0:
+        normal[:] = tangent
+    return gap
+
+
+@njit(cache=True)
+def _tangent(scene: SceneArrays, last: int, t: float, tangent: np.ndarray) -> None:
+    piece = min(int(t), last - 1)
+    s, a = t - piece, scene.curve[piece]
+    length = 0.0
+    for i in range(3):
+        tangent[i] = (3.0 * a[0, i] * s + 2.0 * a[1, i]) * s + a[2, i]
+        length += tangent[i] ** 2
+    tangent /= np.sqrt(length)
+
+
+@njit(cache=True)
+def _across(scene: SceneArrays, last: int, t: float, normal: np.ndarray) -> None:
+    """Write a unit vector (3,) across the curve at t."""
+    _tangent(scene, last, t, normal)
+    least = int(np.argmin(np.abs(normal)))
+    share = normal[least]
+    for i in range(3):
+        normal[i] = (1.0 if i == least else 0.0) - share * normal[i]
+    normal /= np.sqrt(1.0 - share * share)
+
+
+@njit(cache=True)
+def nearest_of_all(scene: SceneArrays, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return gap (n,), normal (n, 3) and number of the obstacle (n,) for points (n, 3)."""
+    count = len(points)
+    gap, normal, obstacle = np.empty(count), np.empty((count, 3)), np.empty(count, dtype=np.int64)
+    for i in range(count):
+        gap[i], row = nearest(scene, points[i], normal[i])
+        obstacle[i] = scene.obstacle[row] if row >= 0 else -1
+    return gap, normal, obstacle
