@@ -3,7 +3,7 @@
 The scene gives the gap of a point to each obstacle (`scene.distance`). Points that can touch are, for every obstacle,
 
     of each cross-section   the point of its outline that lies farthest towards the wall
-    of the last one         two more, a third of a turn to either side, and the point of its face next to the obstacle
+    of the last one         five more around its outline, and the point of its face next to the obstacle
     of each element         the point between its cross-sections where the gap is smallest, if that is smaller than at both
 
 Near its present place the wall of each point is taken as a plane with the true gap and normal there; the planes are found again
@@ -20,8 +20,10 @@ from gravcomp.scene.distance import SceneArrays, gap_to
 from gravcomp.virtual.contact_force import Touching, surface_point
 from gravcomp.virtual.surface import RodSurface, farthest, inside
 
-_FACE_POINTS = 3  # of the last cross-section, beside the one that it has like all others
-_TURN = np.array([[-0.5, -np.sqrt(0.75)], [-0.5, np.sqrt(0.75)]])  # cosine and sine of a third of a turn to either side
+_RIM = 5  # more points on the rim of the tip's face, at equal angles
+_FACE_POINTS = _RIM + 1  # of the last cross-section, beside the one that it has like all others
+_TURN = np.array([[np.cos(k * np.pi / 3), np.sin(k * np.pi / 3)] for k in range(1, _RIM + 1)])
+_STAYS = 1e-6  # of the rod's length: the points on the rim of the tip's face move on if others are deeper by so much
 _AIMS = 2  # evaluations of the gap until the point of an outline that lies farthest towards the wall is found
 _PARTS = 4  # of an element, between which its nearest place is bracketed
 _DEEPER = 1e-5  # of the element's length by which a place inside an element lies nearer than its ends
@@ -52,12 +54,14 @@ def find_contacts(
     orientation_before: np.ndarray,
     position_before: np.ndarray,
     held: np.ndarray,
+    rim: np.ndarray,
     touching: Touching,
 ) -> None:
     """Fill `touching` with the points whose gap is below `reach` m, for the rod at orientation (n + 1, 3, 3), position (n + 1, 3).
 
     length (n,) m: of the elements; rigid: stiffness in N/m of a point on a rigid wall; orientation_before and position_before: the
-    rod at the beginning of the step; held (slots, k, 3) N: tangential force then, in the wall's frame.
+    rod at the beginning of the step; held (slots, k, 3) N: tangential force then, in the wall's frame; rim (k, 3) m: place in the tip's section of its first
+    point on the rim, taken again as long as no other is deeper.
     """
     n = length.shape[0]
     touching.count[0] = 0
@@ -72,6 +76,15 @@ def find_contacts(
                 continue
             gap = _rim(walls, row, surface, k, orientation, position, k, arm[0], x, normal)
             arm[1] = 0.0
+            if k == n:
+                surface_point(orientation, position, n, 1.0, rim[row : row + 1], x)
+                before = _gap(walls, row, orientation, position, x, other[0])
+                if before < gap + _STAYS * np.sum(length):
+                    arm[0], gap = rim[row], before
+                    normal[:] = other[0]
+                else:
+                    surface_point(orientation, position, n, 1.0, arm, x)
+                    rim[row] = arm[0]
             share = 0.5 * (length[k - 1] + (length[k] if k < n else 0.0))
             if gap < reach:
                 _add(
@@ -80,7 +93,7 @@ def find_contacts(
                 )  # fmt: skip
             if k == n:
                 for extra in range(_FACE_POINTS):
-                    if extra < 2:
+                    if extra < _RIM:
                         c, s = _TURN[extra, 0], _TURN[extra, 1]
                         farthest(surface, n, c * arm[0, 0] - s * arm[0, 1], s * arm[0, 0] + c * arm[0, 1], other[0])
                     elif not _facing(walls, row, surface, orientation, position, other[0], x, normal):
@@ -278,8 +291,9 @@ def _add(
         touching.normal[c, i] = normal[i]
         plane += normal[i] * x[i]
         touching.held[c, i] = held[slot, row, i]
-        touching.force[c, i] = 0.0
+        touching.force[c, i] = touching.way[c, i] = 0.0
     touching.plane[c], touching.gap[c] = plane, gap
+    touching.decided[c] = False
     if walls.moving[row]:
         _carry(orientation_before, position_before, orientation, position, touching.start[c])
         _turn(orientation[0], touching.held[c])

@@ -12,7 +12,7 @@ from gravcomp.virtual.rod import RodModel, strains
 from gravcomp.virtual.routing import tendon_lengths
 from gravcomp.virtual.surroundings import RodSurroundings, Touches, touches_of
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
-from gravcomp.virtual.time_step import MOST_ITERATIONS, time_step
+from gravcomp.virtual.time_step import time_step
 
 
 class MovingRod:
@@ -25,6 +25,7 @@ class MovingRod:
         self.model, self.material, self.friction = model, material, friction
         self._around = around = surroundings or RodSurroundings.none(model)
         self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
+        self._rim = np.zeros((len(around.walls.moving), 3))
         self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
         n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
         self.orientation, self.position = model.unloaded()
@@ -110,7 +111,7 @@ class MovingRod:
         rigidly with the base and is at rest.
         """
         model, material, friction = self.model, self.material, self.friction
-        possible, iterations = time_step(
+        possible, converged = time_step(
             dt,
             base_orientation,
             base_position,
@@ -156,6 +157,7 @@ class MovingRod:
             self._around.rigid,
             self._around.depth,
             self._held,
+            self._rim,
             self._touching,
             self._checked,
         )
@@ -163,7 +165,7 @@ class MovingRod:
         if not possible:
             self._rest_as_it_was(base_orientation, base_position)
             return False
-        return iterations < MOST_ITERATIONS
+        return converged
 
     def carry(self, base_orientation: np.ndarray, base_position: np.ndarray) -> None:
         """Move the rod rigidly with its base to the given pose; shape, strains and body velocities do not change."""

@@ -12,7 +12,7 @@ from gravcomp.virtual.rod import RodModel
 from gravcomp.virtual.surface import RodSurface, rod_surface
 from gravcomp.virtual.true_robot import TrueRobot
 
-_DEPTH = 1e-5  # of the rod's length, by which the plane that stands for a wall may differ from it
+_DEPTH = 3e-5  # of the rod's length, by which the plane that stands for a wall may differ from it
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from numba import njit
 
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.contact import Walls, find_contacts, keep_friction
-from gravcomp.virtual.contact_force import Touching, add_contacts, difference, take_over
+from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, take_over
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
 from gravcomp.virtual.rod import strains
@@ -37,11 +37,11 @@ _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
 _ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
 _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
-MOST_ITERATIONS = 12
+_MOST_ITERATIONS, _MOST_AT_WALLS = 12, 25
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _LOOSER = 10.0  # than the static equilibrium, in force and moment
-_SEARCHES = 3  # for contacts in one step
+_SEARCHES = 4  # for contacts in one step
 _NEAR = 0.05  # of the half width of the rod: so near to a wall a point takes part, and farther by twice its way in the step
 
 
@@ -92,15 +92,16 @@ def time_step(
     rigid: float,
     depth: float,
     held: np.ndarray,
+    rim: np.ndarray,
     touching: Touching,
     checked: Touching,
-) -> tuple[bool, int]:
-    """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
+) -> tuple[bool, bool]:
+    """Advance the rod by dt s in place; return whether the state at the end is possible, and whether the iteration converged.
 
     The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
     of the step; compliance (m,) receives that of each tendon's path in one step, m/N; direction, chord and band are scratch.
     rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how much the planes of the contacts may differ from the
-    walls, held (slots, k, 3) N the friction; checked is scratch. MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
+    walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`; checked is scratch. If the state is not possible, pose and
     material keep their values from before the step, and the caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
@@ -124,7 +125,8 @@ def time_step(
     _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
     if obstacles > 0:
         find_contacts(
-            walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, touching
+            walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+            touching,
         )  # fmt: skip
         meets = meets or np.any(touching.gap[: touching.count[0]] < 0.0)
     beta, gamma = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F)), _GAMMA / (dt * _BETA)
@@ -140,8 +142,8 @@ def time_step(
     active, middle = np.empty(m), band.shape[1] // 2
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     new_strain = np.empty((n, 6))
-    iterations = MOST_ITERATIONS
-    for iteration in range(MOST_ITERATIONS):
+    converged = False
+    for _ in range(_MOST_AT_WALLS if obstacles > 0 else _MOST_ITERATIONS):
         _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
@@ -175,7 +177,7 @@ def time_step(
             pull,
             band,
         )
-        add_contacts(touching, orientation, position, residual, band)
+        admissible = add_contacts(touching, orientation, position, _LOOSER * tolerances[0], residual, band)
         worst = 0.0
         for k in range(1, n + 1):
             for i in range(6):
@@ -185,18 +187,20 @@ def time_step(
             _add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
             for i in range(6):
                 worst = max(worst, abs(residual[k, i]) / tolerances[i // 3])
-        if worst < _LOOSER and slack < _LOOSER * tolerances[0]:
+        if admissible and worst < _LOOSER and slack < _LOOSER * tolerances[0]:
             if obstacles > 0 and searches < _SEARCHES:
                 find_contacts(
-                    walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, checked
+                    walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+                    checked,
                 )  # fmt: skip
                 searches += 1
-            if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked) < depth:
-                iterations = iteration
+            if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth:
+                converged = True
                 break
             take_over(checked, touching)
             continue
         increment = newton_step(band, residual, gradient, pull, active, compliance)
+        expect(touching, orientation, position, increment)
         for k in range(1, n + 1):
             for i in range(6):
                 change = increment[6 * (k - 1) + i]
@@ -220,7 +224,7 @@ def time_step(
     if not _is_possible(orientation, position, new_strain, velocity, length):
         for k in range(n + 1):
             copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-        return False, iterations
+        return False, False
     if obstacles > 0:
         keep_friction(walls, orientation, touching, held)
     update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
@@ -230,7 +234,7 @@ def time_step(
     for e in range(n):
         for i in range(6):
             strain[e, i] = new_strain[e, i]
-    return True, iterations
+    return True, converged
 
 
 @njit(cache=True, error_model="numpy")
