@@ -274,3 +274,13 @@ def take_over(source: Touching, target: Touching) -> None:
             for side in range(2):
                 target.weight[c, side] = source.weight[c, side]
                 target.arm[c, side, i] = source.arm[c, side, i]
+
+
+@njit(cache=True, error_model="numpy")
+def forget_friction(touching: Touching) -> None:
+    """Let all points slide without friction; nothing is expected of them any more."""
+    for c in range(touching.count[0]):
+        touching.friction[c] = 0.0
+        touching.decided[c] = False
+        for i in range(3):
+            touching.held[c, i] = 0.0

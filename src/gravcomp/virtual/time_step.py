@@ -23,7 +23,7 @@ from numba import njit
 
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.contact import Walls, find_contacts, keep_friction
-from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, take_over
+from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, forget_friction, take_over
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
 from gravcomp.virtual.rod import strains
@@ -37,7 +37,8 @@ _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
 _ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
 _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
-_MOST_ITERATIONS, _MOST_AT_WALLS = 12, 25
+_MOST_ITERATIONS, _MOST_AT_WALLS = 12, 40
+_WITH_FRICTION = 25  # iterations at walls; the others start again, and take the step without friction
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _LOOSER = 10.0  # than the static equilibrium, in force and moment
@@ -142,8 +143,12 @@ def time_step(
     active, middle = np.empty(m), band.shape[1] // 2
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     new_strain = np.empty((n, 6))
-    converged = False
-    for _ in range(_MOST_AT_WALLS if obstacles > 0 else _MOST_ITERATIONS):
+    converged, slides = False, False
+    for iteration in range(_MOST_AT_WALLS if obstacles > 0 else _MOST_ITERATIONS):
+        if iteration == _WITH_FRICTION:
+            slides = True
+            forget_friction(touching)
+            _restart(gamma, beta, total_increment, velocity, velocity_rate)
         _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
@@ -194,6 +199,8 @@ def time_step(
                     checked,
                 )  # fmt: skip
                 searches += 1
+                if slides:
+                    forget_friction(checked)
             if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth:
                 converged = True
                 break
@@ -279,6 +286,22 @@ def _way(
             tip += orientation[0, i, j] * along
         moved += tip * tip
     return dt * np.sqrt(fastest) + np.sqrt(moved)
+
+
+@njit(cache=True, error_model="numpy")
+def _restart(
+    gamma: float,
+    beta: float,
+    total_increment: np.ndarray,
+    velocity: np.ndarray,
+    velocity_rate: np.ndarray,
+) -> None:
+    """Put the sections back to where they were at the beginning of the step, with the velocities and rates that this implies."""
+    for k in range(1, velocity.shape[0]):
+        for i in range(6):
+            velocity[k, i] -= gamma * total_increment[k, i]
+            velocity_rate[k, i] -= beta * total_increment[k, i]
+            total_increment[k, i] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
