@@ -21,6 +21,8 @@ setup(
         "console_scripts": [
             "can_bridge = gravcomp_hw.can_bridge:main",
             "can_guard = gravcomp.motors.guard:main",
+            "joint_bridge = gravcomp_hw.joint_bridge:main",
+            "joint_robot = gravcomp_hw.joint_robot:main",
             "judge = gravcomp_hw.judge:main",
             "virtual_robot = gravcomp_hw.virtual_robot:main",
         ],

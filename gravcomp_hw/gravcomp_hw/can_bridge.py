@@ -4,17 +4,14 @@ A separate thread publishes the samples and states from the driver's queue, so t
 (a thread of the driver) nor the commands (the executor).
 """
 
-import array
 import math
 import sys
 import threading
 import time
-from collections.abc import Callable
 
-from builtin_interfaces.msg import Time
-from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import Imu, JointState, Temperature
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
@@ -24,16 +21,12 @@ from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
-from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
-from gravcomp.motors.state import CableSnapshot, State
+from gravcomp.motors.state import CableSnapshot
+from gravcomp_hw.bridge_topics import LOG_PERIOD, ImuTopics, cable_state, level, trigger
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
-
-_TEMPERATURE_EVERY = 10  # samples; the chip updates its temperature every 1.28 s
-_LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}
-_LOG_PERIOD = 1.0  # s, between two log messages about refused commands
 
 
 class CanBridge(ManagedNode):
@@ -53,8 +46,7 @@ class CanBridge(ManagedNode):
             self._driver.open()
         except BusError as error:
             raise ConfigError(str(error)) from error
-        self._imu = self.create_publisher(Imu, "imu/data_raw", SENSOR)
-        self._temperature = self.create_publisher(Temperature, "imu/temperature", SENSOR)
+        self._imu = ImuTopics(self, p.imu_frame)
         self._state = self.create_publisher(CableState, "cable/state", COMMAND)
         self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
         self._logged, self._refusal_logged = "", -math.inf
@@ -73,10 +65,10 @@ class CanBridge(ManagedNode):
             self.create_subscription(CableCommand, "cable/command", self._command, COMMAND),
             # A best-effort subscription also receives from reliable publishers.
             self.create_subscription(Float32, "imu/heater", lambda m: self._driver.heater(m.data), SENSOR),
-            self.create_service(Trigger, "~/home", self._trigger(lambda bridge, now: bridge.home(now))),
-            self.create_service(Trigger, "~/stop", self._trigger(lambda bridge, now: bridge.stop())),
-            self.create_service(Trigger, "~/release", self._trigger(lambda bridge, now: bridge.release(now))),
-            self.create_service(Trigger, "~/resume", self._trigger(lambda bridge, now: bridge.resume(now))),
+            self.create_service(Trigger, "~/home", trigger(self._driver.request, lambda bridge, now: bridge.home(now))),
+            self.create_service(Trigger, "~/stop", trigger(self._driver.request, lambda bridge, now: bridge.stop())),
+            self.create_service(Trigger, "~/release", trigger(self._driver.request, lambda bridge, now: bridge.release(now))),
+            self.create_service(Trigger, "~/resume", trigger(self._driver.request, lambda bridge, now: bridge.resume(now))),
             self.create_timer(0.5, self._diagnose),
         ]
 
@@ -98,7 +90,8 @@ class CanBridge(ManagedNode):
             return
         driver.close()
         self._publisher.join(2.0)
-        for publisher in (self._imu, self._temperature, self._state, self._joints):
+        self._imu.destroy()
+        for publisher in (self._state, self._joints):
             self.destroy_publisher(publisher)
         self._driver = None
 
@@ -116,46 +109,22 @@ class CanBridge(ManagedNode):
         stamp = message.header.stamp
         reason = self._driver.command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
         # The logger's own throttle is not used: it looks up its caller's source each time, which takes longer than the command.
-        if reason and time.monotonic() - self._refusal_logged > _LOG_PERIOD:
+        if reason and time.monotonic() - self._refusal_logged > LOG_PERIOD:
             self._refusal_logged = time.monotonic()
             self.get_logger().warning(f"command refused: {reason}")
 
-    def _trigger(self, action: Callable[[Bridge, float], tuple[bool, str]]) -> Callable:
-        def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = self._driver.request(action)
-            return response
-
-        return serve
-
     def _publish(self) -> None:
         """Publish the entries of the driver's queue until the queue ends."""
-        count = 0
         while (entry := self._driver.queue.get()) is not None:
             if not self._publishing:
                 continue
             if isinstance(entry, ImuSample):
-                self._publish_imu(entry, with_temperature=count % _TEMPERATURE_EVERY == 0)
-                count += 1
+                self._imu.publish(entry)
             else:
                 self._publish_state(entry)
 
-    def _publish_imu(self, sample: ImuSample, *, with_temperature: bool) -> None:
-        message = Imu()
-        message.header.stamp = _time(round(1e9 * sample.stamp))
-        message.header.frame_id = self.parameters.imu_frame
-        a, w = message.linear_acceleration, message.angular_velocity
-        a.x, a.y, a.z = sample.specific_force
-        w.x, w.y, w.z = sample.angular_rate
-        message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
-        self._imu.publish(message)
-        if with_temperature:
-            self._temperature.publish(Temperature(header=message.header, temperature=float(sample.temperature)))
-
     def _publish_state(self, snapshot: CableSnapshot) -> None:
-        message = CableState(state=int(snapshot.state), message=snapshot.message)
-        message.header.stamp = _time(snapshot.stamp or self.get_clock().now().nanoseconds)
-        for name in ("command", "displacement", "velocity", "current", "tension"):
-            setattr(message, name, array.array("d", getattr(snapshot, name)))
+        message = cable_state(snapshot, self.get_clock().now().nanoseconds)
         self._state.publish(message)
         if not self._joints.get_subscription_count():
             return
@@ -167,12 +136,12 @@ class CanBridge(ManagedNode):
     def _diagnose(self) -> None:
         driver = self._driver
         snapshot, imu, link = driver.snapshot(), driver.imu.counters, driver.link.counters
-        level = _LEVELS.get(snapshot.state, WARN)
+        severity = level(snapshot.state)
         fault = driver.imu.fault
         state = f"{snapshot.state.name.lower()}: "
         sentence = state + snapshot.message.removeprefix(state) + (f"; {fault}" if fault else "")
         self.report(
-            max(level, WARN) if fault else level,
+            max(severity, WARN) if fault else severity,
             sentence,
             bus=driver.link.status,
             frames_received=link.received,
@@ -191,14 +160,10 @@ class CanBridge(ManagedNode):
         )
         if sentence != self._logged:
             self._logged = sentence
-            if level == OK and not fault:
+            if severity == OK and not fault:
                 self.get_logger().info(sentence)
             else:
                 self.get_logger().warning(sentence)
-
-
-def _time(nanoseconds: int) -> Time:
-    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
 def main() -> int:

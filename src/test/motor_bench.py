@@ -7,7 +7,7 @@ from gravcomp.canbus import codec
 from gravcomp.description.hardware import COUNTS_PER_TURN, Drive, Hardware, Motor
 from gravcomp.motors.bridge import Bridge
 
-HARDWARE = Hardware(motors=tuple(Motor(f"c{i}", i, 1 if i % 2 else -1) for i in range(1, 7)))
+HARDWARE = Hardware(motors=tuple(Motor(f"c{i}", i, direction=1 if i % 2 else -1) for i in range(1, 7)))
 STEP = 5e-4  # s
 
 

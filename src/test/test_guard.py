@@ -19,6 +19,9 @@ from gravcomp.description.hardware import CanInterface, Hardware, Motor
 from gravcomp.motors.guard_client import GuardClient, GuardError
 from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT, GuardSettings
 
+COUNT = 2 * 8192 - 60
+"""Count of motor 1 when the bridge dies: just before the angle wraps."""
+
 # A process in place of the bridge: sends heartbeats until it is ended.
 BRIDGE = """
 import sys, time
@@ -28,7 +31,7 @@ from gravcomp.motors.state import RotorRecord
 can, watchdog = CanInterface(channel=sys.argv[1]), Watchdog(zero_timeout=float(sys.argv[3]))
 def record():
     now = time.monotonic()
-    return {1: RotorRecord(10_000, 5, float(sys.argv[2]), now), 5: RotorRecord(20, 6, 0.0, now)}
+    return {1: RotorRecord(int(sys.argv[4]), 5, float(sys.argv[2]), now), 5: RotorRecord(20, 6, 0.0, now)}
 guard = GuardClient.connect(Hardware(motors=(Motor("a", 1), Motor("b", 5)), can=can, watchdog=watchdog), record())
 print("ready", flush=True)
 while guard.beat(record()):
@@ -62,7 +65,7 @@ def bridge(hardware, bus):
 
 def start_bridge(hardware, rpm=0, **options):
     """Start it with motor 1 turning at `rpm`."""
-    command = [sys.executable, "-c", BRIDGE, hardware.can.channel, str(rpm), str(hardware.watchdog.zero_timeout)]
+    command = [sys.executable, "-c", BRIDGE, hardware.can.channel, str(rpm), str(hardware.watchdog.zero_timeout), str(COUNT)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **options)
     assert process.stdout.readline() == "ready\n"
     return process
@@ -106,10 +109,10 @@ def test_a_second_bridge_on_the_bus_is_refused(bridge, hardware):
 
 
 def turn_on(hardware, rpm):
-    """Turn motor 1 from the count 10,000 at `rpm` for 0.5 s; return its last count."""
+    """Turn motor 1 from COUNT at `rpm` for 0.5 s; return its last count."""
     motors, begin = CanLink(hardware.can), time.monotonic()
     while (elapsed := time.monotonic() - begin) < 0.5:
-        count = 10_000 + round(rpm * 8192 / 60 * elapsed)
+        count = COUNT + round(rpm * 8192 / 60 * elapsed)
         motors.send(
             [
                 codec.encode("MotorFeedback1", angle=count % 8192, speed=rpm, current=0),
@@ -139,7 +142,8 @@ def test_the_next_bridge_gets_the_turns_that_the_guard_counted(hardware, bus):
     bridge = start_bridge(hardware)
     bridge.kill()
     bridge.wait()
-    count = turn_on(hardware, 20)  # slow: a pause of the machine leaves the turns certain
+    count = turn_on(hardware, 2)  # slow: a pause of the machine for 0.7 s leaves the turns certain
+    assert count > 2 * 8192
     wait_for_rounds(bus)
     client = GuardClient.connect(hardware)
     kept = {can_id: (rotor.count, rotor.zero, rotor.certain) for can_id, rotor in client.record.items()}

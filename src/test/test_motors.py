@@ -15,6 +15,7 @@ from gravcomp.motors.homing import find_knee
 from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.output import CurrentOutput
+from gravcomp.motors.setpoint import Setpoint
 
 RPM = 60.0 / COUNTS_PER_TURN  # rpm of one count per second
 
@@ -208,11 +209,11 @@ def test_a_nan_current_is_zero():
 
 def test_the_setpoint_keeps_velocity_and_acceleration_limits():
     drive = Drive()
-    loop, dt = PositionLoop(drive), 0.004
+    setpoint, dt = Setpoint(drive.acceleration_limit), 0.004
     path = []
     for k in range(500):
-        loop.step(0.02 if k < 200 else -0.005, 0.0, loop.setpoint, loop.setpoint_velocity, dt)
-        path.append((loop.setpoint, loop.setpoint_velocity))
+        setpoint.advance(0.02 if k < 200 else -0.005, drive.velocity_limit, dt)
+        path.append((setpoint.position, setpoint.velocity))
     x, v = np.array(path).T
     assert np.abs(v).max() <= drive.velocity_limit * (1 + 1e-9)
     assert np.abs(np.diff(v)).max() <= drive.acceleration_limit * dt * (1 + 1e-9)

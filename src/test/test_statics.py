@@ -177,6 +177,30 @@ def test_an_equilibrium_lost_by_a_small_step_is_not_searched_for_immediately(mon
     assert len(searches) == 2  # from the straight robot it is a jump
 
 
+def test_a_jump_of_the_load_is_followed_in_parts_without_a_search_from_the_straight_robot(simulator, monkeypatch):
+    """A loop that waits a second for its model takes a longer step next, and waits again."""
+    before, after = [-G, 0.0, 0.0], np.array([0.0, -G, 0.0])
+    pulled = np.array([6e-3, 0.0, 0.0, -4e-3, 0.0, 0.0])
+    wanted = simulator.solve(after, displacement=pulled)
+    simulator.solve(before, displacement=np.zeros(6))
+    track, steps = simulator.solver.track, []
+
+    def in_short_steps(gravity, cables, *arguments, **options):
+        """Follow a quarter of the gravity at most."""
+        turned = np.linalg.norm(gravity - (steps[-1] if steps else np.array(before)))
+        state = track(gravity, cables, *arguments, **options)
+        if turned > 0.26 * G:
+            return dataclasses.replace(state, converged=False)
+        steps.append(gravity)
+        return state
+
+    monkeypatch.setattr(simulator.solver, "track", in_short_steps)
+    monkeypatch.setattr(simulator.solver, "solve", lambda *a: pytest.fail("searched from the straight robot"))
+    followed = simulator.step(after, displacement=pulled)
+    assert followed.is_equilibrium and len(steps) > 5
+    assert followed.tip_position == pytest.approx(wanted.tip_position, abs=1e-6)
+
+
 def test_a_load_that_crushes_an_element_in_one_step_is_applied_in_parts():
     """Newton's method with the whole load gives an iterate that is not finite."""
     robot = load_robot_file("article").robot.with_material(law="neo_hookean")

@@ -1,9 +1,12 @@
 """Configuration of Sphinx for `./gravcomp docs`, which reads a copy of the repository."""
 
+import builtins
 import re
 from pathlib import Path
 from types import GenericAlias
 from typing import Any
+
+from sphinx import addnodes
 
 from gravcomp import __version__
 
@@ -11,7 +14,7 @@ project = "gravcomp"
 copyright = "gravcomp maintainers"
 version = release = __version__
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_parser"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_parser"]
 root_doc = "index"  # a copy of index.md in this folder
 include_patterns = [
     "index.md",
@@ -32,7 +35,7 @@ autosummary_generate = True
 autodoc_default_options = {"members": True, "undoc-members": True, "ignore-module-all": True}
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
-numpydoc_show_class_members = False
+napoleon_google_docstring = False
 # In docstrings `name` is code.
 default_role = "code"
 
@@ -44,16 +47,18 @@ myst_fence_as_directive = []
 suppress_warnings = ["myst.xref_missing", "myst.header", "misc.highlighting_failure", "ref.python"]
 
 html_theme = "alabaster"
+html_sidebars = {"**": ["about.html", "searchfield.html", "localtoc.html", "relations.html"]}
 html_title = f"gravcomp {release}"
 html_show_copyright = False
 
+_FOREIGN = {"np", "numpy", "collections", "pathlib", "typing", "enum", "argparse", "subprocess", "scipy"}
 _SECTION = re.compile(r"^\s*-{3,}\s*$")
 
 
 def plain_text(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
     """Turn the prose of a docstring into reStructuredText: indented blocks become literal, other markup is escaped.
 
-    Docstrings with sections of numpydoc are left to numpydoc, examples for doctest to Sphinx.
+    Docstrings with sections of the NumPy style are left to napoleon, examples for doctest to Sphinx.
     """
     if any(_SECTION.match(line) for line in lines):
         return
@@ -88,7 +93,16 @@ def skip_aliases(app: Any, what: str, name: str, obj: Any, skip: bool, options: 
     return True if isinstance(obj, GenericAlias) else None
 
 
+def unlink_foreign_types(app: Any, doctree: Any) -> None:
+    """Make text of the annotations' types that these pages do not describe: the search for each among all names is slow."""
+    for reference in list(doctree.findall(addnodes.pending_xref)):
+        target = reference.get("reftarget", "")
+        if reference.get("refdomain") == "py" and (hasattr(builtins, target) or target.split(".")[0] in _FOREIGN):
+            reference.replace_self(reference.children)
+
+
 def setup(app: Any) -> None:
-    """Register the hooks; the conversion comes before numpydoc's."""
+    """Register the hooks; the conversion comes before napoleon's."""
     app.connect("autodoc-skip-member", skip_aliases)
     app.connect("autodoc-process-docstring", plain_text, priority=400)
+    app.connect("doctree-read", unlink_foreign_types)

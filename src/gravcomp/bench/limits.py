@@ -139,6 +139,16 @@ ROWS = {
         Row("worst_safe_ms", "time from fault to safe current, worst", "ms", 250.0),
         Row("safe_ms.stop", "time from stop to zero current", "ms", 20.0),
     ),
+    "joints": (
+        Row("messages", "hostile messages to joint_bridge", "", 1_000_000, True),
+        Row("violations", "messages to the controller beyond a limit", "", 0),
+        Row("over_can_pct.trajectory.held_mm", "trajectory controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.trajectory.moving_mm", "trajectory controller: error in motion over that on CAN", "%", 10.0),
+        Row("over_can_pct.position.held_mm", "position controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.position.moving_mm", "position controller: error in motion over that on CAN", "%", 10.0),
+        Row("over_can_pct.effort.held_mm", "effort controller: error at rest over that on CAN", "%", 10.0),
+        Row("over_can_pct.effort.moving_mm", "effort controller: error in motion over that on CAN", "%"),
+    ),
     "start": (
         Row("first_page_s", "clone to the moving page with empty caches, without the downloads", "s", 90.0),
         Row("download_s", "downloads of the first start", "s"),

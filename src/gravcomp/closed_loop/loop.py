@@ -3,8 +3,9 @@
     virtual robot --CAN frames--> IMU stream -> orientation filter -> simulator -> inverse problem
                   <--CAN frames-- bridge <----------------------------------------------- command
 
-All parts are those of the graph: frames, state machine of the bridge, position loops, filter. Only the middleware is missing;
-`delay` represents its latency. The ground truth of the virtual robot is recorded for evaluation and does not enter the loop.
+All parts are those of the graph: frames, state machine of the bridge, position loops, filter. A robot with `hardware.joints` has
+the bridge, controller and servos of `bridged_joints` in place of the CAN bridge. Only the middleware is missing; `delay`
+represents its latency. The ground truth of the virtual robot is recorded for evaluation and does not enter the loop.
 
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)))
     loop.release(); loop.run(4.0)
@@ -21,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
+from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
@@ -60,18 +62,25 @@ class ClosedLoop:
         heating: bool = True,
         warm: bool = True,
         tracker: VirtualTrackerParameters | None = None,
+        board: str = "virtual",
     ):
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none. Raises
-        RuntimeError where the bridge does not start.
+        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none;
+        board: of the virtual robot, see there. Raises RuntimeError where the bridge does not start.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
-            _truth(setup, warm and heating), setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion
+            _truth(setup, warm and heating),
+            setup.nominal,
+            setup.virtual_hardware,
+            seed=setup.seed,
+            motion=motion,
+            board=board,
         )
-        self._bridge = Bridge(setup.hardware, require_imu=False)
+        joints = setup.hardware.joints is not None
+        self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)

@@ -15,6 +15,7 @@ COMMANDS = {
     "estimate": "estimate orientation and gravity from a recorded IMU stream, offline",
     "model": "build, inspect, solve and view a robot's model",
     "mesh": "install Gmsh, which fills surfaces with elements and reads STEP files",
+    "firmware": "build, flash and test the firmware of the board",
     "record": "record the graph's topics into a bag",
     "replay": "run the graph on a recorded IMU stream",
     "arm": "move the virtual robot through five poses on a seven-axis arm",

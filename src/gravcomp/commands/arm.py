@@ -65,7 +65,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
         motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
         graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), args.namespace, {"virtual_robot": motion})
-        specs = [spec for spec in graph.loop() if args.gravity != "arm" or spec.executable != "imu_estimator"]
+        specs = [spec for spec in graph.loop(virtual=True) if args.gravity != "arm" or spec.executable != "imu_estimator"]
         if args.gravity != "imu":
             use = "publish" if args.gravity == "arm" else "check"
             specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf)))

@@ -20,6 +20,7 @@ BENCHMARKS = {
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
+    "joints": "joint_bridge: malformed messages, and the loop through each kind of controller against CAN",
     "start": "the first and the second start in a new clone, start of the nodes, size of the environment",
     "soak": "a long run: lost commands, growing memory",
 }
@@ -30,6 +31,10 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "kills": (20, "number of kills of each process"),
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
+    },
+    "joints": {
+        "messages": (1_000_000, "number of malformed and hostile messages"),
+        "seed": (1, "seed of the messages and of the virtual robot"),
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
@@ -57,6 +62,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
+    "joints": {"messages": 3000, "orientations": 0},
     "start": {},
     "soak": {"minutes": 0.2},
 }

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gravcomp.launcher import Graph
     from gravcomp.launcher.host_client import NodeHost
 
+BOARDS = ("virtual", "emulated")
 _SHORTEST = 10.0  # s: a shorter run shows neither sag nor compensation
 _TURNING = 0.2  # rad/s: above the rate of a hand at rest plus the gyroscope's bias
 _START_TIMEOUT = 300.0  # s: on the first start on a machine Numba compiles
@@ -39,6 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--imu", metavar="FILE", help="a recorded IMU stream with ground truth: .npz in BROAD's layout or a rosbag2 folder"
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
+    parser.add_argument(
+        "--board",
+        default="virtual",
+        choices=BOARDS,
+        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the bus of the"
+        " host and the motors",
+    )
     add_tracker_argument(parser)
     add_seed_argument(parser)
     add_page_arguments(parser)
@@ -66,7 +74,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.launcher import Graph
     from gravcomp.launcher.domain import private_domain
-    from gravcomp.launcher.robot_graph import LOOP, RobotGraph, private_channels
+    from gravcomp.launcher.robot_graph import RobotGraph, private_channels
     from gravcomp.virtual.described import described
 
     if not _SHORTEST <= args.duration <= 86400.0:
@@ -82,7 +90,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True} | tracker_parameters(args)
+    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True, "board": args.board} | tracker_parameters(args)
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:
@@ -94,14 +102,15 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
     graph = RobotGraph(args.robot, "udp_multicast", channels, parameters={"virtual_robot": motion}, seed=args.seed)
-    nodes = [executable for _, executable in LOOP] + ["virtual_robot"]
+    loop = graph.loop(virtual=True)
+    nodes = [spec.executable for spec in loop] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
         judge = graph.node(
             "gravcomp_hw", "judge", duration=args.duration, relax_time=relax_time, settle_time=min(4.0, 0.15 * args.duration),
             start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes,
         )  # fmt: skip
-        specs = [*graph.loop(), judge]
+        specs = [*loop, judge]
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
         logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
         domain = private_domain()
@@ -124,6 +133,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             figures = {
                 **state["figures"],
                 "nodes": state["nodes"],
+                "board": args.board,
                 "seed": described(load_robot_file(args.robot), args.seed).seed,
                 "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
             }

@@ -65,7 +65,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if interface and not args.virtual:
         load_robot_file(args.robot).require_motors(interface)
     graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
-    specs = graph.loop()
+    specs = graph.loop(args.virtual)
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic", **tracker_parameters(args)))
     with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:

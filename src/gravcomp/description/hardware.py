@@ -12,25 +12,28 @@
         - {cable: c0, can_id: 1, bus: left}
         - {cable: c1, pair: c3, can_id: 1, bus: right}   # an antagonistic pair on one motor
 
+Instead of C610 on CAN buses, the motors may be joints of a ros2_control robot (`joints`, see `joint_motors`).
+
 Cable displacement [m] is positive when pulled in:  displacement = direction x rotor turns / gear_ratio x 2 pi capstan_radius.
 """
 
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping, parameter
 from gravcomp.description.can_buses import CanBus, CanInterface
-from gravcomp.description.motor import MOTOR_IDS, Motor
+from gravcomp.description.joint_motors import Joints
+from gravcomp.description.motor import MOTOR_IDS, CableMotor, Motor
 from gravcomp.description.transmission import Transmission
 
 __all__ = [
-    "COUNTS_PER_TURN", "MOTOR_IDS", "CanBus", "CanInterface", "Drive", "Hardware", "Homing", "Motor", "Watchdog",
-    "parse_hardware",
+    "COUNTS_PER_TURN", "MOTOR_IDS", "CanBus", "CanInterface", "Drive", "Hardware", "Homing", "Joints", "Motor",
+    "Watchdog", "parse_hardware",
 ]  # fmt: skip
 
 COUNTS_PER_TURN = 8192
@@ -154,6 +157,7 @@ class Hardware:
     buses: tuple[CanBus, ...] = parameter((), description="named buses, instead of can; each carries up to eight motors")
     imu_bus: str | None = parameter(None, description="name of the bus of the IMU board; the first when not given")
     order: tuple[str, ...] = parameter((), description="order of the cables where motors are shared; that of robot.cables")
+    joints: Joints | None = parameter(None, description="joints of a ros2_control robot that wind the cables, for joint_bridge")
 
     def __post_init__(self) -> None:
         if not self.motors:
@@ -192,21 +196,16 @@ class Hardware:
                 )
 
     def _check_cables(self) -> None:
-        named: dict[str, list[Motor]] = {}
-        for motor in self.motors:
-            for cable in motor.ratios:
-                named.setdefault(cable, []).append(motor)
-        for cable, motors in named.items():
-            if len(motors) > 1 and not all(motor.differential for motor in motors):
-                raise ValueError(
-                    f"cable {cable} is given to more than one motor: {', '.join(m.label for m in motors)};"
-                    " a differential needs `differential: true` at each of them"
-                )
+        named = _cables_of(self.motors)
         if self.order and sorted(self.order) != sorted(named):
             raise ValueError(f"order names the cables {', '.join(self.order)}; the motors have {', '.join(named)}")
-        matrix = self.transmission.matrix
-        if np.linalg.matrix_rank(matrix) < len(self.motors):
-            raise ValueError("two motors move the same cables with the same ratios; each motor needs an effect of its own")
+        _refuse_equal_effects(self.transmission)
+        if self.joints is None:
+            return
+        wound = _cables_of(self.joints.motors)
+        if sorted(wound) != sorted(named):
+            raise ValueError(f"joints.motors wind the cables {', '.join(wound)}; the robot has {', '.join(named)}")
+        _refuse_equal_effects(self.joint_transmission)
 
     @property
     def all_buses(self) -> tuple[CanBus, ...]:
@@ -231,6 +230,13 @@ class Hardware:
     def transmission(self) -> Transmission:
         """The way from motors to cables."""
         return Transmission(self.motors, self.cables)
+
+    @functools.cached_property
+    def joint_transmission(self) -> Transmission:
+        """The way from `joints.motors` to cables. Raises ValueError without `joints`."""
+        if self.joints is None:
+            raise ValueError("the hardware has no joints")
+        return Transmission(self.joints.motors, self.cables)
 
     def on(self, interface: str, channel: str) -> "Hardware":
         """Return the hardware on other buses: an interface for all, and channels by commas, one a bus; empty: as described.
@@ -271,6 +277,26 @@ def parse_hardware(section: Any, *, source: str, cables: tuple[str, ...] | None 
             f"needed{'' if shared else ', in this order'}: {', '.join(cables)}"
         )
     return hardware
+
+
+def _cables_of(motors: Sequence[CableMotor]) -> list[str]:
+    """Return the names of the cables that motors move. Raises ValueError for one that is given to several without a need."""
+    named: dict[str, list[CableMotor]] = {}
+    for motor in motors:
+        for cable in motor.ratios:
+            named.setdefault(cable, []).append(motor)
+    for cable, own in named.items():
+        if len(own) > 1 and not all(motor.differential for motor in own):
+            raise ValueError(
+                f"cable {cable} is given to more than one motor: {', '.join(m.label for m in own)};"
+                " a differential needs `differential: true` at each of them"
+            )
+    return list(named)
+
+
+def _refuse_equal_effects(transmission: Transmission) -> None:
+    if np.linalg.matrix_rank(transmission.matrix) < transmission.matrix.shape[1]:
+        raise ValueError("two motors move the same cables with the same ratios; each motor needs an effect of its own")
 
 
 def _refuse_twice(what: str, key: str, values: list[str]) -> None:

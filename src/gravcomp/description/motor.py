@@ -16,16 +16,15 @@ MOTOR_IDS = range(1, 9)
 
 
 @dataclasses.dataclass(frozen=True)
-class Motor:
-    """A motor and its cables."""
+class CableMotor:
+    """What every motor has, whatever drives it: its cables."""
 
     cable: str = parameter(description="name of the cable in robot.cables")
-    can_id: int = parameter(minimum=1, maximum=8, description="CAN id that is set on the C610, unique on its bus")
-    direction: int = parameter(1, choices=(1, -1), description="1: positive rotation of the rotor pulls the cable in")
+    _: dataclasses.KW_ONLY
+    direction: int = parameter(1, choices=(1, -1), description="1: positive rotation of the motor pulls the cable in")
     offset: float = parameter(
         0.0, edge="mm", minimum=-20, maximum=20, description="calibrated displacement of the cable at the motor's zero position"
     )
-    bus: str | None = parameter(None, description="name of the motor's bus in hardware.buses; needed with more than one")
     ratio: float = parameter(
         1.0, minimum=0.01, maximum=100.0, description="displacement of the cable over that at the drive's capstan"
     )
@@ -65,6 +64,20 @@ class Motor:
     def ratios(self) -> dict[str, float]:
         """Displacement of each cable over that at the drive's capstan."""
         return {self.cable: self.ratio, **self.ratios_of_others}
+
+    @property
+    def label(self) -> str:
+        """Name of the motor in messages."""
+        return f"motor ({', '.join(self.ratios)})"
+
+
+@dataclasses.dataclass(frozen=True)
+class Motor(CableMotor):
+    """A C610 on a CAN bus."""
+
+    can_id: int = parameter(minimum=1, maximum=8, description="CAN id that is set on the C610, unique on its bus")
+    _: dataclasses.KW_ONLY
+    bus: str | None = parameter(None, description="name of the motor's bus in hardware.buses; needed with more than one")
 
     @property
     def label(self) -> str:

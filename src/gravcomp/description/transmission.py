@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gravcomp.description.motor import Motor
+from gravcomp.description.motor import CableMotor
 
 _IDLE_WEIGHT = 1e-6  # of a cable without tension in the choice of the motors' displacements, over that of the one with the most
 
@@ -23,7 +23,7 @@ _IDLE_WEIGHT = 1e-6  # of a cable without tension in the choice of the motors' d
 class Transmission:
     """Motors of m cables. matrix (m, k): T; preload (m,) in m: s; direct: every cable has a motor of its own, without gearing."""
 
-    def __init__(self, motors: Sequence[Motor], cables: Sequence[str]):
+    def __init__(self, motors: Sequence[CableMotor], cables: Sequence[str]):
         """motors (k), and the names of the cables (m) in their order. Raises KeyError for a cable that is not among them."""
         index = {name: i for i, name in enumerate(cables)}
         self.matrix, self.preload = np.zeros((len(cables), len(motors))), np.zeros(len(cables))

@@ -10,7 +10,7 @@ from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.thermal import HeaterOptions, ThermalPlantOptions
 from gravcomp.trials.context import Context
 from gravcomp.trials.yaw_drift import COLD, DURATION, RATE, REST, ROOM, BoardSample, board_samples, turning_after, yaw_errors
-from gravcomp.virtual.board import SAMPLE_PERIOD
+from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 from gravcomp.virtual.parameters import Board
 
 TITLE = "IMU: filter and heating"

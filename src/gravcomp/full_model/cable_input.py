@@ -26,6 +26,16 @@ class CableInput:
             return np.zeros(len(free))
         return taut_tensions(compliance, free, self.wound, taut)
 
+    def arrays(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the input to `count` cables for compiled functions.
+
+        The first array (m,) is the displacement to which each cable is pulled in, NaN for released ones. The second is the given
+        tension (m,), which takes precedence, or (0,) if none is given.
+        """
+        if self.tension is not None:
+            return np.full(count, np.nan), self.tension
+        return np.full(count, np.nan) if self.wound is None else self.wound, np.zeros(0)
+
     def sliding(self, before: Sliding, tension: np.ndarray, displacement: np.ndarray) -> Sliding:
         """Return the sliding after this input to cables with `tension` and `displacement` (m,)."""
         return before.after(self.wound, self.tension, tension, displacement)

@@ -9,6 +9,8 @@ import enum
 
 import numpy as np
 
+from gravcomp.contact.contacts import Contacts
+
 
 class ShapeStatus(enum.IntEnum):
     """Origin of a shape; the numbers are those of the message Deformation."""
@@ -51,6 +53,7 @@ class Shape:
     model: str = "full"
     status: ShapeStatus = ShapeStatus.OK
     message: str = ""
+    contacts: Contacts = dataclasses.field(default_factory=Contacts.none)
 
     @property
     def is_equilibrium(self) -> bool:

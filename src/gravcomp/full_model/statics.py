@@ -13,6 +13,9 @@ from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.full_model.wrench import PointLoads, Wrench
 
+# Parts of the load in which it is applied where an obstacle has friction.
+_RUBBING_PART = 0.1
+
 
 class StaticSolver(StaticTracker):
     """Finds equilibria of a model and tracks them."""
@@ -27,20 +30,68 @@ class StaticSolver(StaticTracker):
         last equilibrium is returned with `load_fraction` below 1 and `converged` False, and the solver keeps its state.
         """
         start, loads = self.state, PointLoads.of(self.model, wrench)
-        if self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
+        depth, rubs = self._obstacles(gravity)
+        if not depth and not rubs and self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
             return self.state
         self.reset()
-        here, origin = self.state, self.state.tendons.displacement
-        done, part = 0.0, 0.25
+        origin = self.state.tendons.displacement
+        part = _RUBBING_PART if rubs else 0.25  # friction depends on the way: the whole load at once is none
+        ends = np.zeros(3), np.asarray(gravity)
+        return self._in_parts(ends, origin, cables, part, 1.0 / parts, start, loads, 15, exact=True, depth=depth, rubs=rubs)
+
+    def approach(self, before: np.ndarray, gravity: np.ndarray, cables: CableInput, parts: int = 16) -> Equilibrium:
+        """Return the equilibrium that continues the current state, which balances the gravity `before` (3,), to a new load.
+
+        The load changes in steps, which are halved where they fail, as in `solve`. This follows a large change in less time than
+        a search from the straight robot, and stays on the branch of equilibria.
+        """
+        here = self.state
+        origin = here.tendons.displacement + self.model.tendons.stretch(here.tendons) * here.tension
+        rubs = self.contact is not None and self.contact.rubbing
+        part, ends = _RUBBING_PART if rubs else 0.5, (np.asarray(before), np.asarray(gravity))
+        return self._in_parts(ends, origin, cables, part, 1.0 / parts, here, None, 6, exact=False, depth=0.0, rubs=rubs)
+
+    def _in_parts(
+        self,
+        ends: tuple[np.ndarray, np.ndarray],
+        origin: np.ndarray,
+        cables: CableInput,
+        part: float,
+        least: float,
+        kept: Equilibrium,
+        loads: PointLoads | None,
+        iterations: int,
+        *,
+        exact: bool,
+        depth: float,
+        rubs: bool,
+    ) -> Equilibrium:
+        """Change gravity from one of its `ends` (3,) to the other, and the cables' displacements from `origin` (m,), in steps.
+
+        part: the first step's share of the load; a step that fails is halved, down to `least`. Then the last equilibrium is
+        returned, not converged, with the fraction of the load that it balances, and the solver keeps the state `kept`.
+        iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first; rubs: an obstacle has friction.
+        """
+        (before, gravity), here, done = ends, self.state, 0.0
         while done < 1.0:
             fraction = min(1.0, done + part)
-            force = fraction * np.asarray(gravity)
-            if self.track(force, cables.part(origin, fraction), 15, exact=True, loads=loads, fraction=fraction).converged:
-                here, done, part = self.state, fraction, 2.0 * part
+            force = before + fraction * (gravity - before)
+            if self.contact is not None:
+                self.contact.allowed = (1.0 - fraction) * depth
+            state = self.track(force, cables.part(origin, fraction), iterations, exact=exact, loads=loads, fraction=fraction)
+            if state.converged:
+                here, done, part = self.state, fraction, part if rubs else 2.0 * part
                 continue
             self.state = here
             part /= 2.0
-            if part < 1.0 / parts:
-                self.state = start
+            if part < least:
+                self.state = kept
                 return dataclasses.replace(here, converged=False, load_fraction=done)
         return self.state
+
+    def _obstacles(self, gravity: np.ndarray) -> tuple[float, bool]:
+        """Return how deep in m the straight robot is in an obstacle under gravity (3,), and whether any obstacle has friction."""
+        if self.contact is None:
+            return 0.0, False
+        self.contact.begin(np.zeros_like(self.state.u), gravity)
+        return self.contact.depth(np.zeros_like(self.state.u)), self.contact.rubbing

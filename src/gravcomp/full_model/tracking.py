@@ -20,6 +20,7 @@ import numpy as np
 
 from gravcomp.cables.friction import Sliding
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.wrench import PointLoads
@@ -34,6 +35,8 @@ _ROUNDING = 1e-3
 _SHORT = 0.1
 # The forces of a moment turn with its section. They have settled when they change by less than this fraction of the largest.
 _SETTLED_MOMENT, _UNDAMPED = 1e-6, 8
+# Places of contact are found in some more steps.
+_MORE_IN_CONTACT = 3
 # A factor is used again up to this displacement from where it was made, as a fraction of the length, and as long as each
 # correction is at most this fraction of the previous one.
 _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
@@ -43,7 +46,10 @@ class StaticTracker:
     """Tracks the equilibrium of a model. Owns the stiffness matrix, the current `state`, and the `sliding` of the cables.
 
     viscous: strain of what the materials' branches hold in the equilibrium (`full_model.creep`); None: they have relaxed.
+    contact: with the obstacles of a scene; None: nothing is in the way.
     """
+
+    contact: FullContact | None = None
 
     def __init__(self, model: MeshedModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
         """Start from the straight robot.
@@ -69,6 +75,8 @@ class StaticTracker:
         tendons = self.model.tendons.state(self.model.mesh.nodes)
         self.sliding = Sliding.none(count)
         self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
+        if self.contact is not None:
+            self.contact.reset()
 
     def track(
         self,
@@ -91,6 +99,9 @@ class StaticTracker:
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
         if self.model.tendons.friction.any():
             self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement)
+        if self.contact is not None:
+            self.contact.begin(previous.u, gravity)
+            iterations *= _MORE_IN_CONTACT
         dead = self.model.weight(gravity)
         weight = dead if loads is None else dead + loads.at(state.u, fraction)
         if loads is not None and not loads.constant:
@@ -109,6 +120,7 @@ class StaticTracker:
             self._measure(state, weight)
             if origin is None:
                 break
+            settled &= self.contact is None or self.contact.settled
             state.converged &= settled and state.residual <= self._allowed_residual(state, weight)
         self.state = state
         return state
@@ -142,14 +154,17 @@ class StaticTracker:
                 self._kept = factor, state.u.copy()
         jacobian = state.tendons.jacobian
         out = weight - model.free(force)
-        solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
-        y, state.answer = solved[:, 0], solved[:, 1:]
-        state.compliance = jacobian @ state.answer + np.diag(model.tendons.stretch(state.tendons))
-        free = state.tendons.displacement + jacobian @ y
-        if not math.isfinite(state.compliance.sum() + free.sum()):
-            return None
-        tension = cables.tensions(state.compliance, free, state.tension > 0.0)
-        step = y + state.answer @ tension
+        if self.contact is not None:
+            step, tension = self.contact.respond(state, factor, out, cables)
+        else:
+            solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
+            y, state.answer = solved[:, 0], solved[:, 1:]
+            state.compliance = jacobian @ state.answer + np.diag(model.tendons.stretch(state.tendons))
+            free = state.tendons.displacement + jacobian @ y
+            if not math.isfinite(state.compliance.sum() + free.sum()):
+                return None
+            tension = cables.tensions(state.compliance, free, state.tension > 0.0)
+            step = y + state.answer @ tension
         size = float(np.abs(step).max())
         moved = self._damped_move(state, step, tension, size) if math.isfinite(size) else None
         if moved is None:
@@ -170,7 +185,8 @@ class StaticTracker:
         the displacements unchanged, if even a short part of it crushes an element.
         """
         model = self.model
-        damping = min(1.0, self.longest_step / size) if size > 0 else 1.0
+        longest = self.longest_step if self.contact is None else min(self.longest_step, self.contact.longest)
+        damping = min(1.0, longest / size) if size > 0 else 1.0
         start = state.u.copy()
         while True:
             model.free(state.u)[:] = model.free(start) + damping * step
@@ -232,6 +248,8 @@ class StaticTracker:
         """Return the change (3 n_free,) of the unknowns and the tensions (m,) from the factor of a nearby shape."""
         model = self.model
         force = model.elements.internal_force(state.u, self.viscous)
+        if self.contact is not None:
+            return self.contact.respond(state, factor, weight - model.free(force), cables)
         out = weight - model.free(force) + state.tension @ state.tendons.force_jacobian
         y = factor.solve(out)
         free = state.tendons.displacement + jacobian @ y
@@ -276,11 +294,16 @@ class StaticTracker:
 
         Short steps alone prove nothing: the corrections of a factor that is too stiff are short as well.
         """
-        pull = state.tension @ state.tendons.force_jacobian
+        pull = self._pull(state)
         return 1e-2 * max(np.abs(weight).max(), np.abs(pull).max(initial=0.0)) + 1e-12 * self._stiffness * self.model.length
+
+    def _pull(self, state: Equilibrium) -> np.ndarray:
+        """Return the forces (3 n_free,) of cables and contact on the unknowns."""
+        pull = state.tension @ state.tendons.force_jacobian
+        return pull if self.contact is None else pull + self.contact.pull
 
     def _measure(self, state: Equilibrium, weight: np.ndarray) -> None:
         """Set the residual of `state`."""
         force = self.model.free(self.model.elements.internal_force(state.u, self.viscous))
-        out = weight - force + state.tension @ state.tendons.force_jacobian
+        out = weight - force + self._pull(state)
         state.residual = float(np.abs(out).max())

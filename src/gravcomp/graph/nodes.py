@@ -31,6 +31,55 @@ NODES = (
         ),
     ),
     Node(
+        "gravcomp_hw", "joint_bridge", "drives the cables through the joints of a ros2_control robot, in place of can_bridge",
+        f"{_PARAMETERS}.joint_bridge:JointBridgeParameters",
+        subscribes=(
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m, positive: pulled in"),
+            Port("joint_states", "sensor_msgs/msg/JointState", "angles of the joints that wind the cables, rad"),
+            Port("imu/data_raw", "sensor_msgs/msg/Imu", "only whether samples arrive (require_imu)", optional=True),
+        ),
+        publishes=(
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "bridge state, measured displacements (m) and tensions (N)"),
+            Port(
+                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
+                optional=True,
+            ),
+            Port(
+                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
+                optional=True,
+            ),
+            _DIAGNOSTICS,
+        ),
+        services=(
+            Port("~/stop", "std_srvs/srv/Trigger", "drive no joint: no effort, or positions as they are"),
+            Port("~/release", "std_srvs/srv/Trigger", "pay the cables out, then drive no joint"),
+            Port("~/resume", "std_srvs/srv/Trigger", "continue after a stop or a fault"),
+        ),
+    ),
+    Node(
+        "gravcomp_hw", "joint_robot", "stands in for a ros2_control robot: its controller, its joint_states and an IMU",
+        f"{_PARAMETERS}.joint_robot:JointRobotParameters",
+        subscribes=(
+            Port(
+                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
+                optional=True,
+            ),
+            Port(
+                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
+                optional=True,
+            ),
+        ),
+        publishes=(
+            Port("joint_states", "sensor_msgs/msg/JointState", "angles (rad), speeds (rad/s), efforts (N m) of the joints"),
+            Port(
+                "imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link",
+                optional=True,
+            ),
+            Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC", optional=True),
+            _DIAGNOSTICS,
+        ),
+    ),
+    Node(
         "gravcomp_estimation", "imu_estimator", "estimates orientation and gravity, and controls the IMU's temperature",
         f"{_PARAMETERS}.imu_estimator:ImuEstimatorParameters",
         subscribes=(

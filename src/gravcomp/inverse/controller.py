@@ -29,8 +29,10 @@ from gravcomp.inverse.target import Target
 if TYPE_CHECKING:
     from gravcomp.full_model.shape import Response
 
-# s. A longer pause between two steps does not allow a longer step: the linear response is not valid that far.
-_LONGEST_INTERVAL = 0.1
+# Of the robot's length: farthest that the winches may move the tip in a step. The linear response is not valid farther, and the
+# model would have to search for the next shape. It counts after a pause between two steps; otherwise the winches are slower.
+_FARTHEST = 0.1
+_LONGEST_INTERVAL = 0.1  # s in which cables are paid out in one step after a pause
 
 
 class InverseController:
@@ -104,7 +106,7 @@ class InverseController:
             # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
             path = response.compliance_aa @ tension + response.displacement_free
             previous = np.where(self._coupled, np.maximum(previous, path), previous)
-        interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
+        interval = min(max(interval, 0.0), self._longest_interval(response))
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
             interval *= self._retreat.stride
@@ -141,7 +143,7 @@ class InverseController:
             response.effector_free,
             tension,
             (solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper),
-            options.slack,
+            self._slack,
             previous,
             self._change,
             (limits.displacement_rate * interval, limits.displacement_min, limits.displacement_max),
@@ -164,7 +166,8 @@ class InverseController:
             tilt=errors.tilt,
             met=result.met if result.any_met else None,
             names=self._names,
-            options=options,
+            tolerance=options.tolerance_of(self.robot.length),
+            tilt_tolerance=options.tilt_tolerance,
         )
         self._displacement, self._tension, self._change = displacement, result.tension, result.change
         return Command(
@@ -179,9 +182,20 @@ class InverseController:
             solve_time=time.perf_counter() - started,
         )
 
+    @property
+    def _slack(self) -> float:
+        """Slack in m of an idle cable."""
+        return self.options.slack_of(self.robot.length)
+
+    def _longest_interval(self, response: "Response") -> float:
+        """Return the time in s in which no winch alone moves the tip farther than `_FARTHEST` of the length."""
+        ratio = np.linalg.norm(response.compliance_ea[:3], axis=0) / np.diag(response.compliance_aa)  # tip over cable
+        speed = self.robot.limits.displacement_rate * float(ratio.max(initial=0.0))
+        return _FARTHEST * self.robot.length / speed if speed > 0.0 else _LONGEST_INTERVAL
+
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
         """Return displacements (m,) on the way from `previous` (m,) to slack cables; free (m,): displacements of their paths."""
-        slack = within_limits(free - self.options.slack, previous, self.robot.limits, interval)
+        slack = within_limits(free - self._slack, previous, self.robot.limits, interval)
         return self._possible(slack, np.zeros(len(free)))
 
     def _possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
@@ -212,7 +226,7 @@ class InverseController:
         if move == Move.BACK:
             # Back to the present shape, whichever command it belongs to: the model may be one sample behind.
             path = response.compliance_aa @ tension + response.displacement_free
-            shape = np.where(tension > 0.0, path, path - self.options.slack)
+            shape = np.where(tension > 0.0, path, path - self._slack)
             displacement = self._possible(within_limits(shape, previous, self.robot.limits, interval), tension)
             code, message = (
                 ControllerCode.UNREACHABLE,
@@ -244,13 +258,13 @@ class InverseController:
         """Return the command that pays the cables out, within their rate limits, until none of them has tension."""
         started = time.perf_counter()
         free = response.displacement_free
-        previous = free - self.options.slack if self._displacement is None else self._displacement
+        previous = free - self._slack if self._displacement is None else self._displacement
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
         displacement = self._paid_out(free, previous, interval)
         self.reset(displacement)
         # Antagonists cannot both be paid out: they are as slack as they can be where their motor no longer moves.
         at_rest = bool(np.abs(displacement - previous).max(initial=0.0) < 1e-6)
-        relaxed = bool(np.all(displacement <= free - self.options.slack + 1e-6)) or (self._transmission is not None and at_rest)
+        relaxed = bool(np.all(displacement <= free - self._slack + 1e-6)) or (self._transmission is not None and at_rest)
         return Command(
             displacement=displacement,
             tension=np.zeros(free.size),

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from gravcomp.config import parameter
 
+_SLACK, _TOLERANCE = 1e-3, 0.04  # of the robot's length
+
 
 @dataclass(frozen=True)
 class InverseOptions:
@@ -22,22 +24,22 @@ class InverseOptions:
     proximal_weight: float = parameter(
         0.02, minimum=0.0, maximum=10.0, description="weight of the change of tension in a step; prevents steps that oscillate"
     )
-    slack: float = parameter(
-        0.1,
+    slack: float | None = parameter(
+        None,
         edge="mm",
         minimum=0.0,
-        maximum=5.0,
-        description="length by which an idle cable is paid out beyond its path, to stay slack",
+        maximum=50.0,
+        description="length by which an idle cable is paid out beyond its path, to stay slack; none: 0.1 % of the robot's length",
     )
     pretension: float = parameter(
         0.0, unit="N", minimum=0.0, maximum=5.0, description="smallest tension of every cable; above 0 no cable becomes slack"
     )
-    tolerance: float = parameter(
-        4.0,
+    tolerance: float | None = parameter(
+        None,
         edge="mm",
         minimum=0.01,
-        maximum=100.0,
-        description="largest distance from a reached target, including the shortening by the cables",
+        maximum=1000.0,
+        description="largest distance from a reached target, including the shortening by the cables; none: 4 % of the robot's length",
     )
     tilt_tolerance: float = parameter(
         5.0,
@@ -46,3 +48,11 @@ class InverseOptions:
         maximum=90.0,
         description="largest angle to the direction of a reached target, if the direction has a weight",
     )
+
+    def slack_of(self, length: float) -> float:
+        """Return `slack` in m of a robot of `length` m."""
+        return _SLACK * length if self.slack is None else self.slack
+
+    def tolerance_of(self, length: float) -> float:
+        """Return `tolerance` in m of a robot of `length` m."""
+        return _TOLERANCE * length if self.tolerance is None else self.tolerance

@@ -17,14 +17,15 @@ The part of the errors of tip and backbone along the robot counts less, because 
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.
 
-The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both
-responses are those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the lateral position,
-and
+The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both responses are
+those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the tip's lateral position and the
+length of the backbone, and
 
     D = G (G + delta g I)^-1,   G = J_direction N J_direction^T,   g: largest eigenvalue of J_direction J_direction^T
 
 multiplies the rows of the direction. It is about 1 where segments move the tip and turn it each by themselves, and about 0 where
-the same cables do both: there a weight of the direction would only pull the tip off its place.
+the same cables do both: there a weight of the direction would only pull the tip off its place. Tensions that only shorten the
+robot do not count: a soft robot near its buckling load turns by them, and all its cables would pull it together.
 """
 
 import math
@@ -97,6 +98,9 @@ def build_programme(
 
 # delta of the module's text: cables that turn the tip in place by less than a thirtieth of what they turn it do not count.
 _SEPARATE = 1e-3
+# Of the square of the tip's motion. Cables that shorten a slender robot do so by more; what bending changes of the length, measured
+# from point to point, is less.
+_LEAST_SHORTENING = 1e-5
 
 
 @njit(cache=True)
@@ -152,7 +156,7 @@ def _weighted_errors(
     if direction_weight > 0.0:
         jacobian[row : row + 3], offset[row : row + 3] = change[3:6], free[3:6] - direction
         if tip_weight > 0.0:
-            apart = _turned_in_place(change, compliance_aa, direction)
+            apart = _turned_in_place(change, effector, compliance_aa, direction)
             jacobian[row : row + 3], offset[row : row + 3] = apart @ change[3:6], apart @ offset[row : row + 3]
         _weigh(jacobian[row : row + 3], offset[row : row + 3], direction, 0.0, direction_weight)
         row += 3
@@ -171,31 +175,46 @@ def _weighted_errors(
 
 
 @njit(cache=True)
-def _turned_in_place(change: np.ndarray, compliance_aa: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Return D (3, 3) of the module's text for the effector's response `change` (e, m); axis (3,): the target's direction."""
+def _turned_in_place(change: np.ndarray, effector: np.ndarray, compliance_aa: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return D (3, 3) of the module's text for the effector's response `change` (e, m) at the shape `effector` (e,).
+
+    axis (3,): the target's direction.
+    """
     m = change.shape[1]
-    across, turn = np.empty((3, m)), np.empty((3, m))
+    moved_by, turn = np.empty((3, m)), np.empty((3, m))
+    longer = _lengthening(change, effector)
     for k in range(m):
         root = 1.0 / np.sqrt(compliance_aa[k, k])
-        along = axis[0] * change[0, k] + axis[1] * change[1, k] + axis[2] * change[2, k]
+        along = axis[0] * change[0, k] + axis[1] * change[1, k] + axis[2] * change[2, k] - longer[k]
         for i in range(3):
-            across[i, k], turn[i, k] = root * (change[i, k] - along * axis[i]), root * change[3 + i, k]
-    # The part of each tension that moves the tip across; the third direction, along the axis, is no motion across.
-    moved = across @ across.T
+            moved_by[i, k], turn[i, k] = root * (change[i, k] - along * axis[i]), root * change[3 + i, k]
+    moved = moved_by @ moved_by.T
     size = np.trace(moved)
     if size <= 0.0:
         return np.eye(3)
     for i in range(3):
         for j in range(3):
-            moved[i, j] += size * axis[i] * axis[j]
+            moved[i, j] += _LEAST_SHORTENING * size * axis[i] * axis[j]
         moved[i, i] += 1e-12 * size
-    both = turn @ across.T
+    both = turn @ moved_by.T
     whole = turn @ turn.T
     alone = whole - both @ np.linalg.solve(moved, both.T)
     largest = np.linalg.eigvalsh(whole)[2]
     if largest <= 0.0:
         return np.zeros((3, 3))
     return alone @ np.linalg.inv(alone + _SEPARATE * largest * np.eye(3))
+
+
+@njit(cache=True)
+def _lengthening(change: np.ndarray, effector: np.ndarray) -> np.ndarray:
+    """Return the response (m,) of the backbone's length, from point to point; change (e, m), effector (e,)."""
+    longer = np.zeros(change.shape[1])
+    for a in range(6, len(effector) - 5, 3):
+        along = _unit(effector[a + 3 : a + 6] - effector[a : a + 3])
+        for k in range(change.shape[1]):
+            for i in range(3):
+                longer[k] += along[i] * (change[a + 3 + i, k] - change[a + i, k])
+    return longer
 
 
 @njit(cache=True)

@@ -13,6 +13,12 @@ LOOP = (
 )
 """The four nodes of the loop: package and executable."""
 
+JOINT_BRIDGE = ("gravcomp_hw", "joint_bridge")
+"""In place of the first node of LOOP for a robot with `hardware.joints`."""
+
+JOINT_ROBOT = ("gravcomp_hw", "joint_robot")
+"""Between joint_bridge and the virtual robot."""
+
 
 @dataclass(frozen=True)
 class RobotGraph:
@@ -30,20 +36,33 @@ class RobotGraph:
     parameters: dict = field(default_factory=dict)
     seed: int | None = None
 
-    def loop(self) -> list[NodeSpec]:
-        """Return the four nodes of the loop: bridge, estimator, simulator, controller."""
-        return [self.node(package, executable) for package, executable in LOOP]
+    def loop(self, virtual: bool = False) -> list[NodeSpec]:
+        """Return the four nodes of the loop: bridge, estimator, simulator, controller. Raises ConfigError for a wrong file.
+
+        virtual: for the virtual robot, which joints need a node more for.
+        """
+        nodes: tuple[tuple[str, str], ...] = LOOP
+        if has_joints(self.robot):
+            nodes = (JOINT_BRIDGE, *LOOP[1:]) + ((JOINT_ROBOT,) if virtual else ())
+        return [self.node(package, executable) for package, executable in nodes]
 
     def node(self, package: str, executable: str, **parameters: Any) -> NodeSpec:
         """Return one node of this robot."""
         given: dict[str, Any] = {"robot": self.robot}
-        if executable in ("can_bridge", "virtual_robot", "judge"):
+        if executable in ("can_bridge", "joint_robot", "virtual_robot", "judge"):
             given.update({key: value for key, value in (("interface", self.interface), ("channel", self.channel)) if value})
         if executable in ("virtual_robot", "judge") and self.seed is not None:
             given["seed"] = self.seed
         given.update(self.parameters.get(executable, {}))
         given.update(parameters)
         return NodeSpec(package, executable, given, self.namespace)
+
+
+def has_joints(robot: str) -> bool:
+    """Return whether the motors of a robot are joints of a ros2_control robot. Raises ConfigError."""
+    from gravcomp.description import load_robot_file
+
+    return (load_robot_file(robot).sections.get("hardware") or {}).get("joints") is not None
 
 
 def private_channels(robot: str) -> str:

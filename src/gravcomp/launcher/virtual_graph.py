@@ -32,7 +32,7 @@ class RunningGraph:
         self.can = CanInterface(channel=private_channel())
         self.namespace = f"/bench_{os.getpid()}_{self.can.channel.rpartition(':')[2]}"
         self.robot = robot = RobotGraph("article", self.can.interface, self.can.channel, self.namespace, parameters or {})
-        specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop()]
+        specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop(virtual=True)]
         self._viewer = robot.node("gravcomp_fem", "viewer") if viewer else None
         self.page = ""
         self._specs = {spec.executable: spec for spec in specs}

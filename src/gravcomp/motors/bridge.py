@@ -11,7 +11,6 @@ returns the frames to send. The table of states and causes is in gravcomp_hw/REA
     any --stop--> STOPPED;  --release--> cables paid out, then STOPPED;  --home--> HOMING --> HOLDING
 """
 
-import math
 from collections.abc import Mapping, Sequence
 
 import can
@@ -25,16 +24,11 @@ from gravcomp.motors.homing import HomingProcedure, Phase
 from gravcomp.motors.output import BusOutputs
 from gravcomp.motors.rotors import Rotors
 from gravcomp.motors.state import DRIVING, CableSnapshot, State, ZeroRecord
+from gravcomp.motors.supervisor import Supervisor
 
 ZERO_POLICIES = ("start", "home", "home_at_start")
 """Zero position when it is unknown: the present position ('start'), none until ~/home ('home'), by homing ('home_at_start')."""
 
-GOOD_COMMANDS = 3
-"""Acceptable commands in a row after which HOLDING becomes ACTIVE."""
-
-_RECOVERY_TIME = 0.2  # s of complete feedback after which a fault of bus or feedback is over
-_LONGEST_STEP = 0.02  # s; after a longer pause the loops continue as if only this time had passed
-_LONGEST_PAUSE = 0.1  # s between two ticks. The guard zeroes the currents then, and the cables may have moved
 _SHARED = (
     "no homing: motors that move several cables cannot find a zero position by tightening; hold the robot straight with all its"
     " cables just taut and start with zero: start"
@@ -42,90 +36,52 @@ _SHARED = (
 _RECOVERY = "; call ~/resume or ~/home to continue"
 
 
-class Bridge:
+class Bridge(Supervisor):
     """Drives the motors of `hardware`.
 
-    `zero` is one of ZERO_POLICIES; with `require_imu` the bridge holds the cables while no IMU samples come.
-    Attributes: state, message (its reason), report (of the last homing), rejected_frames and refused_commands (counters).
+    `zero` is one of ZERO_POLICIES. Attributes: those of `Supervisor`, report (of the last homing), rejected_frames (counter).
     Raises ValueError for an unknown policy.
     """
+
+    _loops: CableLoops
 
     def __init__(self, hardware: Hardware, *, zero: str = "start", require_imu: bool = True):
         if zero not in ZERO_POLICIES:
             raise ValueError(f"zero is '{zero}'; allowed: {', '.join(ZERO_POLICIES)}")
-        self.state, self.message = State.UNCONFIGURED, "no bus"
-        self.rejected_frames = 0
-        self.refused_commands = 0
-        self.report = ""
-        self._hardware, self._zero_policy, self._require_imu = hardware, zero, require_imu
-        self._transmission = hardware.transmission
-        self._bus_index = {bus.name: index for index, bus in enumerate(hardware.all_buses)}
-        self._index = {(hardware.bus_index(motor), motor.can_id): i for i, motor in enumerate(hardware.motors)}
         self._rotors = Rotors(hardware)
         self._faults = FaultWatch(hardware, self._rotors)
-        self._check = CommandCheck(hardware)
         self._loops = CableLoops(hardware, self._rotors, self._faults)
+        limits = [(hardware.drive.displacement_min, hardware.drive.displacement_max)] * len(hardware.motors)
+        super().__init__(
+            hardware.transmission,
+            hardware.watchdog,
+            CommandCheck(hardware.cables, hardware.motors, hardware.transmission, lambda: limits, hardware.watchdog),
+            self._loops,
+            require_imu=require_imu,
+            idle="no current",
+            recovery=_RECOVERY,
+        )
+        self.rejected_frames = 0
+        self.report = ""
+        self._hardware, self._zero_policy = hardware, zero
+        self._bus_index = {bus.name: index for index, bus in enumerate(hardware.all_buses)}
+        self._index = {(hardware.bus_index(motor), motor.can_id): i for i, motor in enumerate(hardware.motors)}
         self._output = BusOutputs(hardware)
         self._down: frozenset[int] = frozenset()  # indices of the buses that are closed
         self._lost: list[int] = []  # motors without a bus, while the others hold
-        self._stamp: object | None = None
-        self._command_time = self._imu_time = -math.inf
-        self._good_commands = 0
         self._homing: HomingProcedure | None = None
-        self._releasing = False
-        self._complete_since: float | None = None
-        self._latched = False
         self._turns_reported = False
-        self._last_tick: float | None = None
 
-    # Requests. Those of the user return whether they succeeded, and a sentence for the user.
+    # Requests.
 
     def configure(self) -> None:
         """Enter INACTIVE: the bus is open."""
         self._enter(State.INACTIVE, "bus open, no current")
 
-    def unconfigure(self, why: str = "no bus") -> None:
-        """Enter UNCONFIGURED: the bus is closed."""
-        self._enter(State.UNCONFIGURED, why)
-
     def activate(self, now: float) -> None:
         """Wait for the feedback of all motors, then drive them."""
-        self._latched, self._turns_reported, self._complete_since, self._imu_time = False, False, None, now
-        self._enter(State.FAULT, "waiting for the feedback of all motors")
-
-    def deactivate(self) -> None:
-        """Enter INACTIVE: no current."""
-        self._enter(State.INACTIVE, "deactivated, no current")
-
-    def stop(self, why: str = "stop requested") -> tuple[bool, str]:
-        """Send zero current from the next frame on."""
-        if self.state in (State.UNCONFIGURED, State.INACTIVE):
-            return True, "no motor has current"
-        if not self._latched:
-            self._enter(State.STOPPED, f"stopped, no current: {why}{_RECOVERY}")
-        return True, self.message
-
-    def resume(self, now: float) -> tuple[bool, str]:
-        """Leave STOPPED or a latched FAULT; hold the cables where they are now."""
-        if self.state not in (State.STOPPED, State.FAULT):
-            return self.state in DRIVING, f"nothing to resume: the state is {self.state.name}"
-        missing = self._missing(now)
-        if missing:
-            return False, f"cannot resume: {missing}"
-        self._clear_faults()
-        self._rotors.trust_turns()
-        self._begin(now)
-        return self.state in DRIVING, self.message
-
-    def release(self, now: float) -> tuple[bool, str]:
-        """Pay all cables out to `displacement_min`, then stop. Stop immediately when the zero position is unknown."""
-        if self.state not in DRIVING or not self._rotors.zeros.known or self._lost:
-            done, _ = self.stop("release requested")
-            return done, "no current; the cables were not paid out because the motors were not driving or have no zero"
-        self._enter(State.HOLDING, "paying the cables out")
-        self._releasing = True
-        self._loops.pay_out()
-        return True, self.message
+        self._turns_reported = False
+        super().activate(now)
 
     def home(self, now: float) -> tuple[bool, str]:
         """Find the zero position of every cable; also recovers from a motor fault."""
@@ -161,10 +117,6 @@ class Bridge:
         elif not self._rotors.on_feedback(index, feedback.angle, feedback.speed, feedback.current, now):
             self.rejected_frames += 1
 
-    def on_imu_sample(self, now: float) -> None:
-        """Take note of a valid IMU sample."""
-        self._imu_time = now
-
     def on_board_frame(self, message: can.Message, now: float) -> bool:
         """Return whether a frame of the IMU board came on the board's bus; else it is counted as a sign of swapped buses."""
         bus = self._bus_of(message)
@@ -172,12 +124,6 @@ class Bridge:
             return True
         self._faults.on_board_elsewhere(bus, now)
         return False
-
-    def imu_lost(self, why: str) -> None:
-        """Hold immediately: IMU samples come, but they are not valid."""
-        self._imu_time = -math.inf
-        if self.state is State.ACTIVE and self._require_imu:
-            self._hold(why)
 
     def bus_lost(self, why: str) -> None:
         """Enter FAULT: the bus is lost. The fault ends when all motors answer again."""
@@ -190,41 +136,6 @@ class Bridge:
         if len(self._down) == len(self._bus_index):
             self.bus_lost("; ".join(lost.values()))
 
-    def command(
-        self,
-        displacement: Sequence[float],
-        tension: Sequence[float],
-        now: float,
-        *,
-        age: float = 0.0,
-        stamp: object | None = None,
-    ) -> str | None:
-        """Take a command: displacement (m) and expected tension (N, may be empty) of every cable.
-
-        `age` (s) is that of the IMU sample from which the command was computed; `stamp` appears in the snapshot. Return
-        None when the command is followed, else the reason why it is refused.
-        """
-        if self.state not in (State.ACTIVE, State.HOLDING) or self._releasing or self._lost:
-            return f"not following commands: {self.message}"
-        reason = self._check.objection(displacement, tension, now, age)
-        if reason is None and self._imu_is_stale(now):
-            reason = "there are no good IMU samples"
-        if reason:
-            self.refused_commands += 1
-            self._good_commands = 0
-            if self.state is State.ACTIVE:
-                self._hold(f"command refused: {reason}")
-            else:
-                self.message = f"command refused: {reason}"
-            return reason
-        self._loops.follow(self._transmission.motors(displacement), self._transmission.forces(tension) if len(tension) else [])
-        # Time of the IMU sample: commands that still wait in queues after a node has died do not keep the bridge active.
-        self._command_time, self._stamp = now - max(age, 0.0), stamp
-        self._good_commands += 1
-        if self.state is State.HOLDING and self._good_commands >= GOOD_COMMANDS:
-            self._enter(State.ACTIVE, "following commands")
-        return None
-
     def restore(self, record: ZeroRecord) -> None:
         """Continue with the turns and zero positions that a guard kept, see `Rotors.restore`."""
         self._rotors.restore(record)
@@ -233,17 +144,9 @@ class Bridge:
 
     def tick(self, now: float) -> list[can.Message]:
         """Run one control period: check for faults, change the state, compute the currents. Return the frames to send."""
-        elapsed = 0.0 if self._last_tick is None else max(now - self._last_tick, 0.0)
-        self._last_tick = now
+        self._advance(now)
         if self.state in (State.UNCONFIGURED, State.INACTIVE):
             return []
-        if elapsed > _LONGEST_PAUSE and self.state in DRIVING:
-            self._fault(f"the bridge was delayed by {1e3 * elapsed:.0f} ms", latched=False)
-        self._watch(now)
-        if self.state in DRIVING:
-            self._drive(now, min(elapsed, _LONGEST_STEP))
-        if self.state not in DRIVING:
-            self._loops.no_current()
         return self._output.frames(self._loops.currents, enabled=self.state in DRIVING)
 
     def zero_frames(self) -> list[can.Message]:
@@ -270,25 +173,24 @@ class Bridge:
 
     # Changes of the state.
 
+    @property
+    def _can_pay_out(self) -> bool:
+        return self._rotors.zeros.known and not self._lost
+
+    @property
+    def _can_follow(self) -> bool:
+        return not self._lost
+
+    def _accept(self) -> None:
+        super()._accept()
+        self._rotors.trust_turns()
+
     def _enter(self, state: State, message: str) -> None:
         if self._homing and state is not State.HOMING:
             self._rotors.zeros.abandon_homing()  # no effect after success
             self._homing = None
-        if state is not State.ACTIVE:
-            self._good_commands = 0
-        self._releasing, self._lost = False, []
-        self.state, self.message = state, message
-
-    def _fault(self, message: str, *, latched: bool) -> None:
-        self._latched = self._latched or latched
-        self._complete_since = None
-        self._loops.no_current()
-        self._enter(State.FAULT, message + (_RECOVERY if latched else ""))
-
-    def _hold(self, message: str) -> None:
-        """Keep the cables where their setpoints are now."""
-        self._loops.hold()
-        self._enter(State.HOLDING, message)
+        self._lost = []
+        super()._enter(state, message)
 
     def _watch(self, now: float) -> None:
         """Check in this order: turns, feedback, unknown ids, encoders, age of command and IMU sample."""
@@ -301,21 +203,17 @@ class Bridge:
         elif self.state in DRIVING and missing:
             self._fault(missing, latched=False)
         elif self._lost:
-            self._await_buses(now)
+            self._await(None, now)
         if self.state is State.FAULT and not self._latched:
-            self._await_feedback(missing, now)
+            swapped = self._faults.unknown_id() if len(self._bus_index) > 1 else None
+            self._await(swapped or missing, now)
         if self.state not in DRIVING:
             return
         fault = self._faults.unknown_id() or self._faults.jumping_angle()
         if fault:
             self._fault(fault, latched=True)
             return
-        watchdog = self._hardware.watchdog
-        if self.state is State.ACTIVE:
-            if now - self._command_time > watchdog.command_timeout:
-                self._hold(f"no command from an IMU sample of the last {1e3 * watchdog.command_timeout:.0f} ms")
-            elif self._imu_is_stale(now):
-                self._hold(f"no IMU sample for {1e3 * watchdog.imu_timeout:.0f} ms")
+        self._watch_ages(now)
 
     def _hold_without(self, buses: Sequence[str], motors: list[int]) -> None:
         """Hold the cables of the other buses while `buses` are lost; `motors` (indices) have no current."""
@@ -325,13 +223,6 @@ class Bridge:
             self._lost = motors
         self._complete_since = None
 
-    def _await_buses(self, now: float) -> None:
-        """Continue as after activation when the lost buses have answered for a while."""
-        self._complete_since = now if self._complete_since is None else self._complete_since
-        if now - self._complete_since >= _RECOVERY_TIME:
-            self._clear_faults()
-            self._begin(now)
-
     def _watch_turns(self) -> None:
         """Do not drive with an uncertain number of turns until the user has decided or homing has found the zero position."""
         if self._turns_reported or self.state is State.HOMING:
@@ -340,17 +231,6 @@ class Bridge:
         if uncertain:
             self._fault(f"{self.message.removesuffix(_RECOVERY)}; {uncertain}" if self._latched else uncertain, latched=True)
             self._turns_reported = True
-
-    def _await_feedback(self, missing: str | None, now: float) -> None:
-        swapped = self._faults.unknown_id() if len(self._bus_index) > 1 else None
-        if missing or swapped:
-            self._complete_since = None
-            self.message = swapped or missing or ""
-            return
-        self._complete_since = now if self._complete_since is None else self._complete_since
-        if now - self._complete_since >= _RECOVERY_TIME:
-            self._clear_faults()
-            self._begin(now)
 
     def _begin(self, now: float) -> None:
         """Hold the cables, or find their zero positions first. All motors answer."""
@@ -407,9 +287,6 @@ class Bridge:
     def _bus_of(self, message: can.Message) -> int:
         return self._bus_index.get(str(message.channel), 0)
 
-    def _imu_is_stale(self, now: float) -> bool:
-        return self._require_imu and now - self._imu_time > self._hardware.watchdog.imu_timeout
-
     def _drive(self, now: float, dt: float) -> None:
         """Compute the currents of this period, and end homing or release when they are done."""
         if self._rotors.settling:  # the displacement may be wrong by a turn, and the loops must not correct that
@@ -424,7 +301,4 @@ class Bridge:
             fault = self._loops.step(dt, targets, self._hardware.homing.velocity)
         else:
             fault = self._loops.step(dt, without=self._lost)
-        if fault:
-            self._fault(fault, latched=True)
-        elif self._releasing and self._loops.arrived:
-            self._enter(State.STOPPED, f"cables paid out, no current{_RECOVERY}")
+        self._end_step(fault)

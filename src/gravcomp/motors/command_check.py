@@ -1,9 +1,11 @@
 """Checks of a cable command before the bridge follows it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from gravcomp.description.hardware import Hardware
+from gravcomp.description.hardware import Watchdog
+from gravcomp.description.motor import CableMotor
+from gravcomp.description.transmission import Transmission
 
 _MARGIN = 5e-5  # m beyond a displacement limit that is taken as rounding
 _LEAST_AGE = -0.1  # s; clocks of two processes may differ by this
@@ -12,10 +14,17 @@ _LEAST_AGE = -0.1  # s; clocks of two processes may differ by this
 class CommandCheck:
     """Checks commands one after another; remembers the last one to find jumps."""
 
-    def __init__(self, hardware: Hardware):
-        self._cables, self._transmission = hardware.cables, hardware.transmission
-        self._labels = hardware.cables if self._transmission.direct else tuple(motor.label for motor in hardware.motors)
-        self._drive, self._watchdog = hardware.drive, hardware.watchdog
+    def __init__(
+        self,
+        cables: Sequence[str],
+        motors: Sequence[CableMotor],
+        transmission: Transmission,
+        limits: Callable[[], Sequence[tuple[float, float]]],
+        watchdog: Watchdog,
+    ):
+        """cables (m): names; motors (k) with their transmission; limits (k,): smallest and largest displacement (m) now."""
+        self._cables, self._transmission, self._limits, self._watchdog = tuple(cables), transmission, limits, watchdog
+        self._labels = self._cables if transmission.direct else tuple(motor.label for motor in motors)
         self._last: list[float] | None = None
         self._last_time = -math.inf
 
@@ -23,7 +32,7 @@ class CommandCheck:
         """Return why the command must not be followed, or None.
 
         Checked in this order: number of values, finite values, displacements that shared motors can make, displacement
-        limits of the drive, age of the IMU sample, jump.
+        limits of the motors, age of the IMU sample, jump.
         `displacement` in m, `tension` in N (may be empty), `now` and `age` in s.
         """
         n, watchdog = len(self._cables), self._watchdog
@@ -31,7 +40,6 @@ class CommandCheck:
             return f"{len(displacement)} displacements and {len(tension)} tensions for {n} cables"
         if not all(map(math.isfinite, displacement)) or not all(map(math.isfinite, tension)):
             return "it contains a value that is not a number"
-        low, high = self._drive.displacement_min, self._drive.displacement_max
         turned = self._transmission.motors(displacement)
         for name, wanted, possible in zip(self._cables, displacement, self._transmission.cables(turned)):
             if abs(wanted - possible) > _MARGIN:
@@ -39,7 +47,7 @@ class CommandCheck:
                     f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm"
                     " is possible"
                 )
-        for label, x in zip(self._labels, turned):
+        for label, x, (low, high) in zip(self._labels, turned, self._limits()):
             if not low - _MARGIN <= x <= high + _MARGIN:
                 return f"{label} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
         if not _LEAST_AGE <= age <= watchdog.command_timeout:

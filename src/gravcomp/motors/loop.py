@@ -9,26 +9,31 @@ grow while the current is at its limit. It is frozen while the cable is at rest 
 and an integral that moves below the friction makes them creep back and forth (hunting).
 """
 
-import math
-
 from gravcomp.description.hardware import Drive
+from gravcomp.motors.setpoint import Setpoint
 
 REST_ERROR = 4e-6
 """m; the integral is frozen within it (a fifth of the accuracy required of the loop)."""
 
 
 class PositionLoop:
-    """Position loop of one cable. Attributes: setpoint (m), setpoint_velocity (m/s)."""
+    """Position loop of one cable."""
 
     def __init__(self, drive: Drive, two_way: bool = False):
         """two_way: the motor pulls an antagonist when it turns back, so that the expected force may be negative."""
-        self._drive = drive
+        self._drive, self._setpoint = drive, Setpoint(drive.acceleration_limit)
         self._least = -drive.tension_limit if two_way else drive.pretension
         self.reset(0.0)
 
     def reset(self, displacement: float) -> None:
         """Start at rest at the measured displacement (m)."""
-        self.setpoint, self.setpoint_velocity, self._integral = displacement, 0.0, 0.0
+        self._setpoint.reset(displacement)
+        self._integral = 0.0
+
+    @property
+    def setpoint(self) -> float:
+        """Setpoint of the cable (m)."""
+        return self._setpoint.position
 
     def step(
         self, target: float, tension: float, displacement: float, velocity: float, dt: float, velocity_limit: float | None = None
@@ -40,27 +45,15 @@ class PositionLoop:
         """
         drive = self._drive
         limit = drive.velocity_limit if velocity_limit is None else velocity_limit
-        self._advance(target, limit, dt)
-        error = self.setpoint - displacement
-        wanted = min(max(self.setpoint_velocity + drive.position_gain * error, -limit), limit)
+        setpoint = self._setpoint
+        setpoint.advance(target, limit, dt)
+        error = setpoint.position - displacement
+        wanted = min(max(setpoint.velocity + drive.position_gain * error, -limit), limit)
         feed_forward = min(max(tension, self._least), drive.tension_limit) / drive.tension_per_ampere
         proportional = drive.velocity_gain * (wanted - velocity) + feed_forward
-        at_rest = abs(error) < REST_ERROR and self.setpoint_velocity == 0.0
+        at_rest = abs(error) < REST_ERROR and setpoint.velocity == 0.0
         integral = self._integral if at_rest else self._integral + drive.velocity_integral * (wanted - velocity) * dt
         current = proportional + integral
         if abs(current) < drive.current_limit or abs(integral) < abs(self._integral):
             self._integral = min(max(integral, -drive.current_limit), drive.current_limit)
         return min(max(proportional + self._integral, -drive.current_limit), drive.current_limit)
-
-    def _advance(self, target: float, limit: float, dt: float) -> None:
-        if dt <= 0.0:
-            return
-        remaining, change = target - self.setpoint, self._drive.acceleration_limit * dt
-        # Largest v from which the setpoint can still stop on the target after this step: v dt + v^2 / (2 a_max) <= |remaining|.
-        reachable = math.sqrt(change * change + 2 * self._drive.acceleration_limit * abs(remaining)) - change
-        wanted = math.copysign(min(limit, reachable), remaining)
-        self.setpoint_velocity += min(max(wanted - self.setpoint_velocity, -change), change)
-        if abs(remaining) <= 0.5 * change * dt and abs(self.setpoint_velocity) <= change:
-            self.setpoint, self.setpoint_velocity = target, 0.0
-        else:
-            self.setpoint += self.setpoint_velocity * dt

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from gravcomp.full_model.cable_input import CableInput
 from gravcomp.reduction.law_deviation import DeviationPoint, KeptStiffness, LawDeviation, deviation_at, near_stiffness
 from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -74,14 +73,3 @@ def elastic_stiffness(
 def kept_stiffness(model: ReducedModel) -> KeptStiffness:
     """Return an empty memory for the stiffness of the law's deviation."""
     return KeptStiffness.none(model.size, _NEAR * model.reach)
-
-
-def cable_arrays(cables: CableInput, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the input for compiled functions.
-
-    The first array (m,) is the displacement to which each cable is pulled in, NaN for released ones. The second is the given
-    tension (m,), which takes precedence, or (0,) if none is given.
-    """
-    if cables.tension is not None:
-        return np.full(count, np.nan), cables.tension
-    return np.full(count, np.nan) if cables.wound is None else cables.wound, np.zeros(0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.reduction.body import Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
+from gravcomp.reduction.body import Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.motion_step import motion_step
 from gravcomp.reduction.reduced_cables import ReducedTendons
@@ -125,7 +125,7 @@ class ReducedDynamicSolver:
         inertia = ((1.0 - scheme.alpha_m) * scheme.acceleration_rate) * self._mass + (now * scheme.velocity_rate) * drag
         converged, q, tension, point, force, residual = motion_step(
             self._body, last.point, last.q, last.tension, rest, inertia, model.weight @ gravity,
-            *cable_arrays(cables, last.tension.size), now, scale, offset, self._kept, self._tolerance,
+            *cables.arrays(last.tension.size), now, scale, offset, self._kept, self._tolerance,
         )  # fmt: skip
         if not converged:
             self.state = dataclasses.replace(last, converged=False)

@@ -37,7 +37,7 @@ def motion_step(
     weight
         (r,) force of gravity.
     wound, given
-        Of `body.cable_arrays`.
+        Of `CableInput.arrays`.
     now
         Weight of the forces at the end of the step.
     scale, offset

@@ -16,7 +16,7 @@ from numba import njit
 from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
-from gravcomp.reduction.body import Body, Point, body_of, cable_arrays, elastic_force, elastic_stiffness, kept_stiffness, point_at
+from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.law_deviation import KeptStiffness
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
@@ -83,7 +83,7 @@ class ReducedTracker:
         state = self.state
         if self._has_friction:
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
-        wound, given = cable_arrays(cables, state.tension.size)
+        wound, given = cables.arrays(state.tension.size)
         weight = self.model.weight @ gravity
         converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
@@ -114,7 +114,7 @@ def _tracked(
 ) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
     """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
-    wound and given: of `body.cable_arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
+    wound and given: of `CableInput.arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
     offset; kept: of `elastic_stiffness`; the last three in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables

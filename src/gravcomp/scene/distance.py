@@ -50,7 +50,7 @@ class SceneArrays(NamedTuple):
 
 @njit(cache=True)
 def nearest(scene: SceneArrays, point: np.ndarray, normal: np.ndarray) -> tuple[float, int]:
-    """Return the smallest gap (m) at a point (3,) and its row in `scene`, and write the normal (3,); inf, -1 in an empty scene."""
+    """Return the smallest gap (m) at a point (3,) and its row, and write the normal (3,); inf, -1 in an empty scene."""
     best, row = np.inf, -1
     other = np.zeros(3)
     normal[:] = 0.0

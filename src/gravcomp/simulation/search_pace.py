@@ -32,6 +32,11 @@ class SearchPace:
         self._pause = 0
         self._found = gravity.copy(), None if cables.wound is None else cables.wound.copy()
 
+    @property
+    def last_gravity(self) -> np.ndarray | None:
+        """Gravity (3,) of the last equilibrium in m/s^2; None if there is none."""
+        return None if self._found is None else self._found[0]
+
     def may_search(self, gravity: np.ndarray, cables: CableInput) -> bool:
         """Return whether to search now. Called at every step without equilibrium."""
         if self._pause == 0:

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gravcomp.contact.contacts import Contacts
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
@@ -22,6 +24,7 @@ from gravcomp.simulation.search_pace import SearchPace
 if TYPE_CHECKING:
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.reduction.serving import ReducedServing
+    from gravcomp.scene.scene import Scene
 
 _MORE_ITERATIONS = 12
 _LIMIT_POINT = "the robot has no equilibrium beyond it, or only at a distant shape"
@@ -39,14 +42,20 @@ class Simulator:
     (True, -27.9)
     """
 
-    def __init__(self, robot: Robot | RobotModel, reduced: bool = True):
-        """reduced: use the reduced model if one is built. Raises MeshError for a body that cannot be meshed or computed."""
+    def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None):
+        """reduced: use the reduced model if one is built; scene: what the robot touches.
+
+        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact.
+        """
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
+        self.scene = scene
+        if scene:
+            self.solver.contact = FullContact(self.model, scene)
         self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
-        self._serving = self.load_reduced() if reduced else None
+        self._serving = self.load_reduced() if reduced and not scene else None
 
     def load_reduced(self) -> "ReducedServing | None":
         """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""
@@ -94,8 +103,9 @@ class Simulator:
     ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
-        If the equilibrium is lost, it is searched for from the straight robot, but only occasionally (see `SearchPace`). If
-        none is found or searched for, the last shape is returned with the status NOT_CONVERGED.
+        If the equilibrium is lost, it is searched for in parts of the change of load, then from the straight robot, but only
+        occasionally (see `SearchPace`). If none is found or searched for, the last shape is returned with the status
+        NOT_CONVERGED.
 
         gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
         cables are released. duration: s since the last step, in which a body with creep has crept (`full_model.creep`); None:
@@ -117,11 +127,14 @@ class Simulator:
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
             state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True)
-        if not state.converged:
-            if self._pace.may_search(gravity, cables):
+        if not state.converged and self._pace.may_search(gravity, cables):
+            last, self.solver.state = self._pace.last_gravity, before
+            if last is not None:
+                state = self.solver.approach(last, gravity, cables)
+            if not state.converged:
                 state = self.solver.solve(gravity, cables)
-            else:
-                state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
+        elif not state.converged:
+            state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
         if state.converged:
             self._pace.found(gravity, cables)
         else:
@@ -203,6 +216,7 @@ class Simulator:
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
             message=beyond_range(self.model, state.u) if state.converged else self._reason(state),
+            contacts=Contacts.none() if self.solver.contact is None else self.solver.contact.contacts(state.u),
         )
 
     def _reason(self, state: Equilibrium) -> str:

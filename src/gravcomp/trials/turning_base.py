@@ -52,12 +52,12 @@ def orientations(count: int, seed: int) -> list[np.ndarray]:
     return five + [base_orientation(*angles) for angles in zip(inclination, roll)]
 
 
-def residuals(setup: Setup, count: int = 20, orientation_seed: int = 1) -> Residuals:
-    """Run the loop through the five poses and `count` random ones. Raises ConfigError, NoEquilibrium, RuntimeError."""
+def residuals(setup: Setup, count: int = 20, orientation_seed: int = 1, board: str = "virtual") -> Residuals:
+    """Run the loop through the five poses and `count` random ones, with this board of the virtual robot. Raises ConfigError, NoEquilibrium, RuntimeError."""
     wanted = orientations(count, orientation_seed)
     rest = _REACTION + _PERIODS * 2.0 * math.pi / first_frequency(build_rod(setup.true_robot)) + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
-    loop = ClosedLoop(setup, motion)
+    loop = ClosedLoop(setup, motion, board=board)
     loop.hold(target_of(setup, Case(0.0)))
     start = loop.time
     legs = motion.rests

@@ -16,7 +16,8 @@ from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
 from gravcomp.orientation import EstimatorOptions, GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.thermal import HeaterControl, HeaterOptions, ThermalPlantOptions
-from gravcomp.virtual.board import SAMPLE_PERIOD, VirtualBoard
+from gravcomp.virtual.board import VirtualBoard
+from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 from gravcomp.virtual.parameters import Board
 
 RATE = math.radians(23.0)  # rad/s, about the vertical

@@ -9,6 +9,7 @@ frames at the same times give the same run, bit for bit. With several buses the 
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 import can
 import numpy as np
@@ -21,13 +22,15 @@ from gravcomp.description.hardware import Hardware
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
-from gravcomp.virtual.board import SAMPLE_PERIOD, STATUS_PERIOD, VirtualBoard
+from gravcomp.virtual.board import STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.dynamics import MovingRod
+from gravcomp.virtual.emulated_board import EmulatedBoard
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.frame_faults import FrameFaults
+from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 from gravcomp.virtual.motion import BaseMotion, StaticMotion, base_orientation, quaternion
 from gravcomp.virtual.motors import TICK, MotorBank
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -50,11 +53,13 @@ class VirtualRobot:
         hardware: Hardware,
         seed: int | None = None,
         motion: BaseMotion | None = None,
+        board: str = "virtual",
     ):
         """Start in the static equilibrium.
 
         `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
-        the robot horizontal. Raises ConfigError where the motors do not match the cables, where the parameters describe no robot,
+        the robot horizontal; `board`: 'virtual', Python code, or 'emulated', the
+        firmware's. Raises ConfigError where the motors do not match the cables, where the parameters describe no robot,
         and where the rod cannot represent it.
         """
         if hardware.cables != robot.cable_names:
@@ -62,12 +67,14 @@ class VirtualRobot:
         self.true = true = draw(parameters, robot, hardware, seed)
         # One generator for each part: an additional fault does not change the noise of the IMU.
         streams = np.random.SeedSequence(true.seed).spawn(4)
-        motors, board, faults = (np.random.default_rng(stream) for stream in streams[1:])
+        motors, imu, faults = (np.random.default_rng(stream) for stream in streams[1:])
         self._robot, self._hardware = robot, hardware
         self._model = build_rod(true)
         self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true))
         self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
-        self._board = VirtualBoard(true.board, board)
+        self._board: VirtualBoard | EmulatedBoard = (
+            EmulatedBoard(true.board, imu, hardware) if board == "emulated" else VirtualBoard(true.board, imu)
+        )
         self._base = MovingBase(
             motion or StaticMotion(base_orientation(0.0)),
             robot.imu_mount.rotation,
@@ -193,12 +200,20 @@ class VirtualRobot:
         except FrameError:
             self.refused += 1
             return
-        bus, currents = self._bus_index.get(str(frame.channel), self._board_bus), c610.currents_of(name, values)
+        bus = self._bus_index.get(str(frame.channel), self._board_bus)
+        if bus != self._board_bus or not self._board.between:
+            self._drive(bus, name, values)
+        if bus == self._board_bus and isinstance(self._board, EmulatedBoard):
+            self._board.receive(frame)
+        elif name == "HeaterCommand":
+            self._board.command_heater(values.duty)
+
+    def _drive(self, bus: int, name: str, values: Any) -> None:
+        """Let the motors of a bus take a decoded frame."""
+        currents = c610.currents_of(name, values)
         for index, motor in enumerate(self._hardware.motors):
             if motor.can_id in currents and self._bus_of_motor[index] == bus:
                 self._motors.commanded[index] = currents[motor.can_id]
-        if name == "HeaterCommand":
-            self._board.command_heater(values.duty)
 
     def _act(self) -> list[can.Message]:
         """Do what is due at this tick and return the frames that are sent."""
@@ -206,21 +221,32 @@ class VirtualRobot:
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
+        behind = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:
             for motor, bus, values in zip(self._hardware.motors, self._bus_of_motor, self._motors.feedback()):
-                sent.append(c610.feedback(motor.can_id, **values))
-                sent[-1].channel = self._bus_names[bus]
-        board_frames = len(sent)
+                frame = c610.feedback(motor.can_id, **values)
+                frame.channel = self._bus_names[bus]
+                (behind if self._board.between and bus == self._board_bus else sent).append(frame)
+        own = self._of_emulated(self._board, behind) if isinstance(self._board, EmulatedBoard) else []
         if self._tick % _SAMPLE_TICKS == 0:
             rate, force = self._base.imu(self.time)
-            sent += self._board.sample(rate, force, self._base.recorded)
-        if self._tick % _STATUS_TICKS == 0:
-            sent.append(self._board.status())
-        for frame in sent[board_frames:]:
+            own += self._board.sample(rate, force, self._base.recorded)
+        if self._tick % _STATUS_TICKS == 0 and isinstance(self._board, VirtualBoard):
+            own.append(self._board.status())
+        for frame in own:
             frame.channel = self._bus_names[self._board_bus]
+        sent += own
         for frame in sent:
             frame.timestamp = self.time
         return sent
+
+    def _of_emulated(self, board: EmulatedBoard, behind: list[can.Message]) -> list[can.Message]:
+        """Let the firmware run until now with the frames of the motors behind it. Return its frames to the host."""
+        board.feedback(behind)
+        board.advance(self.time)
+        for frame in board.to_motors():
+            self._drive(self._board_bus, *decode(frame))
+        return board.to_host()
 
     def _apply_faults(self) -> None:
         """Bring motors, cables and board into the state that the active faults demand."""
@@ -233,6 +259,7 @@ class VirtualRobot:
                 self._motors.stalled |= self._faults.concerned_motors(fault)
             elif fault.kind == "cable_break":
                 self._rod.tendon_stiffness[self._faults.concerned(fault)] = 0.0
-        self._board.imu_fault = next((k for k in ("silent", "invalid", "saturated", "stuck") if f"imu_{k}" in kinds), None)
-        self._board.heater_fault = next((k for k in ("dead", "stuck_on") if f"heater_{k}" in kinds), None)
-        self._board.temperature_stuck = "temperature_stuck" in kinds
+        chip = self._board.chip
+        chip.imu_fault = next((k for k in ("silent", "invalid", "saturated", "stuck") if f"imu_{k}" in kinds), None)
+        chip.heater_fault = next((k for k in ("dead", "stuck_on") if f"heater_{k}" in kinds), None)
+        chip.temperature_stuck = "temperature_stuck" in kinds

@@ -47,7 +47,8 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
 
     if args.direction is not None and args.target is None:
         raise ValueError("--direction needs --target, which is not given")
-    simulator = Simulator(load_robot_file(args.robot).robot, reduced=not args.full)
+    file = load_robot_file(args.robot)
+    simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
     if args.target is not None:
         shape, command = _reached(simulator, gravity, args.target, args.direction)

@@ -35,6 +35,20 @@ def run(args: argparse.Namespace) -> int:
         "error_estimate_mm": 1e3 * shape.error_estimate,
         "solve_time_ms": 1e3 * shape.solve_time,
     }
+    if simulator.scene:
+        contacts = shape.contacts
+        figures["contacts"] = [
+            {
+                "obstacle": simulator.scene.names[contacts.obstacle[i]],
+                "station": contacts.station[i],
+                "position_mm": (1e3 * contacts.position[i]).tolist(),
+                "gap_mm": 1e3 * contacts.gap[i],
+                "force_n": contacts.force[i].tolist(),
+                "normal_force_n": contacts.normal_force[i],
+                "sliding": bool(contacts.sliding[i]),
+            }
+            for i in range(len(contacts))
+        ]
     if command is not None:
         error = 1e3 * (shape.tip_position - 1e-3 * np.array(args.target))
         figures |= {
@@ -64,6 +78,13 @@ def _text(figures: dict[str, Any]) -> str:
         f"  {name}: {tension:.4f} N, {displacement:+.3f} mm"
         for name, tension, displacement in zip(figures["cables"], figures["tension_n"], figures["displacement_mm"])
     ]
+    if "contacts" in figures:
+        lines.append(f"  {len(figures['contacts'])} contacts (station: x, y, z in mm; gap; force in N)")
+        lines += [
+            f"    {c['obstacle']}, {c['station']:.3f}: {row(c['position_mm'])}; {1e3 * c['gap_mm']:+.2f} um;"
+            f" {row(c['force_n'], 4)} ({c['normal_force_n']:.4f} N normal{', slides' if c['sliding'] else ''})"
+            for c in figures["contacts"]
+        ]
     lines.append(f"  residual {figures['residual_n']:.1e} N, {figures['solve_time_ms']:.2f} ms")
     lines.append("  backbone (station: x, y, z in mm)")
     lines += [f"    {s:.2f}: {row(p)}" for s, p in zip(figures["backbone_station"], figures["backbone_position_mm"])]

@@ -5,6 +5,9 @@ import dataclasses
 from gravcomp.config import parameter
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 
+BOARDS = ("virtual", "emulated")
+"""What stands in for the board: Python code on the bus of the motors, or the firmware's C code between host and motors."""
+
 MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 
 
@@ -74,6 +77,12 @@ class VirtualRobotNodeParameters:
         choices=(0, 125, 250, 500, 1000),
         description="feedback rate of each motor; 0: the one of the robot file",
         read_only=True,
+    )
+    board: str = parameter(
+        "virtual",
+        choices=BOARDS,
+        read_only=True,
+        description="board of the virtual robot: Python code, or the firmware's C code, which also limits the currents",
     )
     truth_rate: float = parameter(
         100.0, unit="Hz", minimum=1.0, maximum=500.0, description="rate of the topics truth/...", read_only=True

@@ -1,0 +1,76 @@
+#include "flash.h"
+
+#include "registers.h"
+
+#define FIRST_SECTOR 2u
+
+extern const gc_parameter_record gc_parameters_a[], gc_parameters_b[];
+
+// Runs in RAM: the flash cannot be read while it is erased or written. The watchdog is fed meanwhile, for an erasure takes up to
+// 0.5 s; no interrupt comes, because their code is in the flash.
+__attribute__((section(".in_ram"), noinline)) static void wait(void) {
+  do {
+    IWDG->kr = IWDG_FEED;
+  } while ((FLASH->sr & FLASH_SR_BSY) != 0u);
+}
+
+__attribute__((section(".in_ram"), noinline)) static void erase_sector(uint32_t sector) {
+  FLASH->cr = FLASH_CR_SER | FLASH_CR_WORDS | sector << FLASH_CR_SECTOR_SHIFT;
+  FLASH->cr |= FLASH_CR_STRT;
+  wait();
+  FLASH->cr = FLASH_CR_WORDS;
+}
+
+__attribute__((section(".in_ram"), noinline)) static void write_word(volatile uint32_t *place, uint32_t word) {
+  FLASH->cr = FLASH_CR_PG | FLASH_CR_WORDS;
+  *place = word;
+  wait();
+  FLASH->cr = FLASH_CR_WORDS;
+}
+
+static void unlock(void) {
+  __asm__ volatile("cpsid i" ::: "memory");
+  if ((FLASH->cr & FLASH_CR_LOCK) != 0u) {
+    FLASH->keyr = FLASH_KEY1;
+    FLASH->keyr = FLASH_KEY2;
+  }
+  FLASH->sr = FLASH_SR_ERRORS;
+}
+
+static bool lock(void) {
+  FLASH->cr |= FLASH_CR_LOCK;
+  // What the cache has is older than what was written (RM0090 section 3.5.3).
+  FLASH->acr &= ~FLASH_ACR_DCACHE;
+  FLASH->acr |= 1u << 12;
+  FLASH->acr &= ~(1u << 12);
+  FLASH->acr |= FLASH_ACR_DCACHE;
+  const bool good = (FLASH->sr & FLASH_SR_ERRORS) == 0u;
+  __asm__ volatile("cpsie i" ::: "memory");
+  return good;
+}
+
+static bool erase(void *context, uint32_t place) {
+  (void)context;
+  unlock();
+  erase_sector(FIRST_SECTOR + place);
+  return lock();
+}
+
+static bool write(void *context, uint32_t place, const uint32_t *words, uint32_t count) {
+  (void)context;
+  volatile uint32_t *to = (volatile uint32_t *)(uintptr_t)(place == 0u ? gc_parameters_a : gc_parameters_b);
+  unlock();
+  for (uint32_t i = 0; i < count; i++) {
+    write_word(&to[i], words[i]);
+  }
+  return lock();
+}
+
+gc_storage gc_flash_storage(void) {
+  const gc_storage storage = {
+      .places = {gc_parameters_a, gc_parameters_b},
+      .erase = erase,
+      .write = write,
+  };
+  return storage;
+}

@@ -1,0 +1,78 @@
+"""Messages and services that all bridges have: the state of the cables, IMU samples, and requests."""
+
+import array
+from collections.abc import Callable
+
+from builtin_interfaces.msg import Time
+from gravcomp_node.managed_node import ERROR, OK, WARN
+from rclpy.lifecycle import LifecycleNode
+from sensor_msgs.msg import Imu, Temperature
+from std_srvs.srv import Trigger
+
+from gravcomp.canbus.imu_stream import ImuSample
+from gravcomp.motors.state import CableSnapshot, State
+from gravcomp_msgs.msg import CableState
+from gravcomp_node import SENSOR
+
+LOG_PERIOD = 1.0
+"""s, between two log messages about refused commands."""
+
+_TEMPERATURE_EVERY = 10  # samples; the chip updates its temperature every 1.28 s
+_LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}
+
+
+def to_time(nanoseconds: int) -> Time:
+    """Return the message of a time in ns."""
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def level(state: State) -> bytes:
+    """Return the level of /diagnostics for a state of a bridge."""
+    return _LEVELS.get(state, WARN)
+
+
+def cable_state(snapshot: CableSnapshot, now_ns: int) -> CableState:
+    """Return the message of a snapshot, with the stamp of the followed command, else `now_ns`."""
+    message = CableState(state=int(snapshot.state), message=snapshot.message)
+    message.header.stamp = to_time(snapshot.stamp or now_ns)
+    for name in ("command", "displacement", "velocity", "current", "tension"):
+        setattr(message, name, array.array("d", getattr(snapshot, name)))
+    return message
+
+
+def trigger(request: Callable, action: Callable) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+    """Return the callback of a service that has the driver's `request` do `action(bridge, now)`, and answers what it returns."""
+
+    def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = request(action)
+        return response
+
+    return serve
+
+
+class ImuTopics:
+    """The topics imu/data_raw and imu/temperature of a node; `frame`: of the IMU."""
+
+    def __init__(self, node: LifecycleNode, frame: str):
+        self._node, self._frame, self._count = node, frame, 0
+        self._imu = node.create_publisher(Imu, "imu/data_raw", SENSOR)
+        self._temperature = node.create_publisher(Temperature, "imu/temperature", SENSOR)
+
+    def publish(self, sample: ImuSample) -> None:
+        """Publish a sample, and now and then the temperature."""
+        message = Imu()
+        message.header.stamp = to_time(round(1e9 * sample.stamp))
+        message.header.frame_id = self._frame
+        a, w = message.linear_acceleration, message.angular_velocity
+        a.x, a.y, a.z = sample.specific_force
+        w.x, w.y, w.z = sample.angular_rate
+        message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
+        self._imu.publish(message)
+        if self._count % _TEMPERATURE_EVERY == 0:
+            self._temperature.publish(Temperature(header=message.header, temperature=float(sample.temperature)))
+        self._count += 1
+
+    def destroy(self) -> None:
+        """Destroy the publishers."""
+        self._node.destroy_publisher(self._imu)
+        self._node.destroy_publisher(self._temperature)

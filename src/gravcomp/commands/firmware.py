@@ -1,0 +1,140 @@
+"""`gravcomp firmware`: build, flash and test the firmware of the board, install its tools, write a robot's parameters."""
+
+import argparse
+import os
+from pathlib import Path
+
+from gravcomp.commands import output
+from gravcomp.commands.parsers import add_subcommand
+
+_TESTS = ("src/test/test_firmware.py", "src/test/test_virtual_board.py")
+_FOLDER = "build/firmware"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the subcommands."""
+    parser.description = "The firmware of the board (src/doc/firmware.md)."
+    choices = parser.add_subparsers(dest="subcommand", required=True, metavar="SUBCOMMAND")
+    add_subcommand(choices, "install", "install the cross compiler and the emulator (480 MB) into a folder of their own")
+    build = add_subcommand(choices, "build", "build the image for a board")
+    flash = add_subcommand(choices, "flash", "write the image into the board over ST-Link or USB-DFU")
+    for parser_ in (build, flash):
+        parser_.add_argument("--board", default="stm32f407", choices=("stm32f407",), help="board (default: stm32f407)")
+        parser_.add_argument("--standalone", action="store_true", help="with the loop on the board")
+        parser_.add_argument("--output", metavar="DIR", default=_FOLDER, help=f"folder of the image (default: {_FOLDER})")
+    flash.add_argument("--tool", choices=("pyocd", "openocd", "dfu-util"), help="programme that writes (default: what is there)")
+    flash.add_argument("--show", action="store_true", help="print what would be run, and run nothing")
+    test = add_subcommand(choices, "test", "run the firmware's tests and the fuzzer; print which lines of the C code they reach")
+    test.add_argument("--frames", type=int, default=50_000, metavar="N", help="frames of the fuzzer (default: 50000)")
+    test.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the fuzzer (default: 1)")
+    settings = add_subcommand(choices, "parameters", "write a robot's parameters into the board over CAN, and store them")
+    settings.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
+    settings.add_argument("--number", type=int, default=255, metavar="N", help="number of the board (default: the only one)")
+    settings.add_argument("--interface", default="", help="python-can interface, e.g. socketcan (default: the robot file's)")
+    settings.add_argument("--channel", default="", help="channel of the bus, e.g. can0 (default: the robot file's)")
+    settings.add_argument("--one-bus", action="store_true", help="the board is on the bus of the motors, not between host and motors")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the subcommand. Returns 0: done, 1: a test failed or the board refused. Raises ConfigError, SetupError."""
+    return {"install": _install, "build": _build, "flash": _flash, "test": _test, "parameters": _parameters}[args.subcommand](args)
+
+
+def _install(args: argparse.Namespace) -> int:
+    from gravcomp.firmware.toolchain import provide
+
+    folder = provide()
+    output.result({"folder": str(folder)}, f"The firmware's tools are in {folder}")
+    return 0
+
+
+def _build(args: argparse.Namespace) -> int:
+    figures, sentence = _built(args)
+    output.result(figures, sentence)
+    return 0
+
+
+def _built(args: argparse.Namespace) -> tuple[dict, str]:
+    from gravcomp.firmware.image import build_image
+    from gravcomp.firmware.stack import largest_stack
+
+    image = build_image(standalone=args.standalone)
+    folder = Path(args.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in (("image.elf", image.path.read_bytes()), ("boot.bin", image.boot), ("code.bin", image.code)):
+        (folder / name).write_bytes(data)
+    stack = largest_stack(image)
+    figures = {
+        "board": args.board,
+        "standalone": args.standalone,
+        "folder": str(folder),
+        "check": f"{image.check:08x}",
+        "flash_kb": round(image.flash / 1024, 1),
+        "ram_kb": round((image.ram + image.ccm) / 1024, 1),
+        "stack_kb": round(stack / 1024, 2),
+    }
+    sentence = (
+        f"{folder}/image.elf: {figures['flash_kb']} KB of flash, {figures['ram_kb']} KB of RAM, stack of at most"
+        f" {figures['stack_kb']} KB; check {figures['check']}"
+    )
+    return figures, sentence
+
+
+def _flash(args: argparse.Namespace) -> int:
+    import subprocess
+
+    from gravcomp.firmware.flashing import commands_for
+
+    figures, sentence = _built(args)
+    output.note(sentence)
+    lines = commands_for(Path(args.output), args.tool, needed=not args.show)
+    for line in lines:
+        output.note(" ".join(line))
+        if not args.show and subprocess.run(line).returncode != 0:
+            output.result(figures | {"written": False}, "The image was not written: see the message above")
+            return 1
+    done = "The image was not written: --show" if args.show else "The image is in the board"
+    output.result(figures | {"written": not args.show, "commands": [" ".join(line) for line in lines]}, done)
+    return 0
+
+
+def _test(args: argparse.Namespace) -> int:
+    from gravcomp.environment.packages import provide_extra
+    from gravcomp.firmware.fuzzing import fuzz
+    from gravcomp.firmware.line_coverage import measure
+    from gravcomp.firmware.toolchain import provide
+
+    root = Path(os.environ["GRAVCOMP_ROOT"])
+    provide_extra("development", root)
+    provide()
+    coverage = measure(list(_TESTS), root)
+    for file, lines in coverage.missed.items():
+        output.note(f"{file}: not reached: {', '.join(map(str, lines))}")
+    fuzzed = fuzz(args.frames, args.seed)
+    good = not fuzzed.fault and fuzzed.violations == 0
+    figures = {
+        "coverage_pct": coverage.percent, "lines": coverage.lines, "lines_reached": coverage.reached, "frames": fuzzed.frames,
+        "violations": fuzzed.violations, "fault": fuzzed.fault, "edges": fuzzed.edges,
+    }  # fmt: skip
+    output.result(
+        figures,
+        f"Tests passed; {coverage.percent} % of {coverage.lines} lines reached; {fuzzed.frames} hostile frames,"
+        f" {fuzzed.violations} violations{', fault: ' + fuzzed.fault if fuzzed.fault else ''}",
+    )
+    return 0 if good else 1
+
+
+def _parameters(args: argparse.Namespace) -> int:
+    from gravcomp.description import load_robot_file
+    from gravcomp.description.hardware import parse_hardware
+    from gravcomp.firmware.client import BoardClient
+    from gravcomp.firmware.settings import settings_of
+
+    file = load_robot_file(args.robot)
+    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    if len(hardware.all_buses) == 1:
+        hardware = hardware.on(args.interface, args.channel)
+    with BoardClient(hardware.board_bus, args.number) as client:
+        client.configure(settings_of(hardware, between=not args.one_bus))
+    output.result({"board": args.number, "robot": file.source}, "The parameters are in the board, and stored")
+    return 0

@@ -1,0 +1,209 @@
+"""Places where the robot's surface is near an obstacle; compiled.
+
+At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
+half of g'^2 / g'': where it is a minimum along the robot, the place moves there, so that no point of the surface is deeper in
+a wall than at these places, within a few micrometres.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from gravcomp.contact.surface import ContactSurface
+from gravcomp.scene.distance import SceneArrays, gap_to
+
+_TURNS = 4  # corrections of the direction in which the outline is nearest
+_SETTLED = 1e-7  # of the radius
+_MOVES = 3  # corrections of the place along the robot
+_WORTH = 1e-4  # of the radius: a place moves along the robot if that makes the gap smaller by this
+
+
+class Places(NamedTuple):
+    """c places.
+
+    row (c,): of the obstacle in the scene; station (c,): the nearest one; first (c,) and share (c, 3): the first of three
+    neighbours, and their weights; own (c, 2): x and y in the section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent
+    in the section; along (c, 3): the other tangent; curvature (c,) of the obstacle across the robot in 1/m: change of the
+    normal along `around`, positive beside a ball.
+    """
+
+    row: np.ndarray
+    station: np.ndarray
+    first: np.ndarray
+    share: np.ndarray
+    own: np.ndarray
+    gap: np.ndarray
+    normal: np.ndarray
+    around: np.ndarray
+    along: np.ndarray
+    curvature: np.ndarray
+
+
+@njit(cache=True)
+def deepest(
+    scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
+) -> float:
+    """Return the smallest gap of a section (3, 3) p, f_1, f_2, and write where it is in the section and the normal there."""
+    corners, radius = surface.outline.shape[1], surface.radius[station]
+    point = section[0].copy()
+    gap = gap_to(scene, row, point, normal)
+    for turn in range(_TURNS):
+        x = -(normal[0] * section[1, 0] + normal[1] * section[1, 1] + normal[2] * section[1, 2])
+        y = -(normal[0] * section[2, 0] + normal[1] * section[2, 1] + normal[2] * section[2, 2])
+        before_x, before_y = own[0], own[1]
+        if corners == 0:
+            length = np.sqrt(x * x + y * y)
+            own[0], own[1] = (radius * x / length, radius * y / length) if length > 1e-9 else (radius, 0.0)
+        else:
+            farthest = -np.inf
+            for c in range(corners):
+                corner = surface.outline[station, c]
+                reach = x * corner[0] + y * corner[1]
+                if reach > farthest:
+                    farthest = reach
+                    own[0], own[1] = corner[0], corner[1]
+        if turn and abs(own[0] - before_x) + abs(own[1] - before_y) < _SETTLED * radius:
+            break
+        for i in range(3):
+            point[i] = section[0, i] + own[0] * section[1, i] + own[1] * section[2, i]
+        gap = gap_to(scene, row, point, normal)
+    return gap
+
+
+@njit(cache=True)
+def all_gaps(
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, own: np.ndarray, normal: np.ndarray
+) -> np.ndarray:
+    """Return gaps (k, s) of all stations to all rows of the scene for sections (s, 3, 3).
+
+    Stations whose middle is farther than `reach` (s,) from touching have the gap of their middle less their size. Writes own
+    (k, s, 2) and normal (k, s, 3) of the others.
+    """
+    stations = len(surface.place)
+    gap = np.empty((len(scene.kind), stations))
+    for k in range(len(scene.kind)):
+        for s in range(stations):
+            stretch = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
+            middle = gap_to(scene, k, sections[s, 0], normal[k, s])
+            if middle - stretch > reach[s]:
+                gap[k, s] = middle - stretch
+            else:
+                gap[k, s] = deepest(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
+    return gap
+
+
+@njit(cache=True)
+def find_places(
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, moved: np.ndarray, margin: float, pressed: np.ndarray
+) -> Places:
+    """Return the places that touch, or would touch if nothing held the robot.
+
+    sections (s, 3, 3): p, f_1, f_2 of the stations; moved (s, 3): how far p goes in m with the forces of last time; margin:
+    places with a smaller gap in m are returned too; pressed (k, s): whether a place was pressed last.
+    """
+    rows, stations = len(scene.kind), len(surface.place)
+    own, normal = np.zeros((rows, stations, 2)), np.zeros((rows, stations, 3))
+    reach = np.empty(stations)
+    for s in range(stations):
+        reach[s] = margin + _length(moved[s])
+    gap = all_gaps(scene, surface, sections, reach, own, normal)
+    count = 0
+    chosen = np.zeros((rows, stations), dtype=np.bool_)
+    for k in range(rows):
+        for s in range(stations):
+            free = gap[k, s] + normal[k, s] @ moved[s]
+            if pressed[k, s] or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
+                chosen[k, s] = True
+                count += 1
+    result = Places(
+        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
+        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
+    )  # fmt: skip
+    i = 0
+    for k in range(rows):
+        for s in range(stations):
+            if chosen[k, s]:
+                _write_place(scene, surface, sections, gap, own, normal, k, s, result, i)
+                i += 1
+    return result
+
+
+@njit(cache=True)
+def _write_place(
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, gap: np.ndarray, own: np.ndarray, normal: np.ndarray,
+    k: int, s: int, result: Places, i: int,
+) -> None:  # fmt: skip
+    """Write place i of the result: that of station s and row k, moved to the minimum along the robot."""
+    stations = len(surface.place)
+    first = min(max(s - 1, 0), stations - 3)
+    share, place = result.share[i], float(s - first)
+    result.row[i], result.station[i], result.first[i] = k, s, first
+    section = sections[s].copy()
+    best, here, there = gap[k, s], own[k, s].copy(), normal[k, s].copy()
+    before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
+    bend = gap[k, first] - 2.0 * gap[k, first + 1] + gap[k, first + 2]
+    slope = 0.5 * (gap[k, first + 2] - gap[k, first]) + (place - 1.0) * bend
+    if best <= before and best <= after and bend > 0.0 and slope * slope > 2.0 * bend * _WORTH * surface.radius[s]:
+        low, high = max(place - 0.5, 0.0), min(place + 0.5, 2.0)
+        moved, other, beside = place - slope / bend, np.empty(2), np.empty(3)
+        for _ in range(_MOVES):
+            moved = min(max(moved, low), high)
+            _section_at(sections, first, moved, share, section)
+            found = deepest(scene, k, surface, s, section, other, beside)
+            if found < best:
+                best, place = found, moved
+                here[:], there[:] = other, beside
+            # The gap's slope along the robot follows from its gradient; its bend is that of the stations.
+            ahead = 0.0
+            for j in range(3):
+                curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
+                ahead += beside[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
+            moved -= ahead / bend
+    _section_at(sections, first, place, share, section)
+    result.own[i], result.gap[i], result.normal[i] = here, best, there
+    axis = np.cross(section[1], section[2])
+    around = np.cross(axis, there)
+    length = _length(around)
+    if length < 1e-6 * _length(axis):  # the wall is across the robot
+        around[:] = section[1] - (section[1] @ there) * there
+        length = _length(around)
+    around /= length
+    result.around[i], result.along[i] = around, np.cross(there, around)
+    h = 0.02 * surface.radius[s]
+    one, other_side = np.empty(3), np.empty(3)
+    gap_to(scene, k, section[0] + h * around, one)
+    gap_to(scene, k, section[0] - h * around, other_side)
+    bend_across = ((one - other_side) @ around) / (2.0 * h)
+    result.curvature[i] = min(max(bend_across, -1.0 / h), 1.0 / h)
+
+
+@njit(cache=True)
+def _section_at(sections: np.ndarray, first: int, place: float, share: np.ndarray, section: np.ndarray) -> None:
+    """Write the section (3, 3) at `place` (0 to 2) among three stations, and the weights (3,) of these."""
+    share[0] = 0.5 * (place - 1.0) * (place - 2.0)
+    share[1] = place * (2.0 - place)
+    share[2] = 0.5 * place * (place - 1.0)
+    for v in range(3):
+        for j in range(3):
+            section[v, j] = (
+                share[0] * sections[first, v, j] + share[1] * sections[first + 1, v, j] + share[2] * sections[first + 2, v, j]
+            )
+
+
+@njit(cache=True)
+def positions(places: Places, sections: np.ndarray) -> np.ndarray:
+    """Return where the material points of the places (c, 3) are for sections (s, 3, 3)."""
+    result = np.zeros((len(places.row), 3))
+    for i in range(len(places.row)):
+        x, y = places.own[i]
+        for n in range(3):
+            section = sections[places.first[i] + n]
+            for j in range(3):
+                result[i, j] += places.share[i, n] * (section[0, j] + x * section[1, j] + y * section[2, j])
+    return result
+
+
+@njit(cache=True)
+def _length(vector: np.ndarray) -> float:
+    return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

@@ -1,0 +1,262 @@
+"""The processor and the peripherals around it: memory, registers by address, interrupts as calls of their handlers.
+
+Interrupts come while the image waits for them; a handler runs to its end. That is what the image's priorities give it, except for
+the interrupt of reception, which shares with the others nothing but rings with one writer and one reader.
+"""
+
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from gravcomp.firmware.elf import read_elf
+from gravcomp.firmware.emulator.can_controller import CanController, WireFrame
+from gravcomp.firmware.emulator.flash_memory import FlashMemory, SupplyLost
+from gravcomp.firmware.emulator.imu_device import ImuDevice
+from gravcomp.firmware.image import BOOT_START, CODE_START, Image
+from gravcomp.firmware.toolchain import provide
+
+PARAMETERS, MODELS, FLASH_END = 0x08008000, 0x08040000, 0x08100000
+RAM, RAM_SIZE, CCM, CCM_SIZE, STACK_SIZE = 0x20000000, 0x20000, 0x10000000, 0x10000, 0x2000
+WATCHDOG = 40_000
+"""us that the watchdog waits."""
+
+RESET_FLAGS = {"power": 1 << 27 | 1 << 25, "supply": 1 << 25, "watchdog": 1 << 29, "software": 1 << 28, "pin": 1 << 26}
+"""RCC_CSR after a reset by cause."""
+
+_RETURN = 0x08007FF0  # nothing is there; a handler that returns comes to it
+_PAINT = 0xA5
+_WFI = b"\x30\xbf"
+_PERIPHERALS, _SYSTEM, _UNIQUE = 0x40000000, 0xE000E000, 0x1FFF7000
+_TIM2, _TIM3, _IWDG, _CAN1, _CAN2, _PWR, _SPI1 = 0x0000, 0x0400, 0x3000, 0x6400, 0x6800, 0x7000, 0x13000
+_GPIOA, _GPIOB, _RCC, _FLASH = 0x20000, 0x20400, 0x23800, 0x23C00
+_SELECTS = {_GPIOA: (4, "acc"), _GPIOB: (0, "gyro")}
+
+
+class ProcessorFault(RuntimeError):
+    """The image has done what the processor does not do: it hangs, or reads where nothing is."""
+
+
+class Machine:
+    """The chip with an image. Attributes: now (us), cans, imu, flash, supply_low, duty, resets (by cause), symbols."""
+
+    def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
+        """Raises SetupError without the emulator."""
+        provide()
+        import unicorn
+        from unicorn import arm_const
+
+        self._arm = arm_const
+        self._error = unicorn.UcError
+        elf = read_elf(image.path.read_bytes())
+        self.symbols = elf.symbols
+        self._uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
+        uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        self.flash = FlashMemory()
+        uc.mem_map(BOOT_START, PARAMETERS - BOOT_START)
+        uc.mmio_map(PARAMETERS, CODE_START - PARAMETERS, self._read_parameters, None, self._write_parameters, None)
+        uc.mem_map(CODE_START, FLASH_END - CODE_START)
+        uc.mem_map(RAM, RAM_SIZE)
+        uc.mem_map(CCM, CCM_SIZE)
+        uc.mem_map(_UNIQUE, 0x1000)
+        uc.mem_write(_UNIQUE + 0xA10, struct.pack("<3I", *unique_id))
+        uc.mmio_map(_PERIPHERALS, 0x28000, self._read, None, self._write, None)
+        uc.mmio_map(_SYSTEM, 0x1000, self._read_system, None, self._write_system, None)
+        self.code = image.code
+        self.load(image.boot, image.code)
+        main = self.symbols["main"] & ~1
+        self._wait = main + bytes(uc.mem_read(main, 4096)).index(_WFI)
+        uc.ctl_exits_enabled(True)
+        uc.ctl_set_exits([self._wait, _RETURN, self.symbols["gc_stuck"] & ~1])
+        self.resets: list[str] = []
+        self.supply_low = False
+        self.cans = (CanController(), CanController())
+        self.imu = ImuDevice()
+        self.dead = True
+        self.reset("power")
+
+    def load(self, boot: bytes, code: bytes) -> None:
+        """Write both parts of an image into the flash; the models are erased."""
+        self._uc.mem_write(BOOT_START, boot)
+        self._uc.mem_write(CODE_START, b"\xff" * (FLASH_END - CODE_START))
+        self._uc.mem_write(CODE_START, code)
+
+    def write_memory(self, address: int, data: bytes) -> None:
+        """Write into memory or flash, as a debugger does."""
+        self._uc.mem_write(address, data)
+
+    def read_memory(self, address: int, size: int) -> bytes:
+        """Read memory."""
+        return bytes(self._uc.mem_read(address, size))
+
+    def reset(self, cause: str) -> None:
+        """Start the image as after a reset, and run it until it waits. `dead` where it does not come so far."""
+        self.now = 0
+        self.duty = 0
+        self._fed = 0
+        self._registers: dict[int, int] = {_RCC + 0x74: RESET_FLAGS[cause]}
+        self._spi = 0xFF
+        self._restart = False
+        self.flash.reset()
+        for can in self.cans:
+            can.received.clear()
+            can.sent.clear()
+        self.resets.append(cause)
+        self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
+        stack, start = struct.unpack("<2I", self.read_memory(BOOT_START, 8))
+        self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
+        self.dead = False
+        self.dead = not self._run(start, self._wait)
+
+    def tick(self, now: int) -> None:
+        """Let the time be `now` (us) and run the interrupt of the tick, then main's loop once; the watchdog may reset."""
+        self.now = now & 0xFFFFFFFF
+        if self.dead:
+            return
+        self.interrupt("gc_on_tick")
+        self._flush()
+        if not self.dead:
+            self._run(self._wait + 2 | 1, self._wait)
+        if self._restart:
+            self.reset("software")
+        elif (self.now - self._fed) & 0xFFFFFFFF > WATCHDOG:
+            self.reset("watchdog")
+
+    def data_ready(self, time: int) -> None:
+        """Let the gyroscope's data-ready edge come at `time` (us)."""
+        if self.dead or not self.imu.set_up or self.imu.silent:
+            return
+        self._registers[_TIM2 + 0x34] = time & 0xFFFFFFFF
+        self.interrupt("gc_on_data_ready")
+        self._flush()
+        if not self.dead:
+            self._run(self._wait + 2 | 1, self._wait)
+
+    def receive(self, bus: int, frames: list[WireFrame]) -> None:
+        """Let frames come on a bus."""
+        if self.dead or not frames:
+            return
+        self.cans[bus].received.extend(frames)
+        self.interrupt("gc_on_host_frame" if bus == 0 else "gc_on_motor_frame")
+        self.cans[bus].received.clear()
+
+    def interrupt(self, handler: str) -> None:
+        """Run the handler of an interrupt; what it may change of main's registers is kept."""
+        kept = self._uc.context_save()
+        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
+        self._run(self.symbols[handler] | 1, _RETURN)
+        if not self.dead:
+            self._uc.context_restore(kept)
+
+    def call(self, name: str, *arguments: int) -> int:
+        """Call a function of the image and return its result."""
+        registers = (self._arm.UC_ARM_REG_R0, self._arm.UC_ARM_REG_R1, self._arm.UC_ARM_REG_R2, self._arm.UC_ARM_REG_R3)
+        kept = self._uc.context_save()
+        for register, value in zip(registers, arguments):
+            self._uc.reg_write(register, value)
+        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
+        self._run(self.symbols[name] | 1, _RETURN)
+        result = self._uc.reg_read(self._arm.UC_ARM_REG_R0)
+        self._uc.context_restore(kept)
+        return result
+
+    @property
+    def stack_used(self) -> int:
+        """Bytes of the stack that were used since the reset, without the frames of interrupts."""
+        stack = self.read_memory(CCM, STACK_SIZE)
+        return STACK_SIZE - next((k for k, byte in enumerate(stack) if byte != _PAINT), STACK_SIZE)
+
+    def _flush(self) -> None:
+        """Let the interrupts of the mailboxes come until no more frames leave."""
+        for can, handler in zip(self.cans, ("gc_on_host_sent", "gc_on_motor_sent")):
+            before = -1
+            while len(can.sent) != before and not self.dead and not can.off:
+                before = len(can.sent)
+                self.interrupt(handler)
+
+    def _run(self, start: int, end: int) -> bool:
+        """Run from an address until the image waits, returns or gives up; return whether that is `end`. Raises ProcessorFault."""
+        self._lost = False
+        self._failure: Exception | None = None
+        try:
+            self._uc.emu_start(start | 1, 0)
+        except self._error as error:
+            at = self._uc.reg_read(self._arm.UC_ARM_REG_PC)
+            raise ProcessorFault(f"at 0x{at:08X}: {error}") from error
+        if self._failure is not None:
+            raise self._failure
+        if self._lost:
+            self.dead = True
+            return False
+        return self._uc.reg_read(self._arm.UC_ARM_REG_PC) & ~1 == end
+
+    def _guarded(self, action: Callable[..., Any], *arguments: int) -> Any:
+        """Call a model from the emulator, which cannot pass exceptions on."""
+        try:
+            return action(*arguments)
+        except SupplyLost:
+            self._lost = True
+            self._uc.emu_stop()
+        except Exception as error:
+            self._failure = error
+            self._uc.emu_stop()
+        return 0
+
+    def _read_parameters(self, uc: Any, offset: int, size: int, _: Any) -> int:
+        return int.from_bytes(self.flash.data[offset : offset + size], "little")
+
+    def _write_parameters(self, uc: Any, offset: int, size: int, value: int, _: Any) -> None:
+        self._guarded(self.flash.write, offset, size, value)
+
+    def _read_system(self, uc: Any, offset: int, size: int, _: Any) -> int:
+        return 0
+
+    def _write_system(self, uc: Any, offset: int, size: int, value: int, _: Any) -> None:
+        if offset == 0xD0C and value == 0x05FA0004:
+            self._restart = True
+
+    def _read(self, uc: Any, offset: int, size: int, _: Any) -> int:
+        return self._guarded(self._register, offset) & 0xFFFFFFFF
+
+    def _write(self, uc: Any, offset: int, size: int, value: int, _: Any) -> None:
+        self._guarded(self._set_register, offset, value)
+
+    def _register(self, offset: int) -> int:
+        if offset == _TIM2 + 0x24:
+            return self.now
+        for start, can in ((_CAN1, self.cans[0]), (_CAN2, self.cans[1])):
+            if start <= offset < start + 0x400:
+                return can.read(offset - start)
+        if offset == _SPI1 + 0x08:
+            return 1
+        if offset == _SPI1 + 0x0C:
+            return self._spi
+        if offset == _PWR + 0x04:
+            return 4 if self.supply_low else 0
+        if _FLASH < offset < _FLASH + 0x20:
+            return self.flash.read_register(offset - _FLASH)
+        value = self._registers.get(offset, 0)
+        if offset == _RCC:
+            return value | (value & 1 << 16) << 1 | (value & 1 << 24) << 1  # what is switched on is ready
+        if offset == _RCC + 0x08:
+            return value | (value & 3) << 2
+        return value
+
+    def _set_register(self, offset: int, value: int) -> None:
+        for start, can in ((_CAN1, self.cans[0]), (_CAN2, self.cans[1])):
+            if start <= offset < start + 0x400:
+                can.write(offset - start, value)
+                return
+        if offset == _IWDG and value == 0xAAAA:
+            self._fed = self.now
+        elif offset == _SPI1 + 0x0C:
+            self._spi = self.imu.exchange(value & 0xFF)
+        elif offset == _TIM3 + 0x34:
+            self.duty = value
+        elif _FLASH < offset < _FLASH + 0x20:
+            self.flash.write_register(offset - _FLASH, value)
+        elif offset in (_GPIOA + 0x18, _GPIOB + 0x18):
+            pin, device = _SELECTS[offset - 0x18]
+            if value & (1 << pin | 1 << pin + 16):
+                self.imu.select(device, bool(value & 1 << pin + 16))
+        else:
+            self._registers[offset] = value

@@ -1,0 +1,148 @@
+"""What the controller of a ros2_control robot is sent: angles that follow the setpoints, or efforts of position loops.
+
+    trajectory, position:   q = angle of the setpoint; the controller of the robot closes the loop
+    effort:                 tau = d r F,  F the force of the loop of `loop`
+
+The gains of the drive are those of loops that answer within 4 ms, as on a CAN bus. Over topics the answer takes longer, by the
+delay D, and a loop stays stable when its crossover falls as much: with s = min(1, 4 ms / D) the gains are s K_v, s K_i and
+min(1, 2 s) K_p, so that the velocity loop stays faster than the position loop.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from gravcomp.description.hardware import Drive, Watchdog
+from gravcomp.motors.joint_states import JointStates
+from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.monitor import MotorMonitor
+from gravcomp.motors.setpoint import Setpoint
+
+_AWAY = 0.1  # of the following error, at rest away from the setpoint
+_AWAY_TIME = 4.0  # stall times
+_NOMINAL_DELAY = 0.004  # s, of the loops that the gains of a drive are for
+
+
+class JointLoops:
+    """Setpoints, or position loops, of the joints of `states`. Attribute: target (k,) m at the capstans.
+
+    pays_out (k,): motors that only pay out when they turn back; delay: None for a controller of positions; for one of efforts,
+    the time (s) from a measurement to the effort that answers it.
+    """
+
+    def __init__(self, states: JointStates, watchdog: Watchdog, pays_out: np.ndarray, delay: float | None):
+        self._states, self._watchdog, self._pays_out, self._by_effort = states, watchdog, pays_out, delay is not None
+        drives = [_softer(scale.drive, delay or 0.0) for scale in states.scales]
+        self._drives: list[Drive] = drives
+        self._setpoints = [Setpoint(drive.acceleration_limit) for drive in drives]
+        self._loops = [PositionLoop(drive, two_way=not alone) for drive, alone in zip(drives, pays_out)]
+        self._monitors = [MotorMonitor(drive, watchdog) for drive in drives]
+        self._away = [0.0] * len(drives)  # s, for which each joint has been at rest away from its setpoint
+        self.target, self._tension = [0.0] * len(drives), [0.0] * len(drives)
+        self._resting = True
+
+    @property
+    def arrived(self) -> bool:
+        """Whether every setpoint is on its target."""
+        return self._positions() == self.target
+
+    def limits(self) -> list[tuple[float, float]]:
+        """Smallest and largest displacement (m) of each motor."""
+        return [scale.limits() for scale in self._states.scales]
+
+    def reset(self) -> None:
+        """Start at rest at the measured displacements, within the limits."""
+        self._resting = False
+        start = [min(max(x, low), high) for x, (low, high) in zip(self._states.displacement(), self.limits())]
+        for setpoint, loop, displacement in zip(self._setpoints, self._loops, start):
+            setpoint.reset(displacement)
+            loop.reset(displacement)
+        for monitor in self._monitors:
+            monitor.reset()
+        self._away = [0.0] * len(self._away)
+
+    def follow(self, displacement: Sequence[float], tension: Sequence[float]) -> None:
+        """Set targets (m), clamped to the limits, and expected forces (N; none: 0)."""
+        self.target = [min(max(x, low), high) for x, (low, high) in zip(displacement, self.limits())]
+        self._tension = list(tension) or [0.0] * len(self.target)
+
+    def hold(self) -> None:
+        """Keep the cables where their setpoints are now; the expected tensions stay."""
+        self.target = self._positions()
+
+    def pay_out(self) -> None:
+        """Move all cables to the smallest displacement; motors with antagonists go to zero, where no cable is pulled in."""
+        self.follow([low if alone else 0.0 for alone, (low, _) in zip(self._pays_out, self.limits())], [])
+
+    def no_current(self) -> None:
+        """Command no effort; joints away from their setpoints are led to where they are, if that is near, and left there."""
+        if self._by_effort or self._resting:
+            self._resting = True
+            return
+        self._resting = True
+        near = self._watchdog.following_error
+        self.target = [
+            s if abs(x - s) <= _AWAY * near else min(max(x, low, s - near), high, s + near)
+            for x, s, (low, high) in zip(self._states.displacement(), self._positions(), self.limits())
+        ]
+
+    def rest(self, dt: float) -> list[float] | None:
+        """Return what the controller is sent while the motors are not driven, None for nothing."""
+        if self._by_effort:
+            return [0.0] * len(self.target)
+        if self.arrived:
+            return None
+        return self._angles(dt)
+
+    def drive(self, now: float, dt: float) -> tuple[list[float], str | None]:
+        """Return what the controller is sent in a control period of `dt` s, and the fault of a motor, or None."""
+        displacement, velocity, force = self._states.displacement(), self._states.velocity(), self._states.force()
+        if self._by_effort:
+            wanted = [
+                loop.step(target, tension, x, v, dt)
+                for loop, target, tension, x, v in zip(self._loops, self.target, self._tension, displacement, velocity)
+            ]
+            output = [
+                self._states.effort(i, current * drive.tension_per_ampere)
+                for i, (current, drive) in enumerate(zip(wanted, self._drives))
+            ]
+        else:
+            output = self._angles(dt)
+            wanted = [0.0 if f is None else f / drive.tension_per_ampere for f, drive in zip(force, self._drives)]
+        seen = self._states.times()
+        for i, (x, v, setpoint) in enumerate(zip(displacement, velocity, self._positions())):
+            fault = self._monitors[i].update(seen[i], wanted[i], v, setpoint - x) or self._left_behind(i, dt, setpoint - x, v)
+            if fault:
+                return output, f"{self._states.motors[i].label} {fault}"
+        return output, None
+
+    def _positions(self) -> list[float]:
+        return [part.setpoint for part in self._loops] if self._by_effort else [part.position for part in self._setpoints]
+
+    def _angles(self, dt: float) -> list[float]:
+        result = []
+        for setpoint, target, drive, scale in zip(self._setpoints, self.target, self._drives, self._states.scales):
+            setpoint.advance(target, drive.velocity_limit, dt)
+            result.append(scale.angle(setpoint.position))
+        return result
+
+    def _left_behind(self, index: int, dt: float, lag: float, velocity: float) -> str | None:
+        """Detect a joint that rests away from its setpoint: a controller that refuses, or is not active."""
+        watchdog, drive = self._watchdog, self._drives[index]
+        resting = abs(lag) > _AWAY * watchdog.following_error and abs(velocity) < _AWAY * drive.velocity_limit
+        self._away[index] = self._away[index] + dt if resting else 0.0
+        if self._by_effort or self._away[index] <= _AWAY_TIME * watchdog.stall_time:
+            return None
+        return f"rests {1e3 * abs(lag):.1f} mm away from its setpoint: does its controller take the commands?"
+
+
+def _softer(drive: Drive, delay: float) -> Drive:
+    """Return the drive with gains for loops that answer after `delay` (s)."""
+    share = min(1.0, _NOMINAL_DELAY / max(delay, _NOMINAL_DELAY))
+    return dataclasses.replace(
+        drive,
+        position_gain=min(1.0, 2.0 * share) * drive.position_gain,
+        velocity_gain=share * drive.velocity_gain,
+        velocity_integral=share * drive.velocity_integral,
+    )

@@ -1,0 +1,68 @@
+"""A board on a bench for tests: the firmware's C code on this machine or its image in the emulator, with motors behind it."""
+
+import can
+
+from gravcomp.canbus import c610
+from gravcomp.firmware import requests
+from gravcomp.firmware.host_board import HOST_BUS, MOTOR_BUS
+
+STILL = (10, 20, 5460, 1, 2, 3)
+SETTINGS = {"wiring": 1, "motors": 0b0101, "current_limit": 1000}
+"""Motors 1 and 3 behind the board."""
+
+
+class Bench:
+    """Time runs in steps of 1 ms: sample, frames of motors and host, tick."""
+
+    def __init__(self, board, motors=(1, 3)):
+        self.board, self.motors = board, motors
+        self.now = 0  # ms
+        self.angles = dict.fromkeys(motors, 1000)
+        self.speeds = dict.fromkeys(motors, 0)
+        self.silent = False  # the IMU
+        self.waiting = []  # frames that the host sends in the next step
+        self.temperature = 0  # counts from 23 degC
+        self.host, self.to_motors = [], []  # frames with the time in ms
+
+    def run(self, milliseconds, host=None, feedback=True):
+        """Let time pass; `host` are currents (A) by CAN id, sent every 4 ms."""
+        for _ in range(milliseconds):
+            self.now += 1
+            if self.now % 10 == 0 and not self.silent:
+                self.board.sample(STILL, self.temperature, 1000 * self.now)
+            for message in self.waiting:  # the board looks at the bus of the host first
+                self.board.receive(message)
+            self.waiting.clear()
+            if host is not None and self.now % 4 == 0:
+                self.board.receive(c610.command("MotorCommand1to4", host))
+            if feedback and self.now % 2 == 0:
+                for motor in self.motors:
+                    frame = c610.feedback(motor, self.angles[motor] % 8192, self.speeds[motor], 0.0)
+                    self.board.receive(frame, MOTOR_BUS)
+            self.board.advance(1000 * self.now)
+            self.host += [(self.now, frame) for frame in self.board.sent(HOST_BUS)]
+            self.to_motors += [(self.now, frame) for frame in self.board.sent(MOTOR_BUS)]
+
+    def restart(self, cause=0):
+        self.board.restart(cause)
+        self.now = 0
+
+    def ask(self, message):
+        """Send a request and return the answer, None without one."""
+        self.waiting.append(message)
+        begin = len(self.host)
+        self.run(2)
+        return next((a for _, frame in self.host[begin:] if (a := requests.answer_of(frame))), None)
+
+    def currents(self, motor=1, since=0):
+        """Currents (mA) of a motor with the times (ms) at which they were sent."""
+        place = 2 * ((motor - 1) % 4)
+        number = 0x200 if motor <= 4 else 0x1FF
+        return [
+            (time, int.from_bytes(frame.data[place : place + 2], "big", signed=True))
+            for time, frame in self.to_motors
+            if frame.arbitration_id == number and time > since
+        ]
+
+    def last(self, frame_id) -> can.Message:
+        return next(frame for _, frame in reversed(self.host) if frame.arbitration_id == frame_id)
