@@ -12,6 +12,7 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
+from gravcomp.scene.scene import Scene
 from gravcomp.virtual.described import described
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -36,6 +37,7 @@ class Setup:
     controller: InverseControllerParameters
     seed: int
     nominal_hardware: Hardware | None = None
+    scene: Scene | None = None  # around the virtual robot
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
@@ -57,6 +59,7 @@ class Setup:
             controller=section(InverseControllerParameters, "inverse_controller"),
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
+            scene=file.scene or None,
         )
 
     @property

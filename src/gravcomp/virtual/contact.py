@@ -31,7 +31,10 @@ _FLAT = 1e-9  # part of a normal in the section's plane that has no direction
 
 
 class Walls(NamedTuple):
-    """Obstacles of k rows: scene, each row in the frame that it belongs to; moving (k,) bool: that of the base, else the fixed one."""
+    """Obstacles of k rows.
+
+    scene: `SceneArrays`, each row in the frame that it belongs to; moving (k,) bool: that of the base, else the fixed one.
+    """
 
     scene: SceneArrays
     moving: np.ndarray
@@ -57,11 +60,12 @@ def find_contacts(
     rim: np.ndarray,
     touching: Touching,
 ) -> None:
-    """Fill `touching` with the points whose gap is below `reach` m, for the rod at orientation (n + 1, 3, 3), position (n + 1, 3).
+    """Fill `touching` with the points whose gap is below `reach` m, at the rod's present pose.
 
-    length (n,) m: of the elements; rigid: stiffness in N/m of a point on a rigid wall; orientation_before and position_before: the
-    rod at the beginning of the step; held (slots, k, 3) N: tangential force then, in the wall's frame; rim (k, 3) m: place in the tip's section of its first
-    point on the rim, taken again as long as no other is deeper.
+    length (n,) m: of the elements; rigid: stiffness in N/m of a point on a rigid wall; orientation (n + 1, 3, 3),
+    position (n + 1, 3) m: of the cross-sections; orientation_before and position_before:
+    the rod at the beginning of the step; held (slots, k, 3) N: tangential force then, in the wall's frame; rim (k, 3) m: place
+    in the tip's section of its first point on the rim, taken again as long as no other is deeper.
     """
     n = length.shape[0]
     touching.count[0] = 0
@@ -133,8 +137,8 @@ def find_contacts(
                 s = best / _PARTS
             if gap < reach and gap < min(samples[0], samples[_PARTS]) - _DEEPER * length[e]:
                 _add(
-                    walls, row, n + _FACE_POINTS + e, e, 1.0 - _blend(s), arm, gap, normal, x, 0.5 * length[e], rigid, orientation,
-                    position, orientation_before, position_before, held, touching,
+                    walls, row, n + _FACE_POINTS + e, e, 1.0 - _blend(s), arm, gap, normal, x, 0.5 * length[e], rigid,
+                    orientation, position, orientation_before, position_before, held, touching,
                 )  # fmt: skip
 
 
@@ -278,7 +282,6 @@ def _add(
     """Append a point to `touching`; share (m): the length of the robot that it stands for on a wall that yields."""
     c = touching.count[0]
     touching.count[0] += 1
-    obstacle = walls.scene.obstacle[row]
     touching.slot[c], touching.row[c], touching.section[c] = slot, row, section
     touching.weight[c, 0], touching.weight[c, 1] = weight, 1.0 - weight
     touching.stiffness[c] = min(rigid, walls.scene.stiffness[row] * share)

@@ -1,16 +1,17 @@
 """Forces of the walls on the rod, compiled.
 
-A wall pushes with k times the depth of a point behind its plane. A rigid one has a stiffness at which the depth cannot be measured
-(see `rigid_stiffness`); with the implicit time step it is a stiff potential, so that it takes no energy and gives none back that
-was not in it. Friction sticks with the same stiffness and slips at Coulomb's limit (return mapping):
+A wall pushes with k times the depth of a point behind its plane. A rigid one has a stiffness at which the depth cannot be
+measured (see `rigid_stiffness`); with the implicit time step it is a stiff potential, so that it takes no energy and gives none
+back that was not in it. Friction sticks with the same stiffness and slips at Coulomb's limit (return mapping):
 
     f_n = k max(0, -g) n,    f_t = the nearest to held - k u_t with |f_t| <= mu |f_n|
 
-The tangent leaves out how a force turns against the sections: on the way to the solution forces are far from it, as in time_step.py.
+The tangent leaves out how a force turns against the sections: on the way to the solution forces are far from it, as in
+time_step.py.
 
-u_t: the tangential way of the point over the wall in this step; held: f_t at its beginning. As an implicit penalty method for rods:
-D. Tong, A. Choi, J. Joo, M. K. Jawed, "A fully implicit method for robust frictional contact handling in elastic rods", Extreme
-Mech. Lett. 58, 2023; the return mapping: P. Wriggers, "Computational Contact Mechanics", 2006, chapter 5.
+u_t: the tangential way of the point over the wall in this step; held: f_t at its beginning. As an implicit penalty method for
+rods: D. Tong, A. Choi, J. Joo, M. K. Jawed, "A fully implicit method for robust frictional contact handling in elastic rods",
+Extreme Mech. Lett. 58, 2023; the return mapping: P. Wriggers, "Computational Contact Mechanics", 2006, chapter 5.
 """
 
 import math
@@ -25,12 +26,12 @@ _STIFFER = 30.0  # a rigid wall than the stiffest element
 class Touching(NamedTuple):
     """Points that can touch, and the forces on them: c at most, of which the first `count[0]` are in use. In the fixed frame.
 
-    slot and row (c,) int: number of the point and of the obstacle's row, by which friction is carried on; section (c,) int: A, before
-    the point; weight (c, 2), arm (c, 2, 3) m: of A and B, see surface.py; normal (c, 3): out of the wall; plane (c,) m: the gap is
-    normal . x - plane; start (c, 3) m: the place that the point would have if it had stayed where it was on the wall; stiffness (c,)
-    N/m; friction (c,); held (c, 3) N: tangential force at the beginning; force (c, 3) N: on the robot; gap (c,) m; expected (c, 3) N: the force that the last
-    increment of Newton's method leads to where the point sticks; decided (c,) bool: whether there was one; way (c, 3): unit vector
-    along the friction of a point that slips, else 0.
+    slot and row (c,) int: number of the point and of the obstacle's row, by which friction is carried on; section (c,) int: A,
+    before the point; weight (c, 2), arm (c, 2, 3) m: of A and B, see surface.py; normal (c, 3): out of the wall; plane (c,) m:
+    the gap is normal . x - plane; start (c, 3) m: the place that the point would have if it had stayed where it was on the
+    wall; stiffness (c,) N/m; friction (c,); held (c, 3) N: tangential force at the beginning; force (c, 3) N: on the robot; gap
+    (c,) m; expected (c, 3) N: the force that the last increment of Newton's method leads to where the point sticks; decided
+    (c,) bool: whether there was one; way (c, 3): unit vector along the friction of a point that slips, else 0.
     """
 
     count: np.ndarray
@@ -57,8 +58,8 @@ def touching_of(points: int) -> Touching:
     c, whole = points, np.int64
     return Touching(
         np.zeros(1, whole), np.zeros(c, whole), np.zeros(c, whole), np.zeros(c, whole), np.zeros((c, 2)), np.zeros((c, 2, 3)),
-        np.zeros((c, 3)), np.zeros(c), np.zeros((c, 3)), np.zeros(c), np.zeros(c), np.zeros((c, 3)), np.zeros((c, 3)), np.zeros(c),
-        np.zeros((c, 3)), np.zeros(c, bool), np.zeros((c, 3)),
+        np.zeros((c, 3)), np.zeros(c), np.zeros((c, 3)), np.zeros(c), np.zeros(c), np.zeros((c, 3)), np.zeros((c, 3)),
+        np.zeros(c), np.zeros((c, 3)), np.zeros(c, bool), np.zeros((c, 3)),
     )  # fmt: skip
 
 
@@ -88,9 +89,9 @@ def add_contacts(
 ) -> bool:
     """Subtract the walls' forces from residual (n + 1, 6), and add their tangent to the band; write `touching.force` and `gap`.
 
-    Whether a point touches, sticks or slips is decided by the force that the last increment led to, where there was one: on the way
-    to the solution gaps and slips are far larger than at its end. Return whether the forces agree with these decisions, but for
-    `negligible` N.
+    Whether a point touches, sticks or slips is decided by the force that the last increment led to, where there was one: on the
+    way to the solution gaps and slips are far larger than at its end. Return whether the forces agree with these decisions, but
+    for `negligible` N.
     """
     agrees = True
     x, trial = np.empty(3), np.empty(3)
@@ -151,9 +152,7 @@ def add_contacts(
 
 
 @njit(cache=True, error_model="numpy")
-def _add_force(
-    touching: Touching, c: int, orientation: np.ndarray, part: float, residual: np.ndarray, band: np.ndarray
-) -> None:
+def _add_force(touching: Touching, c: int, orientation: np.ndarray, part: float, residual: np.ndarray, band: np.ndarray) -> None:
     """Add one point's force to the residual and its tangent to the band; part: of the stiffness, across the way of a slip."""
     k, mu, a = touching.stiffness[c], touching.friction[c], touching.section[c]
     n, way, force = touching.normal[c], touching.way[c], touching.force[c]
@@ -201,7 +200,7 @@ def _add_force(
 
 @njit(cache=True, error_model="numpy")
 def expect(touching: Touching, orientation: np.ndarray, position: np.ndarray, increment: np.ndarray) -> None:
-    """Write the forces that an increment (6 n,) of the free cross-sections leads to, as far as each point sticks, to `expected`."""
+    """Write the forces that an increment (6 n,) of the free cross-sections leads to where each point sticks, to `expected`."""
     jacobian, x = np.empty((3, 6)), np.empty(3)
     for c in range(touching.count[0]):
         n, k = touching.normal[c], touching.stiffness[c]
@@ -237,7 +236,7 @@ def _section_motion(r: np.ndarray, weight: float, arm: np.ndarray, out: np.ndarr
 
 @njit(cache=True, error_model="numpy")
 def difference(known: Touching, found: Touching, orientation: np.ndarray, position: np.ndarray) -> float:
-    """Return by how much (m) the points in `found` lie deeper in a wall, or elsewhere to it, than those in `known` say, at most."""
+    """Return by how much (m) the points in `found` lie deeper in a wall, or elsewhere to it, than `known` says, at most."""
     worst, deepest, x = 0.0, 0.0, np.empty(3)
     for c in range(known.count[0]):
         deepest = max(deepest, -known.gap[c])

@@ -27,7 +27,7 @@ def slice_of(body: MeshBody, part: float) -> CrossSection:
 
 
 def slice_boundary(body: MeshBody, part: float) -> np.ndarray:
-    """Return points (k, 2) in m of the boundary at `part` of the length. Raises ConfigError for a body without a section there."""
+    """Return points (k, 2) in m of the boundary at `part` of the length. Raises ConfigError where there is no section."""
     segments, height = _slice(body, part)
     if len(segments) < 3:
         raise _missing(body, height)

@@ -85,7 +85,7 @@ def farthest(surface: RodSurface, section: int, x: float, y: float, out: np.ndar
 
 @njit(cache=True, error_model="numpy")
 def inside(surface: RodSurface, section: int, out: np.ndarray) -> bool:
-    """Return whether a point out (3,) of the section's plane lies well inside the outline; move it to the outline from outside."""
+    """Return whether a point out (3,) of the section's plane lies well inside the outline; move it there from outside."""
     x, y = out[0] - surface.middle[section, 0], out[1] - surface.middle[section, 1]
     distance = 0.0  # relative to the outline
     if surface.corners[section] == 0:

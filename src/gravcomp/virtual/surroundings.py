@@ -41,7 +41,8 @@ class RodSurroundings:
 class Touches:
     """Places where a rod touches walls: t of them, in the fixed frame.
 
-    place (t, 3) m; force (t, 3) N, on the rod; depth (t,) m in the wall; obstacle (t,) int: its number in the scene; station (t,).
+    place (t, 3) m; force (t, 3) N, on the rod; depth (t,) m in the wall; obstacle (t,) int: its number in the scene; element (t,)
+    int: the element that it is on.
     """
 
     place: np.ndarray
