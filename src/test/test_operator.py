@@ -16,12 +16,12 @@ LINE = np.stack([np.zeros(50), np.zeros(50), np.linspace(0.0, 0.2, 50)], axis=1)
 
 def camera(*balls) -> Camera:
     tube = TubeWall(points=((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)), radius=(0.015,))
-    return Camera(Scene(SceneSection(tubes=(tube,), spheres=balls)), LINE, np.radians(70.0), 1e-4)
+    return Camera(Scene(SceneSection(tubes=(tube,), spheres=balls)), LINE, np.radians(70.0))
 
 
 def test_a_place_in_the_picture_is_its_direction_from_the_tip():
     target = np.array([0.005, -0.003, 0.05])
-    picture = camera().look(np.zeros(3), np.eye(3), target, 0.009)
+    picture = camera().look(np.zeros(3), np.eye(3), target)
     assert picture.target is not None
     angle = np.arctan2(np.hypot(0.005, 0.003), 0.05)
     np.testing.assert_allclose(picture.target, angle * np.array([0.005, -0.003]) / np.hypot(0.005, 0.003), rtol=1e-9)
@@ -32,8 +32,8 @@ def test_a_place_in_the_picture_is_its_direction_from_the_tip():
 def test_what_a_wall_hides_or_the_camera_does_not_face_is_not_seen():
     target = np.array([0.0, 0.0, 0.08])
     ball = SphereWall(centre=(0.0, 0.0, 0.04), radius=0.003)
-    assert camera(ball).look(np.zeros(3), np.eye(3), target, 0.009).target is None
-    assert camera().look(np.zeros(3), np.diag([1.0, -1.0, -1.0]), target, 0.009).target is None
+    assert camera(ball).look(np.zeros(3), np.eye(3), target).target is None
+    assert camera().look(np.zeros(3), np.diag([1.0, -1.0, -1.0]), target).target is None
 
 
 def closed_loop(person: Person, seconds: float, seed: int = 1, force: float = 0.0):
@@ -41,7 +41,7 @@ def closed_loop(person: Person, seconds: float, seed: int = 1, force: float = 0.
     steering = Steering(person, PERIOD, 6.4e-5, seed)
     error, course = np.array([0.3, 0.0]), []
     for _ in range(round(seconds / PERIOD)):
-        hand = steering.act(Picture(error, None, 0.1), force)
+        hand = steering.act(Picture(error, None), force)
         error = error - PERIOD * hand.rate
         course.append(error)
     return np.array(course), hand
@@ -68,7 +68,7 @@ def test_a_delay_too_long_for_the_crossover_frequency_is_unstable():
 def test_pain_makes_the_hand_pull_back_until_it_has_gone():
     person = Person()
     steering = Steering(person, PERIOD, 6.4e-5, 1)
-    aimed = Picture(np.zeros(2), None, 0.1)
+    aimed = Picture(np.zeros(2), None)
     for _ in range(10):
         hand = steering.act(aimed, 0.0)
     assert hand.speed == pytest.approx(person.speed)

@@ -11,7 +11,7 @@ from gravcomp.trials.lumen import Lumen
 from gravcomp.trials.steered import Passage, Steered, steer
 
 _SEEDS = 20
-_SECONDS = 16.0  # until a run is given up
+_SECONDS = 20.0  # until a run is given up
 _FIRST, _DEPTHS = 0.35, (0.85, 1.0)  # of the robot's length: the tip at the start, the target
 _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0
@@ -88,7 +88,7 @@ def _lumens(held: list[Steered], without: list[Steered]) -> str:
                 axes.plot(1e3 * run.tip @ sideways, 1e3 * run.tip[:, 2], color=colour, linewidth=1.0)
                 body = run.body[-1]
                 draw_robot(axes, np.stack([body @ sideways, body[:, 2]], axis=1), colour)
-            target = one.passage.target
+            target = one.passage.target()
             axes.plot([1e3 * target @ sideways], [1e3 * target[2]], "o", color=TARGET)
             axes.set_aspect("equal")
             axes.set_title(one.passage.name)

@@ -17,31 +17,32 @@ _SIGHTS = 40  # places along a line of sight at which it is looked for a wall
 class Picture:
     """target: angles (2,) of the target, None where it is not seen; ahead: those of the farthest place of the lumen that is seen.
 
-    size: angle in rad under which a length of `scale` m at the target appears, 0 where it is not seen.
     """
 
     target: np.ndarray | None
     ahead: np.ndarray | None
-    size: float
+
+    @property
+    def off_middle(self) -> float:
+        """Angle (rad) of the target off the middle, infinite where it is not seen."""
+        return np.inf if self.target is None else float(np.linalg.norm(self.target))
 
 
 class Camera:
     """A camera whose lens is the middle of the tip's face; it sees half the angle `half_view` rad to every side."""
 
-    def __init__(self, scene: Scene, line: np.ndarray, half_view: float, clear: float):
-        """line (k, 3) m: the middle of the lumen, from its mouth inward; clear (m): gap that ends a line of sight."""
-        self._scene, self._line, self._half_view, self._clear = scene, line, half_view, clear
+    def __init__(self, scene: Scene, line: np.ndarray, half_view: float):
+        """line (k, 3) m: the middle of the lumen, from its mouth inward."""
+        self._scene, self._line, self._half_view = scene, line, half_view
 
-    def look(self, tip: np.ndarray, rotation: np.ndarray, target: np.ndarray, scale: float) -> Picture:
+    def look(self, tip: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> Picture:
         """Return the picture at the tip (3,) m with the axes `rotation` (3, 3); target (3,) m: a place next to a wall."""
         seen = self._seen(tip, rotation, np.concatenate([target[None], self._line]))
         angles = self._angles(tip, rotation, np.concatenate([target[None], self._line]))
         ahead = np.flatnonzero(seen[1:])
-        distance = float(np.linalg.norm(target - tip))
         return Picture(
             angles[0] if seen[0] else None,
             angles[1 + ahead[-1]] if len(ahead) else None,
-            2.0 * np.arctan2(0.5 * scale, distance) if seen[0] else 0.0,
         )
 
     def _angles(self, tip: np.ndarray, rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -58,5 +59,5 @@ class Camera:
         share = np.linspace(0.0, 1.0, _SIGHTS, endpoint=False)[1:]
         sights = tip + share[None, :, None] * (points[chosen] - tip)[:, None]
         gap = self._scene.nearest(sights.reshape(-1, 3))[0].reshape(len(chosen), -1)
-        within[chosen] = (gap > self._clear).all(axis=1)
+        within[chosen] = (gap > 0.0).all(axis=1)
         return within

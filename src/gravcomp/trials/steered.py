@@ -25,8 +25,8 @@ REST = 1.5  # s before the person begins
 DEPTH = 0.02e-3  # m, beyond which the robot has entered a wall
 _PERIOD = 0.04  # s between pictures
 _HALF_VIEW = np.radians(70.0)  # of the camera, as of colonoscopes
-_NEAR, _CENTRED, _MOMENT = 1.1, np.radians(15.0), 0.5  # robot's widths from the tip, off the middle, s
-_CLEAR = 0.02  # of the robot's width: where a line of sight counts as ended by a wall
+_NEAR, _CENTRED, _MOMENT = 2.0, np.radians(15.0), 0.5  # robot's widths from the tip, off the middle, s
+_RAISED = 0.25  # of the robot's width, by which the middle of the target stands out of the wall, as a polyp does
 _BEND = 2.0  # of the robot's length is the tightest circle's circumference that the lever commands
 _INTO = 3  # robot's lengths that the tube goes on behind the target
 _SPACING = 0.1  # of the robot's length: points that describe the tube
@@ -55,14 +55,13 @@ class Passage:
         """Rotation (3, 3): world from the lumen's frame."""
         return base_orientation(np.radians(self.inclination), np.radians(self.roll))
 
-    @property
-    def target(self) -> np.ndarray:
-        """Place (3,) of the target in the lumen's frame, m."""
+    def target(self, raised: float = 0.0) -> np.ndarray:
+        """Place (3,) of the target in the lumen's frame, `raised` m above the wall."""
         along = self.lumen.direction(np.array(self.depth))
         plane = np.array([-np.sin(self.lumen.plane), np.cos(self.lumen.plane), 0.0])
         inward = np.cross(plane, along)
         across = np.cos(self.angle) * inward + np.sin(self.angle) * plane
-        return self.lumen.point(np.array(self.depth)) + 0.5 * self.lumen.diameter * across
+        return self.lumen.point(np.array(self.depth)) + (0.5 * self.lumen.diameter - raised) * across
 
     def scene(self, length: float) -> Scene:
         """Return the lumen as a rigid tube in the world, for a robot of `length` m."""
@@ -116,9 +115,9 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
     path = FollowedPath(length, robot.segments[-1].full_length, 2.0 * np.pi / (_BEND * length), setup.direction_weight)
     scene.turned(np.eye(3))  # pictures are taken in the world
     line = passage.lumen.point(np.linspace(0.0, passage.depth + 0.2 * length, 80)) @ passage.orientation.T
-    camera = Camera(scene, line, _HALF_VIEW, _CLEAR * width)
+    camera = Camera(scene, line, _HALF_VIEW)
     hand = Steering(person, _PERIOD, np.pi * (width / 2) ** 2, seed)
-    target = passage.orientation @ passage.target
+    target = passage.orientation @ passage.target(_RAISED * width)
     loop.hold(path.target(passage.first), weightless=not compensated)
     loop.run(REST)
     start, held, reached, hurt = loop.time, 0.0, False, 0
@@ -126,11 +125,11 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
         truth = loop.truth
         base = Rotation.from_quat(truth.base_orientation).as_matrix()
         tip = truth.base_position + base @ truth.tip_position
-        picture = camera.look(tip, base @ Rotation.from_quat(truth.tip_orientation).as_matrix(), target, width)
+        picture = camera.look(tip, base @ Rotation.from_quat(truth.tip_orientation).as_matrix(), target)
         does = hand.act(picture, float(np.linalg.norm(truth.contact_force, axis=1).sum()))
         hurt += does.hurt
-        near = picture.target is not None and float(np.linalg.norm(target - tip)) < _NEAR * width
-        held = held + _PERIOD if near and float(np.linalg.norm(picture.target)) < _CENTRED else 0.0
+        near = float(np.linalg.norm(target - tip)) < _NEAR * width
+        held = held + _PERIOD if near and picture.off_middle < _CENTRED else 0.0
         if held >= _MOMENT:
             reached = True
             break

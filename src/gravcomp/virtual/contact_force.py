@@ -34,7 +34,7 @@ class Touching(NamedTuple):
     (c,) bool: whether there was one; way (c, 3): unit vector along the friction of a point that slips, else 0.
     """
 
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]  # tuple has a method of this name
     slot: np.ndarray
     row: np.ndarray
     section: np.ndarray

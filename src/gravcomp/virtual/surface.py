@@ -59,7 +59,7 @@ def rod_surface(model: RodModel, true: TrueRobot) -> RodSurface:
     middle, half = np.zeros((len(outlines), 2)), np.zeros((len(outlines), 2))
     for index, (outline, polygon) in enumerate(zip(outlines, polygons)):
         corner[index, : len(polygon)] = polygon
-        if len(polygon):
+        if not isinstance(outline, Outline) or len(polygon):
             middle[index], half[index] = (polygon.max(axis=0) + polygon.min(axis=0)) / 2, np.ptp(polygon, axis=0) / 2
         else:
             middle[index], half[index] = (outline.x, outline.y), (outline.half_width, outline.half_height)

@@ -119,7 +119,8 @@ def time_step(
     obstacles = walls.moving.shape[0]
     reach = 0.0
     if obstacles > 0:
-        reach = _NEAR * surface.size[n] + 2.0 * _way(dt, velocity, start_orientation, start_position, orientation, position)
+        way = _way(dt, velocity, start_orientation, start_position, orientation, position)
+        reach = _NEAR * float(surface.size[n]) + 2.0 * way
     meets = touching.count[0] > 0 and np.any(touching.force[: touching.count[0]] != 0.0)
     start_velocity = velocity.copy()
     total_increment = _predict_free(dt, velocity, acceleration, velocity_rate)
