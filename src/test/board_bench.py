@@ -19,6 +19,7 @@ class Bench:
         self.now = 0  # ms
         self.angles = dict.fromkeys(motors, 1000)
         self.speeds = dict.fromkeys(motors, 0)
+        self.measured = dict.fromkeys(motors, 0.0)  # A
         self.silent = False  # the IMU
         self.waiting = []  # frames that the host sends in the next step
         self.temperature = 0  # counts from 23 degC
@@ -37,7 +38,7 @@ class Bench:
                 self.board.receive(c610.command("MotorCommand1to4", host))
             if feedback and self.now % 2 == 0:
                 for motor in self.motors:
-                    frame = c610.feedback(motor, self.angles[motor] % 8192, self.speeds[motor], 0.0)
+                    frame = c610.feedback(motor, self.angles[motor] % 8192, self.speeds[motor], self.measured[motor])
                     self.board.receive(frame, MOTOR_BUS)
             self.board.advance(1000 * self.now)
             self.host += [(self.now, frame) for frame in self.board.sent(HOST_BUS)]

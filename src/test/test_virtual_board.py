@@ -46,9 +46,7 @@ def samples(board, count, rate=(0.0, 0.0, 0.0), force=UP, recorded=False):
     """Specific force (count, 3), angular rate (count, 3) and the ImuTime values as a host reads them."""
     forces, rates, times = [], [], []
     for _ in range(count):
-        acceleration, gyroscope, time = (
-            decode(frame).values for frame in imu_frames(board, rate, force, recorded)
-        )
+        acceleration, gyroscope, time = (decode(frame).values for frame in imu_frames(board, rate, force, recorded))
         assert acceleration.sequence == gyroscope.sequence == time.sequence
         forces.append(np.array(acceleration[:3]) * accelerometer_scale(Board().accelerometer_range))
         rates.append(np.array(gyroscope[:3]) * gyroscope_scale(Board().gyroscope_range))

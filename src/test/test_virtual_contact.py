@@ -85,23 +85,26 @@ def test_friction_slips_at_coulombs_limit_against_the_motion():
     assert abs(force[1]) < 1e-3 * force[0]
 
 
-def test_no_energy_is_gained_over_a_closed_path_without_friction():
-    # The base pushes the rod against a ball and back; the ball's force does work on the way out as on the way in.
-    ball = SphereWall(centre=(-0.02, 0.0, 0.07), radius=0.01, frame="world")
-    rod = rod_at(body=ELASTIC | {"damping_time": 0.0}, spheres=(ball,))
-    work, spent, before = 0.0, 0.0, np.zeros(3)
+def energy(rod) -> float:
+    model = rod.model
+    stretched = rod.strain - model.rest_strain
+    elastic = 0.5 * float(np.einsum("e,ei,eij,ej", model.length, stretched, model.stiffness, stretched))
+    turning = float(np.einsum("ki,kij,kj", rod.velocity[:, 3:], model.inertia, rod.velocity[:, 3:]))
+    return elastic + 0.5 * (float((model.mass * (rod.velocity[:, :3] ** 2).sum(axis=1)).sum()) + turning)
 
-    def pose(time):
-        return np.eye(3), np.array([-0.01 * np.sin(np.pi * min(time, 1.0)) ** 2, 0.0, 0.0])
 
-    for time in run(rod, 1.0, pose=pose):
-        place = pose(time)[1]
-        done = float(rod.touches.force.sum(axis=0) @ (place - before))  # by the wall, as if all moved with the base
-        work, spent, before = work + done, spent + abs(done), place
-    kinetic = 0.5 * float((rod.model.mass * (rod.velocity[:, :3] ** 2).sum(axis=1)).sum())
-    assert spent > 1e-5
-    assert kinetic < 1e-2 * spent
-    assert work < 1e-2 * spent
+def test_no_energy_is_gained_where_an_undamped_rod_is_thrown_at_walls():
+    planes = tuple(PlaneWall(point=(side * 8e-3, 0.0, 0.0), normal=(-side, 0.0, 0.0)) for side in (-1.0, 1.0))
+    rod = rod_at(body=ELASTIC | {"damping_time": 0.0}, planes=planes)
+    rod.velocity[1:, 0] = -0.3 * rod.model.station[1:] ** 2
+    course, forces = [energy(rod)], []
+    for _ in run(rod, 0.8):
+        course.append(energy(rod))
+        forces.append(rod.touches.force.sum(axis=0)[0])
+    assert min(forces) < 0.0 < max(forces), "it meets both walls"
+    # What the free steps of the generalized-alpha method pass from one mode to the other is less than a thousandth.
+    assert (np.diff(course) / course[0]).max() < 1e-3
+    assert course[-1] < course[0]
 
 
 @pytest.mark.parametrize("seed", range(4))

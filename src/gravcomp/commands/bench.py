@@ -14,9 +14,12 @@ if TYPE_CHECKING:
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
+    "contact": "a robot that touches a scene: accuracy, penetration, energy, step times",
     "track": "a wrong model that a tracker of the tip corrects",
+    "loads": "external wrenches against SoRoSim; unknown payloads and tip forces that the loop has to find",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
+    "board": "the board's firmware: hostile frames, dead host, failed sensor, build",
     "graph": "the running graph: latency and rates, CPU load of the CAN bridge",
     "page": "the live page in a browser: time until it is shown, frame rate, load on the loop",
     "faults": "malformed frames and messages, faults, killed processes: the currents that reach the motors",
@@ -32,12 +35,17 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "frames": (1_000_000, "number of malformed and hostile frames and messages"),
         "seed": (1, "seed of the random frames and faults"),
     },
+    "board": {
+        "frames": (200_000, "number of hostile frames and samples at the image and at the C code"),
+        "seed": (1, "seed of the hostile frames"),
+    },
     "joints": {
         "messages": (1_000_000, "number of malformed and hostile messages"),
         "seed": (1, "seed of the messages and of the virtual robot"),
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
+    "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
@@ -50,19 +58,23 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
         "--figures": ("KEY", "only these figures, by their keys in --json"),
     },
     "track": {"files": ("FILE", "robot files or shipped robots (default: article)")},
+    "loads": {"files": ("FILE", "robot files or shipped robots (default: article)")},
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
+    "contact": {"every": 20},
     "track": {"seeds": 1},
+    "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},
     "streams": {"every": 5},
+    "board": {"frames": 10_000, "every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
-    "joints": {"messages": 3000, "orientations": 0},
+    "joints": {"messages": 3000, "orientations": 0, "loops": 1},
     "start": {},
     "soak": {"minutes": 0.2},
 }

@@ -44,8 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--board",
         default="virtual",
         choices=BOARDS,
-        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the bus of the"
-        " host and the motors",
+        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the"
+        " host's bus and the motors",
     )
     add_tracker_argument(parser)
     add_seed_argument(parser)
@@ -90,7 +90,12 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True, "board": args.board} | tracker_parameters(args)
+    motion: dict[str, Any] = {
+        "truth_rate": 50.0,
+        "feedback_rate": 125,
+        "steerable": True,
+        "board": args.board,
+    } | tracker_parameters(args)
     if args.imu:
         motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
     else:

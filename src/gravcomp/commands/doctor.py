@@ -21,14 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", metavar="FILE", help="also check this robot file")
     parser.add_argument("--interface", help="also listen to a CAN bus for two seconds: python-can interface, e.g. socketcan")
     parser.add_argument("--channel", default="", help="channel of that bus, e.g. can0; several by commas")
+    parser.add_argument(
+        "--board", action="store_true", help="also run the bench test of the board on that bus, 15 s; motors without power"
+    )
     parser.add_argument("--graph", action="store_true", help="also check the running graph: rates, latencies, matching QoS")
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of the running graph, e.g. /left")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the checks. Returns 0: nothing required is missing, 1: something is."""
+    """Run the checks. Returns 0: nothing required is missing, 1: something is. Raises ConfigError."""
     from gravcomp import __version__
-    from gravcomp.doctor import bus, machine, robot_file, running_graph
+    from gravcomp.config import ConfigError
+    from gravcomp.doctor import board, bus, machine, robot_file, running_graph
 
     findings = machine.examine()
     if args.robot:
@@ -36,6 +40,10 @@ def run(args: argparse.Namespace) -> int:
     if args.interface:
         for channel in args.channel.split(","):
             findings += bus.examine(args.interface, channel.strip())
+    if args.board and not args.interface:
+        raise ConfigError("--board needs the bus of the board: --interface and --channel")
+    if args.board:
+        findings += board.examine(args.interface, args.channel.split(",")[0].strip())
     if args.graph:
         findings += running_graph.examine(args.namespace)
     healthy = not any(finding.level == "missing" for finding in findings)

@@ -32,12 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     settings.add_argument("--number", type=int, default=255, metavar="N", help="number of the board (default: the only one)")
     settings.add_argument("--interface", default="", help="python-can interface, e.g. socketcan (default: the robot file's)")
     settings.add_argument("--channel", default="", help="channel of the bus, e.g. can0 (default: the robot file's)")
-    settings.add_argument("--one-bus", action="store_true", help="the board is on the bus of the motors, not between host and motors")
+    settings.add_argument(
+        "--one-bus", action="store_true", help="the board is on the bus of the motors, not between host and motors"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: done, 1: a test failed or the board refused. Raises ConfigError, SetupError."""
-    return {"install": _install, "build": _build, "flash": _flash, "test": _test, "parameters": _parameters}[args.subcommand](args)
+    return {"install": _install, "build": _build, "flash": _flash, "test": _test, "parameters": _parameters}[args.subcommand](
+        args
+    )
 
 
 def _install(args: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
 """A board on a real bus: requests and their answers, with errors that say what the board or the bus lacks."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import TracebackType
 
 import can
@@ -38,17 +38,27 @@ class BoardClient:
 
     def ask(self, message: can.Message) -> Answer:
         """Send a request and return its answer. Raises ConfigError without one."""
+        self.send(message)
+        for frame in self.listen(_PATIENCE):
+            answer = requests.answer_of(frame)
+            if answer is not None and answer.key == message.data[2] and answer.operation == message.data[1]:
+                return answer
+        raise ConfigError(self._why_silent())
+
+    def send(self, message: can.Message) -> None:
+        """Send a frame that has no answer. Raises ConfigError where the bus does not take it."""
         try:
             self._bus.send(message)
-            end = time.monotonic() + _PATIENCE
-            while (left := end - time.monotonic()) > 0.0:
-                frame = self._bus.recv(left)
-                answer = requests.answer_of(frame) if frame is not None else None
-                if answer is not None and answer.key == message.data[2] and answer.operation == message.data[1]:
-                    return answer
         except can.CanError as error:
             raise ConfigError(f"the bus does not take frames: {error}; is it terminated, and has it 1 Mbit/s?") from error
-        raise ConfigError(self._why_silent())
+
+    def listen(self, seconds: float) -> Iterator[can.Message]:
+        """Yield the frames that come within this time."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            frame = self._bus.recv(left)
+            if frame is not None:
+                yield frame
 
     def value(self, name: str) -> float:
         """Return a parameter or a reading. Raises ConfigError."""
@@ -67,10 +77,8 @@ class BoardClient:
     def boards(self) -> list[int]:
         """Return the numbers of the boards whose heartbeat is heard."""
         heard = set()
-        end = time.monotonic() + _LISTEN
-        while (left := end - time.monotonic()) > 0.0:
-            frame = self._bus.recv(left)
-            if frame is not None and frame.arbitration_id == requests.STATE_ID:
+        for frame in self.listen(_LISTEN):
+            if frame.arbitration_id == requests.STATE_ID:
                 try:
                     heard.add(int(decode(frame).values.board))
                 except FrameError:

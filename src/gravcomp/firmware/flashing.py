@@ -15,7 +15,7 @@ TOOLS = {
 
 
 def commands_for(folder: Path, tool: str | None, *, needed: bool = True) -> list[list[str]]:
-    """Return the command lines for the image in `folder`. `needed`: the programme must be there. Raises SetupError without one."""
+    """Return the command lines for the image in `folder`. `needed`: the programme must be there. Raises SetupError."""
     found = tool or next((name for name in TOOLS if shutil.which(name)), None)
     if found is None or (needed and not shutil.which(found)):
         ways = "; ".join(f"{name} ({need})" for name, need in TOOLS.items() if tool in (None, name))

@@ -1,4 +1,4 @@
-"""The fuzzer of the firmware's frames (gravcomp_hw/firmware/tests): built with GCC's sanitizers, run on the corpus in the tree."""
+"""The fuzzer of the firmware's frames (gravcomp_hw/firmware/tests), built with GCC's sanitizers and run on the corpus there."""
 
 import dataclasses
 import json

@@ -88,7 +88,7 @@ def host_compiler() -> list[str]:
 def compile_files(
     compiler: Sequence[str], files: Sequence[Path], target: Path, options: Sequence[str], folder: Path | None = None
 ) -> None:
-    """Compile and link `files` into `target`; what the compiler leaves beside it goes into `folder`. Raises SetupError."""
+    """Compile and link `files` into `target`; what else the compiler writes goes into `folder`. Raises SetupError."""
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         command = [*compiler, *WARNINGS, *EXACT, *options, *map(str, files), "-o", str(target)]
         done = subprocess.run(command, capture_output=True, text=True, cwd=folder or scratch)

@@ -54,7 +54,9 @@ def measure(tests: list[str], root: Path) -> Coverage:
 def _read(folder: Path) -> Coverage:
     reached: dict[str, dict[int, bool]] = {}
     counters = sorted(str(path) for path in folder.glob("*.gcda"))
-    done = subprocess.run(["gcov", "--json-format", "--stdout", *counters], cwd=folder, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ["gcov", "--json-format", "--stdout", *counters], cwd=folder, capture_output=True, text=True, check=True
+    )
     wanted = {str(path) for path in sources(*PARTS, suffixes=(".c", ".h"))}
     for report in done.stdout.splitlines():
         for file in json.loads(report)["files"] if report.strip() else ():

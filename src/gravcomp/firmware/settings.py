@@ -36,7 +36,7 @@ FAULTS = (
     "another board sends the same frames",
     "no stored parameters: defaults",
     "the last reset came from the watchdog",
-    "the last reset came from the supply",
+    "the supply is too low, or caused the last reset",
     "no whole model on the board",
     "homing failed",
     "frames were lost: the bus is too slow or off",

@@ -17,9 +17,9 @@ INTERRUPT_FRAME = 108
 
 _INTERRUPTS = (
     ("gc_on_tick", "gc_on_data_ready", "gc_on_host_sent", "gc_on_motor_sent"),
-    ("gc_on_host_frame", "gc_on_motor_frame"),
+    ("gc_on_host_frame", "gc_on_motor_frame", "gc_on_edge"),
 )
-"""Handlers by priority: besides the main loop one of each priority can be on the stack."""
+"""Handlers by priority: on the stack can be the main loop and one of each priority."""
 
 _POINTED = ("erase", "write", "gc_standalone_receive")
 """Functions whose addresses are taken: where a call through a pointer may go."""
@@ -80,7 +80,7 @@ def _refuse_recursion(calls: Mapping[str, set[str]]) -> None:
 
     def visit(name: str, path: tuple[str, ...]) -> None:
         if name in path:
-            raise SetupError(f"the firmware calls itself: {' -> '.join([*path[path.index(name):], name])}")
+            raise SetupError(f"the firmware calls itself: {' -> '.join([*path[path.index(name) :], name])}")
         if name in done:
             return
         for callee in sorted(calls.get(name, ())):

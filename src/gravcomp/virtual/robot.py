@@ -88,6 +88,7 @@ class VirtualRobot:
             _ROD_TICKS * TICK,
             _SAMPLE_TICKS // _ROD_TICKS,
         )
+        self._pushes: dict[int, np.ndarray] = {}  # N in soft_base, by the cross-section
         self._outward, self._inward = FrameFaults(faults), FrameFaults(faults)
         self._faults = ActiveFaults(hardware)
         self._tick = 0
@@ -128,6 +129,15 @@ class VirtualRobot:
     def turn_base(self, orientation: np.ndarray) -> None:
         """Turn the base to `orientation` (3, 3), world from soft_base, and keep it there; this ends the motion that it had."""
         self._base.turn(orientation, self.time)
+
+    def push(self, force: np.ndarray, station: float = 1.0) -> None:
+        """Let a force (3,) in N, constant in soft_base, act at the cross-section nearest to `station`, from now on; 0: none."""
+        section = int(np.argmin(np.abs(self._model.station - station)))
+        self._pushes[section] = np.asarray(force, dtype=float)
+
+    def attach(self, mass: float, centre: np.ndarray | None = None) -> None:
+        """Fix a payload of `mass` kg to the tip, beside the described one; centre (3,) m: in the axes of the tip."""
+        self._rod.attach(mass, np.zeros(3) if centre is None else np.asarray(centre, dtype=float))
 
     def inject(self, fault: Fault) -> None:
         """Begin `fault`. Raises ConfigError for an unknown cable."""
@@ -234,11 +244,13 @@ class VirtualRobot:
 
     def _act(self) -> list[can.Message]:
         """Do what is due at this tick and return the frames that are sent."""
-        sent = []
+        sent: list[can.Message] = []
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
+            for section, force in self._pushes.items():
+                self._rod.load[section] = orientation @ force
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
-        behind = []  # frames of motors that the board passes on
+        behind: list[can.Message] = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:
             for motor, bus, values in zip(self._hardware.motors, self._bus_of_motor, self._motors.feedback()):
                 frame = c610.feedback(motor.can_id, **values)

@@ -52,6 +52,7 @@ def time_step(
     base_orientation: np.ndarray,
     base_position: np.ndarray,
     gravity: np.ndarray,
+    load: np.ndarray,
     wound: np.ndarray,
     wound_before: np.ndarray,
     orientation: np.ndarray,
@@ -69,6 +70,8 @@ def time_step(
     compliance: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    filament: np.ndarray,
+    curve: np.ndarray,
     rest_strain: np.ndarray,
     mass: np.ndarray,
     centre: np.ndarray,
@@ -99,18 +102,19 @@ def time_step(
 ) -> tuple[bool, bool]:
     """Advance the rod by dt s in place; return whether the state at the end is possible, and whether the iteration converged.
 
-    The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step; compliance (m,) receives that of each tendon's path in one step, m/N; direction, chord and band are scratch.
-    rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how much the planes of the contacts may differ from the
-    walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`; checked is scratch. If the state is not possible,
-    pose and material keep their values from before the step, and the caller sets the rest of the state.
+    The parameters are those of `MovingRod`; load (n + 1, 3) N acts in addition to the weights; wound_before and wound (m,) m are
+    the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one
+    step, m/N; direction, chord and band are scratch. rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how
+    much the planes of the contacts may differ from the walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`;
+    checked is scratch. If the state is not possible, pose and material keep their values from before the step, and the caller
+    sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
     linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
     force = np.empty((n + 1, 3))
     for k in range(n + 1):
         for i in range(3):
-            force[k, i] = mass[k] * gravity[i]
+            force[k, i] = mass[k] * gravity[i] + load[k, i]
     share = tension_shares(strain, length, sliding, routing.start, routing.end, mu, guide_angle)
 
     start_orientation, start_position = orientation.copy(), position.copy()
@@ -168,6 +172,8 @@ def time_step(
             rest_strain,
             linear,
             constant,
+            filament,
+            curve,
             slip_stiffness,
             slip_moment,
             slip_strain,
@@ -363,20 +369,20 @@ def _add_inertia(
 ) -> None:
     """Add M rate - ad_v^T M v of one cross-section to residual (6,).
 
-    mass in kg, its centre (3,) m in the plane of the section, inertia (3, 3) kg m^2 about the axis. With the momenta
+    mass in kg, its centre (3,) m, inertia (3, 3) kg m^2 about the axis. With the momenta
     P = m (v + w x c) and L = m c x v + J w the force is M rate + (w x P, w x L + v x P).
     """
     v0, v1, v2, w0, w1, w2 = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
-    c0, c1 = centre[0], centre[1]
-    p0, p1, p2 = mass * (v0 - w2 * c1), mass * (v1 + w2 * c0), mass * (v2 + w0 * c1 - w1 * c0)
-    q0 = mass * c1 * v2 + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
-    q1 = -mass * c0 * v2 + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
+    c0, c1, c2 = centre[0], centre[1], centre[2]
+    p0, p1, p2 = mass * (v0 + w1 * c2 - w2 * c1), mass * (v1 + w2 * c0 - w0 * c2), mass * (v2 + w0 * c1 - w1 * c0)
+    q0 = mass * (c1 * v2 - c2 * v1) + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
+    q1 = mass * (c2 * v0 - c0 * v2) + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
     q2 = mass * (c0 * v1 - c1 * v0) + inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
-    residual[0] += mass * (rate[0] - rate[5] * c1) + w1 * p2 - w2 * p1
-    residual[1] += mass * (rate[1] + rate[5] * c0) + w2 * p0 - w0 * p2
+    residual[0] += mass * (rate[0] + rate[4] * c2 - rate[5] * c1) + w1 * p2 - w2 * p1
+    residual[1] += mass * (rate[1] + rate[5] * c0 - rate[3] * c2) + w2 * p0 - w0 * p2
     residual[2] += mass * (rate[2] + rate[3] * c1 - rate[4] * c0) + w0 * p1 - w1 * p0
-    residual[3] += mass * c1 * rate[2] + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
-    residual[4] += -mass * c0 * rate[2] + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
+    residual[3] += mass * (c1 * rate[2] - c2 * rate[1]) + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
+    residual[4] += mass * (c2 * rate[0] - c0 * rate[2]) + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
     residual[5] += mass * (c0 * rate[1] - c1 * rate[0]) + w0 * q1 - w1 * q0 + v0 * p1 - v1 * p0
     for i in range(3):
         for j in range(3):
@@ -388,17 +394,21 @@ def _add_inertia_to_band(
     row: int, beta: float, mass: float, centre: np.ndarray, inertia: np.ndarray, middle: int, band: np.ndarray
 ) -> None:
     """Add beta M of one cross-section, whose first row is `row`, to the band."""
-    m, x, y = beta * mass, beta * mass * centre[0], beta * mass * centre[1]
+    m, x, y, z = beta * mass, beta * mass * centre[0], beta * mass * centre[1], beta * mass * centre[2]
     for i in range(3):
         band[row + i, middle] += m
         for j in range(3):
             band[row + 3 + i, middle + j - i] += beta * inertia[i, j]
     # The upper right block is -m c^, the lower left one its transpose.
+    band[row, middle + 4] += z
     band[row, middle + 5] -= y
+    band[row + 1, middle + 2] -= z
     band[row + 1, middle + 4] += x
     band[row + 2, middle + 1] += y
     band[row + 2, middle + 2] -= x
     band[row + 5, middle - 5] -= y
     band[row + 5, middle - 4] += x
+    band[row + 3, middle - 2] -= z
     band[row + 3, middle - 1] += y
+    band[row + 4, middle - 4] += z
     band[row + 4, middle - 2] -= x

@@ -26,10 +26,6 @@ void gc_clock_count(void) {
   TIM2->psc = GC_APB1_TIMER_MHZ - 1u;
   TIM2->arr = 0xFFFFFFFFu;
   TIM2->egr = TIM_EGR_UG;
-  // The data-ready edge of the gyroscope latches the counter: the stamp has no delay of software.
-  TIM2->ccmr1 = TIM_CCMR1_INPUT;
-  TIM2->ccer = TIM_CC1_ENABLE;
-  TIM2->dier = TIM_CC1_FLAG;
   TIM2->cr1 = TIM_CR1_CEN;
   SYSTICK_LOAD = GC_CORE_MHZ * 1000u - 1u;
   SYSTICK_VAL = 0u;

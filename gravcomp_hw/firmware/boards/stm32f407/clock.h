@@ -1,11 +1,11 @@
-// Clocks: 168 MHz from a crystal of 8 MHz, a counter of microseconds, the tick of a millisecond.
+// Clocks: 168 MHz from a crystal of 12 MHz, a counter of microseconds, the tick of a millisecond.
 #ifndef GC_CLOCK_H
 #define GC_CLOCK_H
 
 #include <stdint.h>
 
 #ifndef GC_CRYSTAL_MHZ
-#define GC_CRYSTAL_MHZ 8u
+#define GC_CRYSTAL_MHZ 12u
 #endif
 #define GC_CORE_MHZ 168u
 #define GC_APB1_MHZ 42u

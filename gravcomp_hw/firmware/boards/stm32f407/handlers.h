@@ -5,6 +5,7 @@
 void gc_reset(void);
 void gc_stuck(void);
 void gc_on_tick(void);
+void gc_on_edge(void);
 void gc_on_data_ready(void);
 void gc_on_host_frame(void);
 void gc_on_motor_frame(void);

@@ -1,5 +1,5 @@
-// The board on the STM32F407. Interrupts of reception fill rings. All others have one priority and therefore never interrupt each
-// other: the tick, the data-ready edge and the mailboxes share the board without locks. The loop on the board runs below them.
+// The board on the STM32F407. Interrupts of reception fill rings, that of the data-ready edge takes its time. All others have one
+// priority and therefore never interrupt each other: the tick, the sample and the mailboxes share the board without locks. The loop on the board runs below them.
 #include <stdint.h>
 
 #include "../../core/board.h"
@@ -18,13 +18,14 @@
 #include "../../standalone/standalone.h"
 #endif
 
-#define RECEPTION_PRIORITY 0x10u
+#define RECEPTION_PRIORITY 0x10u  // and of the edge
 #define COMMON_PRIORITY 0x80u
 #define PATIENCE 40u  // ticks without a turn of main's loop after which the watchdog is not fed
 
 static gc_board board;
 static gc_bmi088 imu;
 static gc_ring rings[GC_BUSES];
+static volatile uint32_t edge;   // us, of the last data-ready edge
 static volatile uint32_t turns;  // of the loop in main
 static uint32_t turns_seen;
 static uint32_t ticks_without_turn;
@@ -89,10 +90,17 @@ void gc_on_tick(void) {
   }
 }
 
+// The stamp is taken at once; the sample is read at the common priority, by the interrupt of a timer that has none of its own.
+void gc_on_edge(void) {
+  if (gc_pin_edge()) {
+    edge = gc_clock_now();
+    NVIC_ISPR[IRQ_TIM2 / 32u] = 1u << IRQ_TIM2 % 32u;
+  }
+}
+
 void gc_on_data_ready(void) {
-  const uint32_t time = TIM2->ccr1;  // reading it clears the flag
   gc_sample sample;
-  if (gc_bmi088_read(&imu, time, &sample)) {
+  if (gc_bmi088_read(&imu, edge, &sample)) {
     gc_board_sample(&board, &sample);
     send_all();
   }
@@ -154,6 +162,7 @@ int main(void) {
   gc_board_start(&board);
   SCB_SHPR[11] = COMMON_PRIORITY;  // SysTick
   enable(IRQ_TIM2, COMMON_PRIORITY);
+  enable(IRQ_EXTI9_5, RECEPTION_PRIORITY);
   enable(IRQ_CAN1_TX, COMMON_PRIORITY);
   enable(IRQ_CAN2_TX, COMMON_PRIORITY);
   enable(IRQ_CAN1_RX0, RECEPTION_PRIORITY);

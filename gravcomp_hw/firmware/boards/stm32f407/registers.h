@@ -26,12 +26,16 @@ typedef struct {
 #define RCC_CFGR_APB2_BY_2 (4u << 13)
 #define RCC_AHB1_GPIOA (1u << 0)
 #define RCC_AHB1_GPIOB (1u << 1)
+#define RCC_AHB1_GPIOC (1u << 2)
+#define RCC_AHB1_GPIOD (1u << 3)
+#define RCC_AHB1_GPIOF (1u << 5)
 #define RCC_APB1_TIM2 (1u << 0)
-#define RCC_APB1_TIM3 (1u << 1)
 #define RCC_APB1_CAN1 (1u << 25)
 #define RCC_APB1_CAN2 (1u << 26)
 #define RCC_APB1_PWR (1u << 28)
 #define RCC_APB2_SPI1 (1u << 12)
+#define RCC_APB2_SYSCFG (1u << 14)
+#define RCC_APB2_TIM10 (1u << 17)
 #define RCC_CSR_RMVF (1u << 24)
 #define RCC_CSR_BORRSTF (1u << 25)
 #define RCC_CSR_PINRSTF (1u << 26)
@@ -75,18 +79,29 @@ typedef struct {
 } gc_gpio;
 #define GPIOA ((gc_gpio *)0x40020000u)
 #define GPIOB ((gc_gpio *)0x40020400u)
+#define GPIOC ((gc_gpio *)0x40020800u)
+#define GPIOD ((gc_gpio *)0x40020C00u)
+#define GPIOF ((gc_gpio *)0x40021400u)
 
-// RM0090 section 18.4, timers 2 to 5.
+// RM0090 section 9.3, which port a pin's interrupt comes from; section 12.3, interrupts of pins.
+typedef struct {
+  gc_register memrmp, pmc, exticr[4];
+} gc_syscfg;
+#define SYSCFG ((gc_syscfg *)0x40013800u)
+typedef struct {
+  gc_register imr, emr, rtsr, ftsr, swier, pr;
+} gc_exti;
+#define EXTI ((gc_exti *)0x40013C00u)
+
+// RM0090 sections 18.4 and 19.5, timers 2 and 10.
 typedef struct {
   gc_register cr1, cr2, smcr, dier, sr, egr, ccmr1, ccmr2, ccer, cnt, psc, arr, unused, ccr1, ccr2, ccr3, ccr4;
 } gc_timer;
 #define TIM2 ((gc_timer *)0x40000000u)
-#define TIM3 ((gc_timer *)0x40000400u)
+#define TIM10 ((gc_timer *)0x40014400u)
 #define TIM_CR1_CEN 1u
 #define TIM_EGR_UG 1u
 #define TIM_CC1_ENABLE 1u
-#define TIM_CC1_FLAG 2u
-#define TIM_CCMR1_INPUT 1u
 #define TIM_CCMR1_PWM (6u << 4)
 #define TIM_CCMR1_PRELOAD (1u << 3)
 
@@ -148,6 +163,7 @@ typedef struct {
 
 // PM0214 sections 4.3 to 4.6: interrupts, system control, SysTick, access to the FPU.
 #define NVIC_ISER ((gc_register *)0xE000E100u)
+#define NVIC_ISPR ((gc_register *)0xE000E200u)
 #define NVIC_IPR ((volatile uint8_t *)0xE000E400u)
 #define SCB_AIRCR (*(gc_register *)0xE000ED0Cu)
 #define SCB_SHPR ((volatile uint8_t *)0xE000ED18u)
@@ -158,6 +174,6 @@ typedef struct {
 #define SYSTICK_VAL (*(gc_register *)0xE000E018u)
 
 // RM0090 section 12.2, numbers of the interrupts.
-enum { IRQ_CAN1_TX = 19, IRQ_CAN1_RX0 = 20, IRQ_TIM2 = 28, IRQ_CAN2_TX = 63, IRQ_CAN2_RX0 = 64, IRQ_COUNT = 82 };
+enum { IRQ_CAN1_TX = 19, IRQ_CAN1_RX0 = 20, IRQ_EXTI9_5 = 23, IRQ_TIM2 = 28, IRQ_CAN2_TX = 63, IRQ_CAN2_RX0 = 64, IRQ_COUNT = 82 };
 
 #endif

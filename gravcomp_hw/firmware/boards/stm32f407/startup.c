@@ -33,6 +33,7 @@ __attribute__((section(".vectors"), used)) const gc_vectors gc_vector_table = {
         {
             [IRQ_CAN1_TX] = gc_on_host_sent,
             [IRQ_CAN1_RX0] = gc_on_host_frame,
+            [IRQ_EXTI9_5] = gc_on_edge,
             [IRQ_TIM2] = gc_on_data_ready,
             [IRQ_CAN2_TX] = gc_on_motor_sent,
             [IRQ_CAN2_RX0] = gc_on_motor_frame,
@@ -42,7 +43,7 @@ __attribute__((section(".vectors"), used)) const gc_vectors gc_vector_table = {
 __attribute__((section(".image_header"), used)) const gc_image_header gc_image = {.magic = GC_IMAGE_MAGIC};
 
 // Faults of the processor, and an image that is not whole: nothing is driven; the watchdog restarts the chip.
-void gc_stuck(void) {
+__attribute__((noinline)) void gc_stuck(void) {
   for (;;) {
     __asm__ volatile("nop");
   }

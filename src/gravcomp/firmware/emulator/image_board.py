@@ -27,14 +27,14 @@ class ImageBoard:
         image: Image | None = None,
     ):
         self.machine = Machine(image or build_image(), unique_id)
-        self._settle()
+        self._now = 0
         self.set(settings or {})
 
     def restart(self, cause: int = 0) -> None:
         """Start as after a reset of this cause (core/board.h)."""
         self.machine.flash.words_left = None
         self.machine.reset(_CAUSES[cause])
-        self._settle()
+        self._now = 0
 
     def set(self, settings: Mapping[str, float]) -> None:
         """Set parameters by name, without a request. Raises ConfigError for an unknown name or a value out of range."""
@@ -59,7 +59,7 @@ class ImageBoard:
             self._now = (self._now + TICK) & 0xFFFFFFFF
             self.machine.tick(self._now)
             if len(self.machine.resets) != resets:
-                self._settle()
+                self._now = 0
                 return
 
     def receive(self, message: can.Message, bus: int = HOST_BUS) -> None:
@@ -78,9 +78,7 @@ class ImageBoard:
     def sent(self, bus: int = HOST_BUS) -> list[can.Message]:
         """Return the frames that have left on a bus, in order."""
         frames, self.machine.cans[bus].sent = self.machine.cans[bus].sent, []
-        return [
-            can.Message(arbitration_id=f.identifier >> 21, is_extended_id=False, data=f.data[: f.length]) for f in frames
-        ]
+        return [can.Message(arbitration_id=f.identifier >> 21, is_extended_id=False, data=f.data[: f.length]) for f in frames]
 
     def bus_off(self, bus: int, off: bool) -> None:
         """Let a bus be off, or on again."""
@@ -96,12 +94,11 @@ class ImageBoard:
         """Bits of the present faults."""
         return self.machine.call("gc_board_faults", self.machine.symbols["board"]) & 0xFFFF
 
-    def _settle(self) -> None:
-        self._now = 0
-
 
 def _wire(message: can.Message) -> WireFrame:
     data = bytes(message.data[:8]).ljust(8, b"\0")
     odd = message.is_error_frame or message.is_fd
-    identifier = (message.arbitration_id & 0x1FFFFFFF) << 3 | _IDE if message.is_extended_id or odd else message.arbitration_id << 21
+    identifier = (
+        (message.arbitration_id & 0x1FFFFFFF) << 3 | _IDE if message.is_extended_id or odd else message.arbitration_id << 21
+    )
     return WireFrame(identifier & 0xFFFFFFFF | (_RTR if message.is_remote_frame else 0), min(message.dlc, 8), data)

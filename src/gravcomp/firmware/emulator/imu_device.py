@@ -1,4 +1,4 @@
-"""Model of the BMI088 on its SPI bus [BMI088 data sheet]: two devices with a select each; the accelerometer sends a byte first."""
+"""Model of the BMI088 on its SPI bus [BMI088 data sheet]: two devices with a select each."""
 
 import struct
 

@@ -25,9 +25,11 @@ RESET_FLAGS = {"power": 1 << 27 | 1 << 25, "supply": 1 << 25, "watchdog": 1 << 2
 
 _RETURN = 0x08007FF0  # nothing is there; a handler that returns comes to it
 _PAINT = 0xA5
+_START_PATIENCE = 30_000_000  # us
 _WFI = b"\x30\xbf"
 _PERIPHERALS, _SYSTEM, _UNIQUE = 0x40000000, 0xE000E000, 0x1FFF7000
-_TIM2, _TIM3, _IWDG, _CAN1, _CAN2, _PWR, _SPI1 = 0x0000, 0x0400, 0x3000, 0x6400, 0x6800, 0x7000, 0x13000
+_TIM2, _TIM10, _IWDG, _CAN1, _CAN2, _PWR, _SPI1, _EXTI = 0x0000, 0x14400, 0x3000, 0x6400, 0x6800, 0x7000, 0x13000, 0x13C00
+_EDGE = 1 << 5
 _GPIOA, _GPIOB, _RCC, _FLASH = 0x20000, 0x20400, 0x23800, 0x23C00
 _SELECTS = {_GPIOA: (4, "acc"), _GPIOB: (0, "gyro")}
 
@@ -37,7 +39,11 @@ class ProcessorFault(RuntimeError):
 
 
 class Machine:
-    """The chip with an image. Attributes: now (us), cans, imu, flash, supply_low, duty, resets (by cause), symbols."""
+    """The chip with an image.
+
+    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty, resets (their causes),
+    dead (nothing runs), symbols.
+    """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
         """Raises SetupError without the emulator."""
@@ -69,6 +75,7 @@ class Machine:
         uc.ctl_set_exits([self._wait, _RETURN, self.symbols["gc_stuck"] & ~1])
         self.resets: list[str] = []
         self.supply_low = False
+        self.main_stands = False
         self.cans = (CanController(), CanController())
         self.imu = ImuDevice()
         self.dead = True
@@ -79,6 +86,8 @@ class Machine:
         self._uc.mem_write(BOOT_START, boot)
         self._uc.mem_write(CODE_START, b"\xff" * (FLASH_END - CODE_START))
         self._uc.mem_write(CODE_START, code)
+        self._uc.ctl_remove_cache(BOOT_START, PARAMETERS)
+        self._uc.ctl_remove_cache(CODE_START, FLASH_END)
 
     def write_memory(self, address: int, data: bytes) -> None:
         """Write into memory or flash, as a debugger does."""
@@ -105,7 +114,10 @@ class Machine:
         stack, start = struct.unpack("<2I", self.read_memory(BOOT_START, 8))
         self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
         self.dead = False
-        self.dead = not self._run(start, self._wait)
+        try:
+            self.dead = not self._run(start, self._wait, _START_PATIENCE)
+        except ProcessorFault:  # the processor would go to gc_stuck, or be reset by the watchdog for ever
+            self.dead = True
 
     def tick(self, now: int) -> None:
         """Let the time be `now` (us) and run the interrupt of the tick, then main's loop once; the watchdog may reset."""
@@ -114,7 +126,7 @@ class Machine:
             return
         self.interrupt("gc_on_tick")
         self._flush()
-        if not self.dead:
+        if not self.dead and not self.main_stands:
             self._run(self._wait + 2 | 1, self._wait)
         if self._restart:
             self.reset("software")
@@ -125,10 +137,13 @@ class Machine:
         """Let the gyroscope's data-ready edge come at `time` (us)."""
         if self.dead or not self.imu.set_up or self.imu.silent:
             return
-        self._registers[_TIM2 + 0x34] = time & 0xFFFFFFFF
+        self._registers[_EXTI + 0x14] = _EDGE
+        tick, self.now = self.now, time & 0xFFFFFFFF
+        self.interrupt("gc_on_edge")
+        self.now = tick
         self.interrupt("gc_on_data_ready")
         self._flush()
-        if not self.dead:
+        if not self.dead and not self.main_stands:
             self._run(self._wait + 2 | 1, self._wait)
 
     def receive(self, bus: int, frames: list[WireFrame]) -> None:
@@ -173,12 +188,15 @@ class Machine:
                 before = len(can.sent)
                 self.interrupt(handler)
 
-    def _run(self, start: int, end: int) -> bool:
-        """Run from an address until the image waits, returns or gives up; return whether that is `end`. Raises ProcessorFault."""
+    def _run(self, start: int, end: int, patience: int = 0) -> bool:
+        """Run from an address until the image waits, returns or gives up; return whether that is `end`.
+
+        patience: us of the host's time after which it counts as hanging; 0: without end. Raises ProcessorFault.
+        """
         self._lost = False
         self._failure: Exception | None = None
         try:
-            self._uc.emu_start(start | 1, 0)
+            self._uc.emu_start(start | 1, 0, timeout=patience)
         except self._error as error:
             at = self._uc.reg_read(self._arm.UC_ARM_REG_PC)
             raise ProcessorFault(f"at 0x{at:08X}: {error}") from error
@@ -250,8 +268,10 @@ class Machine:
             self._fed = self.now
         elif offset == _SPI1 + 0x0C:
             self._spi = self.imu.exchange(value & 0xFF)
-        elif offset == _TIM3 + 0x34:
+        elif offset == _TIM10 + 0x34:
             self.duty = value
+        elif offset == _EXTI + 0x14:
+            self._registers[offset] = self._registers.get(offset, 0) & ~value
         elif _FLASH < offset < _FLASH + 0x20:
             self.flash.write_register(offset - _FLASH, value)
         elif offset in (_GPIOA + 0x18, _GPIOB + 0x18):
