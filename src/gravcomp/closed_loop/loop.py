@@ -48,6 +48,7 @@ from gravcomp.virtual.motion import BaseMotion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.tracker import VirtualTracker
+from gravcomp.virtual.truth import Truth
 
 SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
@@ -95,6 +96,7 @@ class ClosedLoop:
             seed=setup.seed,
             motion=motion,
             board="virtual" if board == STANDALONE else board,
+            scene=setup.scene,
         )
         self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == STANDALONE else None
         joints = setup.hardware.joints is not None
@@ -132,6 +134,11 @@ class ClosedLoop:
     def time(self) -> float:
         """Virtual time, s."""
         return self._virtual.time
+
+    @property
+    def truth(self) -> Truth:
+        """Ground truth of the virtual robot, for evaluation and for a person who sees the robot."""
+        return self._virtual.truth
 
     @property
     def trace(self) -> Trace:
@@ -305,6 +312,9 @@ class ClosedLoop:
                 shape.tip_position,
                 shape.tip_direction,
                 self._sent,
+                truth.base_position,
+                float(np.linalg.norm(truth.contact_force, axis=1).sum()),
+                float(truth.contact_depth.max(initial=0.0)),
             )
         )
 
