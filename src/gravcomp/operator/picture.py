@@ -15,8 +15,9 @@ _SIGHTS = 40  # places along a line of sight at which it is looked for a wall
 
 @dataclass(frozen=True)
 class Picture:
-    """target: angles (2,) of the target, None where it is not seen; ahead: those of the farthest place of the lumen that is seen.
+    """What the camera at the tip shows.
 
+    target: angles (2,) of the target, None where it is not seen; ahead: those of the farthest place of the lumen that is seen.
     """
 
     target: np.ndarray | None
