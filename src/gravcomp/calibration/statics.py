@@ -26,10 +26,13 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.tube import with_coarse_elements
 
 _STEPS = {
-    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 2e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
+    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 1e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
     "angle": 5e-3,
 }  # fmt: skip
 """Steps of the difference quotients, in the units of `StaticParameters`; of the modulus: of its logarithm."""
+
+_CENTRAL = ("mount",)
+"""Kinds whose effect is about as much quadratic as linear: under a turned gravity a horizontal robot is also pressed together."""
 
 _SMALL = 1e-9  # ratio of a branch that does not creep, so that the model has it
 
@@ -140,14 +143,22 @@ class StaticPredictor:
         return tuple(places.ravel().tolist())
 
     def _differences(self, parameters: StaticParameters, kind: str, steps: list[Step], shown: list[Step]) -> np.ndarray:
-        """Return the difference quotients (k, 6, n) by a field, each from a walk of its own near `steps`."""
-        here, columns = np.array([step.tip for step in shown]), []
+        """Return the difference quotients (k, 6, n) by a field, each from walks of its own near `steps`."""
+        here, columns, step = np.array([step.tip for step in shown]), [], _STEPS[kind]
+
+        def moved(index: int, change: float) -> np.ndarray:
+            parameters_there = parameters.changed(kind, (index,), change)
+            self._apply(parameters_there)
+            # A cable that begins where it ends would not slide, and not rub.
+            known = None if kind == "friction" else steps
+            walked = self._walk.run(self._inputs(parameters_there), parameters_there.creep, known)
+            return np.array([one.tip for one in walked if one.window is not None])
+
         for index in range(parameters.count(kind)):
-            moved = parameters.changed(kind, (index,), _STEPS[kind])
-            self._apply(moved)
-            walked = self._walk.run(self._inputs(moved), moved.creep, steps)
-            there = np.array([step.tip for step in walked if step.window is not None])
-            columns.append((there - here) / _STEPS[kind])
+            if kind in _CENTRAL:
+                columns.append((moved(index, step) - moved(index, -step)) / (2.0 * step))
+            else:
+                columns.append((moved(index, step) - here) / step)
         return np.stack(columns, axis=2)
 
     def _by_place(self, parameters: StaticParameters, kind: str, shown: list[Step]) -> np.ndarray:
