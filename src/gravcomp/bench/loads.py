@@ -1,6 +1,6 @@
 """External loads: wrenches against SoRoSim, and loads that the virtual robot carries and the loop has to find.
 
-The payload is a share of the robot's own mass. The tip forces act across the robot, as a wall beside it does, and, listed apart,
+The payload is a share of the robot's own mass. The tip forces act across the robot, as a wall does, and, listed apart,
 along it, where the body is so stiff that neither sensor sees much. Trackers and load cells are those of the options' defaults.
 The base's IMU cannot contribute on an arm that moves the base by itself: `payload_imu_frames` counts the IMU frames of the
 virtual robot that a payload changes.

@@ -47,7 +47,7 @@ class LivePayload:
         self._wanted = mass
 
     def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
-        """Return what the model carries beside the payload of the robot file, at `now` (s) under gravity (3,); None: nothing."""
+        """Return what the robot file's payload lacks, at `now` (s) under gravity (3,); None: nothing."""
         interval = max(0.0, now - self._at) if math.isfinite(self._at) else 0.0
         self._at = now
         share = interval / (interval + self.ramp_time) if interval + self.ramp_time > 0.0 else 1.0

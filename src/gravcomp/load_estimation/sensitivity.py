@@ -5,8 +5,8 @@ body is elastic (Maxwell 1864),
 
     u <= W_aa lambda + W_af f + delta_g,   lambda >= 0, complementary,      e = W_ea lambda + C f + e_g.
 
-A load makes cables slack, and the robot gives way the more. So tensions and tip are those of the taut cables under the load that
-is assumed, and the derivatives d lambda = -W_aa^-1 W_af df, de = (C - W_ea W_aa^-1 W_af) df hold for these. A weight that is
+A load makes cables slack, and the robot is softer without them. So tensions and tip are those of the taut cables under the load
+that is assumed, and the derivatives d lambda = -W_aa^-1 W_af df, de = (C - W_ea W_aa^-1 W_af) df hold for these. A weight that is
 larger by the share s_w acts like more of delta_g and e_g. A body that is more compliant by the share s_E has all three W and C
 larger by it: it keeps the tensions of a straight robot, whose cables carry its weight whatever its stiffness, and moves the tip
 as more weight does. Displacements that differ from the commanded ones by b_u (backlash, friction, line) give d lambda = W_aa^-1
