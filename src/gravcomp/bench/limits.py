@@ -84,6 +84,7 @@ ROWS = {
         Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
         Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
         Row("lost_steps", "steps without an equilibrium, share", ""),
+        Row("unsolved_scenes", "scenes of 200 that are not entered from the straight robot", ""),
     ),
     "robots": (
         Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),
