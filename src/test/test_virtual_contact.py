@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from virtual_article import given, reference_robot, true_robot, with_body
 
-from gravcomp.scene import BoxWall, PlaneWall, SceneSection, SphereWall, TubeWall
+from gravcomp.scene import BoxWall, PlaneWall, SceneSection, TubeWall
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.dynamics import MovingRod
