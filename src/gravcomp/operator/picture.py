@@ -15,10 +15,7 @@ _SIGHTS = 40  # places along a line of sight at which it is looked for a wall
 
 @dataclass(frozen=True)
 class Picture:
-    """What the camera at the tip shows.
-
-    target: angles (2,) of the target, None where it is not seen; ahead: those of the farthest place of the lumen that is seen.
-    """
+    """Angles (2,) of the target, and those of the farthest place of the lumen that is seen; None where there is none."""
 
     target: np.ndarray | None
     ahead: np.ndarray | None

@@ -21,7 +21,7 @@ from gravcomp.virtual.contact_force import Touching, surface_point
 from gravcomp.virtual.surface import RodSurface, farthest, inside
 
 _RIM = 5  # more points on the rim of the tip's face, at equal angles
-_FACE_POINTS = _RIM + 1  # of the last cross-section, beside the one that it has like all others
+_FACE_POINTS = _RIM + 1  # of the last cross-section, in addition to the one that each has
 _TURN = np.array([[np.cos(k * np.pi / 3), np.sin(k * np.pi / 3)] for k in range(1, _RIM + 1)])
 _STAYS = 1e-6  # of the rod's length: the points on the rim of the tip's face move on if others are deeper by so much
 _AIMS = 2  # evaluations of the gap until the point of an outline that lies farthest towards the wall is found
