@@ -50,7 +50,8 @@ class VirtualRobotNode(ManagedNode):
             parameters = dataclasses.replace(parameters, motors=motors)
         motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
-        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, self.parameters.board)
+        scene = self.robot_file.scene
+        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, self.parameters.board, scene)
         self.get_logger().info(robot.true.summary())
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)

@@ -123,4 +123,4 @@ def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     counted = sum(one.count for one in found.values())
     inside = sum(one.share * one.count for one in found.values())
     assert counted > 50 and inside / counted >= 0.9
-    assert found["modulus"].share >= 0.9 and found["modulus"].width < 4.0
+    assert found["modulus"].share >= 0.9

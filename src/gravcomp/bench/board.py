@@ -6,6 +6,7 @@ Everything runs on this machine: the C code under sanitizers, and the image in a
 import time
 from collections.abc import Callable
 
+from gravcomp.bench import board_standalone
 from gravcomp.canbus import c610
 from gravcomp.canbus.codec import encode
 from gravcomp.closed_loop.setup import Setup
@@ -65,6 +66,7 @@ def run(progress: Callable[[str], None], *, frames: int = 200_000, seed: int = 1
         "image_ram_kb": round((image.ram + image.ccm) / 1024, 1),
         "image_stack_kb": round(largest_stack(image) / 1024, 2),
         **(_loop(progress) if every == 1 else {}),
+        **board_standalone.run(progress, every=every),
     }
 
 

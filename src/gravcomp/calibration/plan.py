@@ -31,6 +31,7 @@ from gravcomp.standard_gravity import STANDARD_GRAVITY
 _LEVELS = (0.35, 1.0)  # of the largest tension that is used: two are needed to distinguish an offset from a stretch
 _MEAN_TURN = math.radians(80.0)  # of the base from station to station
 _FARTHER = 1.5  # than the linear model expects, a tip may turn
+_LEAST_REST = 0.3  # of the longest time that a pose may take
 _WIDEST = 0.5  # deviation of the logarithm of all moduli together before the measurement
 
 
@@ -153,13 +154,18 @@ def make_plan(
     rows = np.stack([unknown.derivative(derivatives) for unknown in unknowns], axis=2) * scale[:, None]
     prior = np.vstack([prior_rows(unknowns, priors), [(u.kind == "modulus") / _WIDEST for u in unknowns]])
     longest = options.budget / options.fewest
-    rest = float(np.clip(options.periods * period, options.budget / options.most, longest)) - _pull_time(candidates, robot)
-    chosen = _chosen(candidates, rows, prior, max(rest, 0.3 * longest), robot, options)
+    held = float(np.clip(options.periods * period, options.budget / options.most, longest))
+    pull = _pull_time(candidates, robot)
+    rest = max(held - pull, _LEAST_REST * longest)
+    chosen = _chosen(candidates, rows, prior, rest, robot, options)
     poses = _ordered([candidates[k] for k in chosen])
-    last = poses[-1]
-    free = next(pose for pose in candidates if pose.station == last.station and not pose.pulled)
+    if not poses:
+        raise ConfigError(
+            f"robot '{robot.name}': no pose of {rest + pull:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
+        )
+    free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
     poses.append(free)  # let go at the end, it swings: the damping
-    return Plan(tuple(poses), tuple([max(rest, 0.3 * longest) + _pull_time(candidates, robot)] * len(poses)), rest, options.rate)
+    return Plan(tuple(poses), (rest + pull,) * len(poses), rest, options.rate)
 
 
 def _candidates(

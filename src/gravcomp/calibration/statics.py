@@ -26,7 +26,7 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.tube import with_coarse_elements
 
 _STEPS = {
-    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 5e-3, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
+    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 2e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
     "angle": 5e-3,
 }  # fmt: skip
 """Steps of the difference quotients, in the units of `StaticParameters`; of the modulus: of its logarithm."""

@@ -25,6 +25,9 @@ from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.firmware.model_fit import blob_for
+from gravcomp.firmware.model_settings import LoopParameters
+from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
@@ -45,6 +48,7 @@ from gravcomp.virtual.motion import BaseMotion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.tracker import VirtualTracker
+from gravcomp.virtual.truth import Truth
 
 SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
@@ -54,6 +58,10 @@ _COMPLIANCE_STEPS = 50  # bus steps between two computations of the tip's compli
 _IDLE = 4e-4  # of the largest tension, below which a cable counts as idle
 _RELEASE_SLACK = 0.05
 """Of the robot's length: released cables are paid out so far beyond their paths that no motion of the robot makes them taut."""
+
+
+STANDALONE = "standalone"
+"""Board on which the firmware's loop runs."""
 
 
 class ClosedLoop:
@@ -76,8 +84,9 @@ class ClosedLoop:
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
-        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. Raises RuntimeError
-        where the bridge does not start.
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there; or "standalone": the
+        firmware's loop in C computes the commands in place of filter, simulator and inverse problem, which needs a reduced model.
+        Raises RuntimeError where the bridge does not start, ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -86,8 +95,10 @@ class ClosedLoop:
             setup.virtual_hardware,
             seed=setup.seed,
             motion=motion,
-            board=board,
+            board="virtual" if board == STANDALONE else board,
+            scene=setup.scene,
         )
+        self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == STANDALONE else None
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
@@ -123,6 +134,11 @@ class ClosedLoop:
     def time(self) -> float:
         """Virtual time, s."""
         return self._virtual.time
+
+    @property
+    def truth(self) -> Truth:
+        """Ground truth of the virtual robot, for evaluation and for a person who sees the robot."""
+        return self._virtual.truth
 
     @property
     def trace(self) -> Trace:
@@ -205,6 +221,8 @@ class ClosedLoop:
         estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
         if not isinstance(estimate, Problem):
             self._gravity = np.array(estimate.gravity)
+        if self._on_board is not None:
+            self._on_board.weigh(stamp_ns // 1000, sample.angular_rate, sample.specific_force)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
         # The model starts at rest and relaxed, and creeps from then on.
@@ -259,6 +277,10 @@ class ClosedLoop:
         return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free))), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
+        if self._on_board is not None:
+            self._on_board.follow(SAMPLE_PERIOD)
+            result = self._on_board.read()
+            return result.displacement, result.tension
         command = self._problem.step(
             shape.response,
             target,
@@ -290,8 +312,16 @@ class ClosedLoop:
                 shape.tip_position,
                 shape.tip_direction,
                 self._sent,
+                truth.base_position,
+                float(np.linalg.norm(truth.contact_force, axis=1).sum()),
+                float(truth.contact_depth.max(initial=0.0)),
             )
         )
+
+
+def _parameters(setup: Setup) -> LoopParameters:
+    """Return what the loop on the board takes from the setup."""
+    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware)
 
 
 def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:

@@ -13,6 +13,7 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
+from gravcomp.scene.scene import Scene
 from gravcomp.virtual.body import build_rod, first_frequency
 from gravcomp.virtual.described import described
 from gravcomp.virtual.draw import draw
@@ -38,6 +39,7 @@ class Setup:
     controller: InverseControllerParameters
     seed: int
     nominal_hardware: Hardware | None = None
+    scene: Scene | None = None  # around the virtual robot
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
@@ -59,6 +61,7 @@ class Setup:
             controller=section(InverseControllerParameters, "inverse_controller"),
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
+            scene=file.scene or None,
         )
 
     @property

@@ -65,7 +65,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
-    "contact": {"every": 20},
+    "contact": {"every": 19},
     "track": {"seeds": 1},
     "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},

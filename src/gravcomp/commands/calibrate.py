@@ -202,17 +202,20 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
             robot = calibrated_robot(setup.robot, statics.parameters, creep_times=statics.creep_times)
             hardware = calibrated_hardware(setup.hardware, statics.parameters)
             courses = [] if args.no_damping or data.measured is None else moving(data.measured, statics.parameters, still)
-            motion = None
+            motion, lost = None, ""
             if courses:
-                motion = fit_motion(
-                    with_coarse_elements(robot),
-                    courses,
-                    modulus=False,
-                    creep=args.creep,
-                    mapper=sweep.map,
-                    progress=lambda s: show(f"damping: {s}"),
-                )
-                if motion.damping_seen:
+                try:
+                    motion = fit_motion(
+                        with_coarse_elements(robot),
+                        courses,
+                        modulus=False,
+                        creep=args.creep,
+                        mapper=sweep.map,
+                        progress=lambda s: show(f"damping: {s}"),
+                    )
+                except RuntimeError as error:  # what was found at rest still counts
+                    lost = str(error)
+                if motion is not None and motion.damping_seen:
                     robot = with_behaviour(robot, motion)
         except (MeasurementError, MeshError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
@@ -228,7 +231,9 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
     result = calibration_result(data.source, str(target), statics, motion, courses, setup.robot.materials[0].damping_time)
     if data.duration is not None:
         result.data["robot_time_s"] = round(data.duration, 1)
-    if not courses and not args.no_damping:
+    if lost:
+        result.notes.insert(0, f"damping time: {lost}; the value of the robot file is kept")
+    elif not courses and not args.no_damping:
         result.notes.insert(0, "damping time: no trial contains fast motion; the value of the robot file is kept")
     result.seconds = time.perf_counter() - started
     page = write_report(result, Path(args.out).expanduser())

@@ -27,6 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     test = add_subcommand(choices, "test", "run the firmware's tests and the fuzzer; print which lines of the C code they reach")
     test.add_argument("--frames", type=int, default=50_000, metavar="N", help="frames of the fuzzer (default: 50000)")
     test.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the fuzzer (default: 1)")
+    model = add_subcommand(choices, "model", "turn a robot's reduced model into the blob of the loop on the board")
+    model.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
+    model.add_argument("--output", metavar="DIR", default=_FOLDER, help=f"folder of the blob (default: {_FOLDER})")
+    model.add_argument(
+        "--joystick-bend", type=float, default=60.0, metavar="DEG", help="bend at full deflection of the joystick (default: 60)"
+    )
     settings = add_subcommand(choices, "parameters", "write a robot's parameters into the board over CAN, and store them")
     settings.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
     settings.add_argument("--number", type=int, default=255, metavar="N", help="number of the board (default: the only one)")
@@ -39,9 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: done, 1: a test failed or the board refused. Raises ConfigError, SetupError."""
-    return {"install": _install, "build": _build, "flash": _flash, "test": _test, "parameters": _parameters}[args.subcommand](
-        args
-    )
+    subcommands = {
+        "install": _install, "build": _build, "flash": _flash, "test": _test, "model": _model, "parameters": _parameters,
+    }  # fmt: skip
+    return subcommands[args.subcommand](args)
 
 
 def _install(args: argparse.Namespace) -> int:
@@ -82,6 +89,51 @@ def _built(args: argparse.Namespace) -> tuple[dict, str]:
         f" {figures['stack_kb']} KB; check {figures['check']}"
     )
     return figures, sentence
+
+
+def _model(args: argparse.Namespace) -> int:
+    import math
+
+    from gravcomp.config import ConfigError
+    from gravcomp.description import load_robot_file
+    from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit
+    from gravcomp.firmware.model_settings import LoopParameters
+    from gravcomp.full_model.robot_model import RobotModel
+    from gravcomp.reduction import load, why_not
+
+    if not 0.0 < args.joystick_bend <= 180.0:
+        raise ConfigError(f"--joystick-bend is {args.joystick_bend:g}; allowed: above 0 to 180 deg")
+    file = load_robot_file(args.robot)
+    model = RobotModel(file.robot)
+    reduction = load(model)
+    if reduction is None:
+        reason = why_not(model) or f"it is not built: run ./gravcomp model build {args.robot}"
+        raise ConfigError(f"{file.source}: there is no reduced model for the board: {reason}")
+    found = fit(model, reduction, LoopParameters.of(file), math.radians(args.joystick_bend))
+    path = Path(args.output) / f"{file.robot.name}.model"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(found.blob)
+    figures = {
+        "robot": file.robot.name,
+        "blob": str(path),
+        "bytes": len(found.blob),
+        "slot_bytes": SLOT_BYTES,
+        "modes": found.model.size,
+        "modes_of_reduced_model": reduction.basis.shape[1],
+        "strains": found.strains,
+        "multiply_adds": found.multiply_adds,
+        "estimated_ms": round(found.milliseconds, 2),
+        "error_mm": round(1e3 * found.error, 4),
+        "reduction_error_mm": round(1e3 * found.reduction_error, 4),
+    }
+    sentence = (
+        f"{path}: {figures['modes']} of {figures['modes_of_reduced_model']} modes, {found.strains} strains;"
+        f" {len(found.blob) / 1024:.0f} of {SLOT_BYTES // 1024} KB of flash; {1e-3 * found.multiply_adds:.0f} thousand"
+        f" multiply-adds a step, about {found.milliseconds:.1f} of {LONGEST_MS:g} ms; the tip is up to {1e3 * found.error:.4f} mm"
+        " from that of the whole reduced model"
+    )
+    output.result(figures, sentence)
+    return 0
 
 
 def _flash(args: argparse.Namespace) -> int:

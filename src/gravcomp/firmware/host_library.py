@@ -45,6 +45,7 @@ def load() -> ctypes.CDLL:
         ("size", ctypes.c_size_t, ()),
         ("record_size", ctypes.c_size_t, ()),
         ("start", None, (memory, ctypes.POINTER(u32), u8)),
+        ("attach", None, (memory,)),
         ("lose_supply_after", None, (memory, u32)),
         ("set", flag, (memory, u32, u32)),
         ("get", u32, (memory, u32)),

@@ -32,11 +32,16 @@ def laid_on_plane(weight: float, stiffness: float, gap: float) -> tuple[float, f
     return weight * place / 3.0, place
 
 
-def buckled_in_tube(load: float, length: float, stiffness: float, clearance: float) -> tuple[float, float]:
-    """Return force of the wall (N) and deflection of the tip (m) of a rod that an end load buckles against a tube around it.
+def buckled_in_tube(weight: float, load: float, length: float, stiffness: float, clearance: float) -> tuple[float, float]:
+    """Return force of the wall (N) and deflection of the tip (m) of a rod that an end load presses against a tube around it.
 
-    load P in N along the rod, beyond pi^2 E I / (4 L^2) and below 4.49^2 E I / L^2; only the tip touches:
-    N = P c / (L - tan(k L) / k), k^2 = P / E I.
+    load P in N along the rod, below 4.49^2 E I / L^2; only the tip touches. With k^2 = P / E I the deflection is
+
+        y = A cos k x + B sin k x + c - (N/P) (L - x) + w/(2 P) (L - x)^2 - w/(P k^2),
+
+    clamped at 0, and y(L) = c gives N. Without weight N = P c / (L - tan(k L) / k), beyond the load pi^2 E I / (4 L^2).
     """
     k = math.sqrt(load / stiffness)
-    return load * clearance / (length - math.tan(k * length) / k), clearance
+    cosine, sine, bent = math.cos(k * length), math.sin(k * length), weight / k**2
+    pushed = (load * clearance + 0.5 * weight * length**2 - bent) * cosine - weight * length * sine / k + bent
+    return pushed / (length * cosine - sine / k), clearance

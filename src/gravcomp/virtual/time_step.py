@@ -12,17 +12,24 @@ The tension T of each tendon is an unknown of Newton's method in addition to the
 and the geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and
 its geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency
 and robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
+
+While the rod touches a wall (contact.py, contact_force.py), and in the step after, velocity and acceleration are the backward
+differences of the pose (J. J. Moreau's time stepping with theta = 1, V. Acary, B. Brogliato, "Numerical Methods for Nonsmooth
+Dynamical Systems", 2008, chapter 10): a point that meets a wall stays on it, and no acceleration of an impact is carried on.
 """
 
 import numpy as np
 from numba import njit
 
 from gravcomp.virtual.band_solver import newton_step
+from gravcomp.virtual.contact import Walls, find_contacts, keep_friction
+from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, forget_friction, take_over
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
 from gravcomp.virtual.rod import strains
 from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
+from gravcomp.virtual.surface import RodSurface
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
 
 _SPECTRAL_RADIUS = 0.5  # numerical damping of frequencies that the time step cannot resolve; 1: none
@@ -30,10 +37,13 @@ _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
 _ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
 _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
-MOST_ITERATIONS = 12
+_MOST_ITERATIONS, _MOST_AT_WALLS = 12, 40
+_WITH_FRICTION = 25  # iterations at walls; the others start again, and take the step without friction
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _LOOSER = 10.0  # than the static equilibrium, in force and moment
+_SEARCHES = 4  # for contacts in one step
+_NEAR = 0.05  # of the half width of the rod: so near to a wall a point takes part, and farther by twice its way in the step
 
 
 @njit(cache=True, error_model="numpy")
@@ -81,17 +91,25 @@ def time_step(
     direction: np.ndarray,
     chord: np.ndarray,
     band: np.ndarray,
-) -> tuple[bool, int]:
-    """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
+    walls: Walls,
+    surface: RodSurface,
+    rigid: float,
+    depth: float,
+    held: np.ndarray,
+    rim: np.ndarray,
+    touching: Touching,
+    checked: Touching,
+) -> tuple[bool, bool]:
+    """Advance the rod by dt s in place; return whether the state at the end is possible, and whether the iteration converged.
 
     The parameters are those of `MovingRod`; load (n + 1, 3) N acts in addition to the weights; wound_before and wound (m,) m are
     the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one
-    step, m/N; direction, chord and band are scratch. MOST_ITERATIONS iterations mean that the iteration did not converge. If the
-    state is not possible, pose and material keep their values from before the step, and the caller sets the rest of the state.
+    step, m/N; direction, chord and band are scratch. rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how
+    much the planes of the contacts may differ from the walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`;
+    checked is scratch. If the state is not possible, pose and material keep their values from before the step, and the caller
+    sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
-    beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
-    gamma = _GAMMA / (dt * _BETA)
     linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
     force = np.empty((n + 1, 3))
     for k in range(n + 1):
@@ -99,22 +117,44 @@ def time_step(
             force[k, i] = mass[k] * gravity[i] + load[k, i]
     share = tension_shares(strain, length, sliding, routing.start, routing.end, mu, guide_angle)
 
-    total_increment = _predict(dt, velocity, acceleration, velocity_rate)
     start_orientation, start_position = orientation.copy(), position.copy()
     copy_pose(base_orientation, base_position, orientation[0], position[0])
+    turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    obstacles = walls.moving.shape[0]
+    reach = 0.0
+    if obstacles > 0:
+        way = _way(dt, velocity, start_orientation, start_position, orientation, position)
+        reach = _NEAR * float(surface.size[n]) + 2.0 * way
+    meets = touching.count[0] > 0 and np.any(touching.force[: touching.count[0]] != 0.0)
+    start_velocity = velocity.copy()
+    total_increment = _predict_free(dt, velocity, acceleration, velocity_rate)
+    _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
+    if obstacles > 0:
+        find_contacts(
+            walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+            touching,
+        )  # fmt: skip
+        meets = meets or np.any(touching.gap[: touching.count[0]] < 0.0)
+    beta, gamma = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F)), _GAMMA / (dt * _BETA)
+    if meets:
+        beta, gamma = 1.0 / (dt * dt), 1.0 / dt
+        for k in range(1, n + 1):
+            for i in range(6):
+                velocity[k, i], velocity_rate[k, i], total_increment[k, i] = start_velocity[k, i], 0.0, dt * start_velocity[k, i]
+    searches = 1
 
     path_before = path.copy()
     pulled, law = tension.copy(), np.empty(m)  # T, and k s where the tendon is taut
-    active, work, middle = np.empty(m), np.empty((3, 3)), band.shape[1] // 2
+    active, middle = np.empty(m), band.shape[1] // 2
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     new_strain = np.empty((n, 6))
-    turn, shift = np.empty((3, 3)), np.empty(3)
-    iterations = MOST_ITERATIONS
-    for iteration in range(MOST_ITERATIONS):
-        for k in range(1, n + 1):
-            motion_exp(total_increment[k], turn, shift)
-            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-            advance(orientation[k], position[k], turn, shift, work)
+    converged, slides = False, False
+    for iteration in range(_MOST_AT_WALLS if obstacles > 0 else _MOST_ITERATIONS):
+        if iteration == _WITH_FRICTION:
+            slides = True
+            forget_friction(touching)
+            _restart(gamma, beta, total_increment, velocity, velocity_rate)
+        _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
         slack = 0.0  # largest stretch of a taut tendon that has become too short
@@ -149,6 +189,7 @@ def time_step(
             pull,
             band,
         )
+        admissible = add_contacts(touching, orientation, position, _LOOSER * tolerances[0], residual, band)
         worst = 0.0
         for k in range(1, n + 1):
             for i in range(6):
@@ -158,10 +199,22 @@ def time_step(
             _add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
             for i in range(6):
                 worst = max(worst, abs(residual[k, i]) / tolerances[i // 3])
-        if worst < _LOOSER and slack < _LOOSER * tolerances[0]:
-            iterations = iteration
-            break
+        if admissible and worst < _LOOSER and slack < _LOOSER * tolerances[0]:
+            if obstacles > 0 and searches < _SEARCHES:
+                find_contacts(
+                    walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+                    checked,
+                )  # fmt: skip
+                searches += 1
+                if slides:
+                    forget_friction(checked)
+            if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth:
+                converged = True
+                break
+            take_over(checked, touching)
+            continue
         increment = newton_step(band, residual, gradient, pull, active, compliance)
+        expect(touching, orientation, position, increment)
         for k in range(1, n + 1):
             for i in range(6):
                 change = increment[6 * (k - 1) + i]
@@ -177,12 +230,17 @@ def time_step(
     for k in range(1, n + 1):
         _orthonormalise(orientation[k], work)
         for i in range(6):
-            acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
+            if meets:
+                acceleration[k, i] = velocity_rate[k, i]
+            else:
+                acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
 
     if not _is_possible(orientation, position, new_strain, velocity, length):
         for k in range(n + 1):
             copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-        return False, iterations
+        return False, False
+    if obstacles > 0:
+        keep_friction(walls, orientation, touching, held)
     update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
     update_sliding(sliding, path_before, path, wound_before, wound, presliding)
     for c in range(m):
@@ -190,11 +248,71 @@ def time_step(
     for e in range(n):
         for i in range(6):
             strain[e, i] = new_strain[e, i]
-    return True, iterations
+    return True, converged
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(dt: float, velocity: np.ndarray, acceleration: np.ndarray, velocity_rate: np.ndarray) -> np.ndarray:
+def _move(
+    increment: np.ndarray,
+    start_orientation: np.ndarray,
+    start_position: np.ndarray,
+    orientation: np.ndarray,
+    position: np.ndarray,
+    turn: np.ndarray,
+    shift: np.ndarray,
+    work: np.ndarray,
+) -> None:
+    """Set the free cross-sections to their start, moved by increment (n + 1, 6); turn, shift and work are scratch."""
+    for k in range(1, increment.shape[0]):
+        motion_exp(increment[k], turn, shift)
+        copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
+        advance(orientation[k], position[k], turn, shift, work)
+
+
+@njit(cache=True, error_model="numpy")
+def _way(
+    dt: float,
+    velocity: np.ndarray,
+    start_orientation: np.ndarray,
+    start_position: np.ndarray,
+    orientation: np.ndarray,
+    position: np.ndarray,
+) -> float:
+    """Return how far (m) a cross-section moves in dt s: the fastest at its velocity, or the tip that turns with the base."""
+    fastest = 0.0
+    for k in range(velocity.shape[0]):
+        v = velocity[k]
+        fastest = max(fastest, v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    moved, n = 0.0, position.shape[0] - 1
+    for i in range(3):
+        tip = position[0, i] - start_position[n, i]
+        for j in range(3):
+            along = 0.0
+            for k in range(3):
+                along += start_orientation[0, k, j] * (start_position[n, k] - start_position[0, k])
+            tip += orientation[0, i, j] * along
+        moved += tip * tip
+    return dt * np.sqrt(fastest) + np.sqrt(moved)
+
+
+@njit(cache=True, error_model="numpy")
+def _restart(
+    gamma: float,
+    beta: float,
+    total_increment: np.ndarray,
+    velocity: np.ndarray,
+    velocity_rate: np.ndarray,
+) -> None:
+    """Put the sections back to where they were at the beginning of the step, with the velocities and rates that this implies."""
+    for k in range(1, velocity.shape[0]):
+        for i in range(6):
+            velocity[k, i] -= gamma * total_increment[k, i]
+            velocity_rate[k, i] -= beta * total_increment[k, i]
+            total_increment[k, i] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _predict_free(dt: float, velocity: np.ndarray, acceleration: np.ndarray, velocity_rate: np.ndarray) -> np.ndarray:
     """Return the first increment (n + 1, 6) of the cross-sections; set velocity, acceleration and rate to match."""
     total_increment = np.zeros(velocity.shape)
     for k in range(1, velocity.shape[0]):

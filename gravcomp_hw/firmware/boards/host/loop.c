@@ -1,0 +1,43 @@
+#include "loop.h"
+
+#include "../../core/memory.h"
+
+size_t gc_loop_size(void) { return sizeof(gc_standalone); }
+
+size_t gc_loop_settings(void) { return sizeof(gc_settings) / sizeof(float); }
+
+uint32_t gc_loop_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
+  (void)gc_standalone_load(loop, blob, size);
+  return (uint32_t)loop->refusal;
+}
+
+bool gc_loop_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const float *accel) {
+  const bool used = gc_gravity_take(&loop->gravity, stamp, gyro, accel, loop->down);
+  loop->has_gravity = loop->has_gravity || used;
+  return used;
+}
+
+bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval) {
+  if (gravity == NULL && !loop->has_gravity) {
+    return false;
+  }
+  return gc_standalone_follow(loop, gravity != NULL ? gravity : loop->down, interval);
+}
+
+void gc_loop_joystick(gc_standalone *loop, bool on, float x, float y) {
+  loop->joystick = on;
+  loop->stick[0] = x;
+  loop->stick[1] = y;
+}
+
+void gc_loop_read(const gc_standalone *loop, gc_loop_result *result) {
+  gc_zero(result, sizeof *result);
+  gc_copy(result->gravity, loop->down, sizeof result->gravity);
+  gc_copy(result->tip, loop->shape.tip, sizeof result->tip);
+  gc_copy(result->displacement, loop->controller.displacement, sizeof result->displacement);
+  gc_copy(result->tension, loop->controller.tension, sizeof result->tension);
+  result->left = loop->shape.left;
+  result->code = (uint32_t)loop->controller.code;
+  result->converged = loop->shape.converged ? 1u : 0u;
+  result->solver_steps = loop->controller.solver_steps;
+}

@@ -1,0 +1,103 @@
+#include "model.h"
+
+#include "../core/crc.h"
+
+#define GC_SETTINGS_FLOATS ((uint32_t)(sizeof(gc_settings) / sizeof(float)))
+#define GC_SECTION_ROWS 9u
+
+// Number of floats of all tables, without the numbers of the pieces' cables.
+static size_t float_count(uint32_t r, uint32_t k, uint32_t m, uint32_t s, uint32_t n) {
+  const size_t pairs = (size_t)r * (r + 1u) / 2u;
+  return pairs * (k + m) + (size_t)s * 3u * r + (3u + GC_SECTION_ROWS) * (size_t)r + GC_SECTION_ROWS + (size_t)s * 3u +
+         (size_t)n * 3u * (r + 1u) + (size_t)m * 6u + GC_SETTINGS_FLOATS;
+}
+
+size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces, uint32_t points) {
+  const size_t numbers = ((size_t)pieces + 3u) / 4u * 4u;
+  return sizeof(gc_model_header) + sizeof(float) * float_count(modes, strains, cables, pieces, points) + numbers;
+}
+
+static bool all_finite(const float *values, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    if (!(values[i] - values[i] == 0.0f)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static bool fits(const gc_model_header *h) {
+  return h->modes >= GC_TILE && h->modes <= GC_MODES_MAX && h->modes % GC_TILE == 0u && h->strains >= h->modes &&
+         h->strains <= GC_STRAINS_MAX && h->strains % GC_TILE == 0u && h->cables >= 1u && h->cables <= GC_CABLES_MAX &&
+         h->pieces >= 1u && h->pieces <= GC_PIECES_MAX && h->points <= GC_POINTS_MAX;
+}
+
+gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, const uint8_t *robot) {
+  if (size < sizeof(gc_model_header)) {
+    return GC_MODEL_CUT_OFF;
+  }
+  const gc_model_header *header = (const gc_model_header *)(const void *)blob;
+  if (header->magic != GC_MODEL_MAGIC) {
+    return GC_MODEL_FOREIGN;
+  }
+  if (header->version != GC_MODEL_VERSION || header->settings != GC_SETTINGS_FLOATS) {
+    return GC_MODEL_OTHER_VERSION;
+  }
+  if (!fits(header)) {
+    return GC_MODEL_TOO_BIG;
+  }
+  if (size < header->size) {
+    return GC_MODEL_CUT_OFF;
+  }
+  if (header->size != gc_model_bytes(header->modes, header->strains, header->cables, header->pieces, header->points)) {
+    return GC_MODEL_WRONG_SIZE;
+  }
+  const size_t before = offsetof(gc_model_header, robot);
+  if (gc_crc32(0u, blob + before, header->size - before) != header->crc) {
+    return GC_MODEL_WRONG_CRC;
+  }
+  for (uint32_t i = 0; robot != NULL && i < GC_ROBOT_BYTES; ++i) {
+    if (robot[i] != header->robot[i]) {
+      return GC_MODEL_OTHER_ROBOT;
+    }
+  }
+  const uint32_t r = header->modes, k = header->strains, m = header->cables, s = header->pieces;
+  const uint32_t n = header->points;
+  const float *next = (const float *)(const void *)(blob + sizeof(gc_model_header));
+  const size_t count = float_count(r, k, m, s, n);
+  if (!all_finite(next, count)) {
+    return GC_MODEL_NOT_FINITE;
+  }
+  const uint8_t *numbers = (const uint8_t *)(next + count);
+  for (uint32_t i = 0; i < s; ++i) {
+    if (numbers[i] >= m || (i > 0u && numbers[i] < numbers[i - 1u])) {
+      return GC_MODEL_WRONG_SIZE;
+    }
+  }
+  gc_model opened;
+  opened.modes = r, opened.strains = k, opened.cables = m, opened.pieces = s, opened.points = n;
+  opened.quadratic = next, next += (size_t)r * (r + 1u) / 2u * k;
+  opened.cable_stiffness = next, next += (size_t)r * (r + 1u) / 2u * m;
+  opened.piece_change = next, next += (size_t)s * 3u * r;
+  opened.weight = next, next += 3u * r;
+  opened.section_change = next, next += GC_SECTION_ROWS * r;
+  opened.section_rest = next, next += GC_SECTION_ROWS;
+  opened.piece_rest = next, next += (size_t)s * 3u;
+  opened.point_change = next, next += (size_t)n * 3u * r;
+  opened.point_rest = next, next += (size_t)n * 3u;
+  opened.rest_length = next, next += m;
+  opened.axial_compliance = next, next += m;
+  opened.friction = next, next += m;
+  opened.sheath_angle = next, next += m;
+  opened.free_length = next, next += m;
+  opened.least_tension = next, next += m;
+  opened.settings = (const gc_settings *)(const void *)next;
+  opened.piece_cable = numbers;
+  opened.robot = header->robot;
+  opened.slides = false;
+  for (uint32_t i = 0; i < m; ++i) {
+    opened.slides = opened.slides || opened.friction[i] != 0.0f;
+  }
+  *model = opened;
+  return GC_MODEL_OK;
+}

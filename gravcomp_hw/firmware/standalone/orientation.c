@@ -1,0 +1,323 @@
+#include "orientation.h"
+
+#include "../core/maths.h"
+#include "../core/memory.h"
+#include "trigonometry.h"
+
+#define GC_START_TILT_STD 0.0872664626f   // rad
+#define GC_START_YAW_STD 1.745329252e-3f  // rad
+#define GC_START_VELOCITY_STD 0.5f        // m/s
+#define GC_SATURATED_RATE_NOISE 2.0f      // rad/s/sqrt(Hz)
+#define GC_STUCK_RATE_NOISE 0.3f
+#define GC_UNKNOWN_ACCEL_NOISE 5.0f       // m/s^2/sqrt(Hz)
+#define GC_CONTRADICTION 0.5f             // m/s
+#define GC_CONTRADICTED_TILT 0.0349065850f  // rad
+#define GC_SURE_GYRO 1.5f
+#define GC_SURE_ACCEL 1.0f
+#define GC_MISSED_PERIODS 2.5f
+#define GC_GRAVITY_TIME 1.0f  // s
+#define GC_LARGEST_SCALE 0.1f
+
+typedef enum { NOT_RESTING, RESTING, CONTRADICTED } advance_result;
+
+static float squared(float x) { return x * x; }
+
+static float length_of(const float *v) { return gc_sqrt((v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]); }
+
+static float distance(const float *a, const float *b) {
+  return gc_sqrt((squared(a[0] - b[0]) + squared(a[1] - b[1])) + squared(a[2] - b[2]));
+}
+
+static void forget_suspects(gc_orientation *filter) {
+  gc_spike_gate_reset(&filter->gyro_gate);
+  gc_spike_gate_reset(&filter->accel_gate);
+  filter->suspecting = false;
+  filter->undecided_count = 0;
+}
+
+void gc_orientation_reset(gc_orientation *filter, const gc_settings *settings) {
+  gc_zero(filter, sizeof *filter);
+  filter->settings = settings;
+  filter->state.orientation.w = 1.0f;
+  filter->state.gravity_norm = settings->gravity;
+  filter->gyro_gate.floor = settings->spike_gyro;
+  filter->gyro_gate.sure = GC_SURE_GYRO;
+  filter->accel_gate.floor = settings->spike_accel;
+  filter->accel_gate.sure = GC_SURE_ACCEL;
+  gc_sample_check_reset(&filter->check);
+  gc_covariance_set_bias(&filter->state.errors, settings->bias_initial);
+  forget_suspects(filter);
+}
+
+// Start with the inclination from one specific force; yaw and bias continue where there was an orientation before.
+static void start(gc_orientation *filter, const float *gyro, const float *accel, float gap) {
+  gc_filter_state *state = &filter->state;
+  float(*p)[GC_ERRORS] = state->errors.matrix;
+  float yaw = 0.0f, yaw_variance = squared(GC_START_YAW_STD);
+  if (filter->started) {
+    yaw = gc_quaternion_yaw(state->orientation);
+    yaw_variance = p[2][2] + squared(distance(state->last_gyro, state->bias) * gap);
+  }
+  const float norm = length_of(accel), excess = norm / state->gravity_norm - 1.0f;
+  const float tilt_variance = squared(GC_START_TILT_STD) + squared(excess);
+  if (norm > 0.0f) {
+    state->orientation = gc_quaternion_level(accel, yaw);
+  }
+  for (uint32_t i = 0; i < GC_ERRORS; ++i) {
+    for (uint32_t k = 0; k < GC_ERRORS; ++k) {
+      const bool of_bias = i >= 3u && i < 6u && k >= 3u && k < 6u;
+      p[i][k] = of_bias ? p[i][k] + (i == k ? squared(filter->settings->bias_walk) * gap : 0.0f) : 0.0f;
+    }
+  }
+  p[0][0] = p[1][1] = tilt_variance;
+  p[2][2] = yaw_variance;
+  p[6][6] = p[7][7] = p[8][8] = squared(GC_START_VELOCITY_STD);
+  gc_zero(state->velocity, sizeof state->velocity);
+  filter->contradicted = false;
+  state->rest.started = false;
+  state->rest.still = state->rest.calm = 0u;
+  gc_copy(state->last_gyro, gyro, sizeof state->last_gyro);
+  state->period = 0.0f;
+  filter->started = true;
+}
+
+// Return the angle in rad between the mean specific force at rest and the vertical of the orientation.
+static float contradicted_tilt(const gc_filter_state *state) {
+  float up[3];
+  gc_quaternion_rotate(state->orientation, state->rest.mean_accel, up);
+  return gc_atan2(gc_sqrt(up[0] * up[0] + up[1] * up[1]), up[2]);
+}
+
+static void predict(gc_orientation *filter, const gc_filter_step *step) {
+  const gc_settings *s = filter->settings;
+  gc_filter_state *state = &filter->state;
+  const float dt = step->dt;
+  const float *usable = step->gyro_usable ? step->gyro : state->bias;
+  float rate[3], extra_tilt = 0.0f, extra_velocity = 0.0f;
+  gc_copy(rate, usable, sizeof rate);
+  if (state->period > 0.0f && dt > GC_MISSED_PERIODS * state->period) {
+    // The missing samples are replaced by the mean of the rates around them; its uncertainty is their difference.
+    for (uint32_t i = 0; i < 3u; ++i) {
+      rate[i] = 0.5f * (rate[i] + state->last_gyro[i]);
+    }
+    extra_tilt = squared(distance(rate, state->last_gyro) * dt);
+    extra_velocity = squared(GC_UNKNOWN_ACCEL_NOISE) * dt;
+  } else {
+    state->period = state->period > 0.0f ? state->period + 0.05f * (dt - state->period) : dt;
+  }
+  gc_copy(state->last_gyro, usable, sizeof state->last_gyro);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    rate[i] -= state->bias[i];
+  }
+  const float half = 0.5f * dt;
+  const gc_quaternion before = state->orientation;
+  const gc_quaternion middle =
+      gc_quaternion_product(before, gc_quaternion_exponential(rate[0] * half, rate[1] * half, rate[2] * half));
+  state->orientation = gc_quaternion_normalised(
+      gc_quaternion_product(before, gc_quaternion_exponential(rate[0] * dt, rate[1] * dt, rate[2] * dt)));
+  if (step->accel_usable) {
+    float force[3];
+    gc_quaternion_rotate(middle, step->accel, force);
+    state->velocity[0] += force[0] * dt;
+    state->velocity[1] += force[1] * dt;
+    state->velocity[2] += (force[2] - state->gravity_norm) * dt;
+  }
+  const float rate_squared = (rate[0] * rate[0] + rate[1] * rate[1]) + rate[2] * rate[2];
+  float tilt = (squared(s->gyro_noise) + squared(s->gyro_noise_per_rate) * rate_squared) * dt + extra_tilt;
+  if (!step->gyro_usable) {
+    tilt += squared(filter->contradicted ? GC_STUCK_RATE_NOISE : GC_SATURATED_RATE_NOISE) * dt;
+  }
+  const bool with_bias = s->bias_estimation > 0.0f;
+  const float walk = filter->temperature_stable ? s->bias_walk_stable : s->bias_walk;
+  const gc_step_noise noise = {
+      tilt,
+      with_bias ? squared(walk) * dt : 0.0f,
+      squared(step->accel_usable ? s->accel_noise : GC_UNKNOWN_ACCEL_NOISE) * dt + extra_velocity,
+  };
+  gc_covariance_predict(&state->errors, dt, middle, state->gravity_norm, noise, with_bias);
+}
+
+static void correct(gc_orientation *filter, float dt, bool measure_bias) {
+  const gc_settings *s = filter->settings;
+  gc_filter_state *state = &filter->state;
+  const float variance = squared(s->velocity_noise) / dt;
+  float error[GC_ERRORS];
+  if (measure_bias) {
+    float residual[3];
+    for (uint32_t i = 0; i < 3u; ++i) {
+      residual[i] = state->rest.mean_gyro[i] - state->bias[i];
+    }
+    gc_covariance_correct_at_rest(&state->errors, state->velocity, residual, variance, squared(s->rest_noise) / dt, error);
+  } else {
+    gc_covariance_correct_velocity(&state->errors, state->velocity, variance, state->orientation, error);
+  }
+  state->orientation = gc_quaternion_normalised(
+      gc_quaternion_product(gc_quaternion_exponential(error[0], error[1], error[2]), state->orientation));
+  for (uint32_t i = 0; i < 3u; ++i) {
+    state->bias[i] += error[3u + i];
+    state->velocity[i] += error[6u + i];
+  }
+}
+
+// Learn |a| at rest: if it were not g, the sensor would seem to accelerate along the vertical all the time.
+static void learn_gravity(gc_filter_state *state, const gc_settings *s, float dt) {
+  const float norm = length_of(state->rest.mean_accel);
+  const float previous = state->norm_at_rest > 0.0f ? state->norm_at_rest : norm;
+  state->norm_at_rest = previous + dt / (GC_GRAVITY_TIME + dt) * (norm - previous);
+  state->gravity_norm =
+      gc_clamp(state->norm_at_rest, (1.0f - GC_LARGEST_SCALE) * s->gravity, (1.0f + GC_LARGEST_SCALE) * s->gravity);
+}
+
+// Take a sample into the state.
+static advance_result advance(gc_orientation *filter, const gc_filter_step *step) {
+  const gc_settings *s = filter->settings;
+  gc_filter_state *state = &filter->state;
+  bool resting = false;
+  if (step->gyro_usable && step->accel_usable) {
+    float deviation[3];
+    for (uint32_t i = 0; i < 3u; ++i) {
+      deviation[i] = gc_sqrt(gc_max(0.0f, state->errors.matrix[3u + i][3u + i]));
+    }
+    resting = gc_rest_take(&state->rest, s, step->dt, step->gyro, step->accel, state->bias, deviation);
+    // Calm and not resting: where the inclination is wrong, the bias is wrong, too.
+    if (gc_rest_calm(&state->rest, s) && contradicted_tilt(state) > GC_CONTRADICTED_TILT) {
+      float mean[3];
+      gc_copy(mean, state->rest.mean_accel, sizeof mean);
+      gc_covariance_set_bias(&state->errors, s->bias_initial);
+      start(filter, step->gyro, mean, step->dt);
+      return CONTRADICTED;
+    }
+  } else {
+    state->rest.started = false;
+    state->rest.still = state->rest.calm = 0u;
+  }
+  predict(filter, step);
+  if (step->accel_usable) {
+    correct(filter, step->dt, resting && s->bias_estimation > 0.0f);
+  }
+  if (resting) {
+    learn_gravity(state, s, step->dt);
+  }
+  return resting ? RESTING : NOT_RESTING;
+}
+
+// Take a sensor's value through its gate; write what is decided into the undecided steps. Returns whether anything is.
+static bool gate(gc_orientation *filter, gc_spike_gate *of, gc_filter_step *step, bool accelerometer) {
+  float counted[GC_SUSPECTS_MAX][3];
+  const uint32_t count = gc_spike_gate_take(of, filter->settings, step->dt, accelerometer ? step->accel : step->gyro, counted);
+  for (uint32_t k = 0; k < count && k < filter->undecided_count; ++k) {
+    gc_filter_step *earlier = &filter->undecided[filter->undecided_count - 1u - k];
+    gc_copy(accelerometer ? earlier->accel : earlier->gyro, counted[count - 1u - k], sizeof(float[3]));
+  }
+  return count > 0u;
+}
+
+static uint32_t suspects(const gc_orientation *filter) {
+  const uint32_t gyro = filter->gyro_gate.suspects, accel = filter->accel_gate.suspects;
+  return gyro > accel ? gyro : accel;
+}
+
+// Repeat the steps of the suspects that the present sample decides; those that remain open are repeated as they stand.
+static void repeat(gc_orientation *filter, uint32_t suspects_before) {
+  const uint32_t now = suspects(filter), open = now > 0u ? now - 1u : 0u;
+  const uint32_t kept = open < suspects_before ? open : suspects_before, count = filter->undecided_count;
+  const uint32_t decided = count > kept ? count - kept : 0u;
+  filter->state = filter->before;
+  for (uint32_t k = 0; k < count; ++k) {
+    if (k == decided) {
+      filter->before = filter->state;
+    }
+    (void)advance(filter, &filter->undecided[k]);
+  }
+  if (decided == count) {
+    filter->before = filter->state;
+  }
+  for (uint32_t k = decided; k < count; ++k) {
+    filter->undecided[k - decided] = filter->undecided[k];
+  }
+  filter->undecided_count = count - decided;
+}
+
+// Remove spikes from a sample.
+static void without_spikes(gc_orientation *filter, gc_filter_step *step) {
+  const uint32_t before = suspects(filter);
+  bool decided = false;
+  if (step->gyro_usable) {
+    decided = gate(filter, &filter->gyro_gate, step, false);
+  } else {
+    gc_spike_gate_reset(&filter->gyro_gate);
+  }
+  if (step->accel_usable) {
+    decided = gate(filter, &filter->accel_gate, step, true) || decided;
+  } else {
+    gc_spike_gate_reset(&filter->accel_gate);
+  }
+  if (decided && filter->suspecting) {
+    repeat(filter, before);
+  }
+  if (suspects(filter) == 0u) {
+    filter->suspecting = false;
+    filter->undecided_count = 0;
+  } else if (!filter->suspecting) {
+    filter->suspecting = true;
+    filter->before = filter->state;
+  }
+}
+
+static void estimate_of(const gc_orientation *filter, const float *gyro, bool rest, gc_problem problem,
+                        gc_orientation_estimate *estimate) {
+  const gc_filter_state *state = &filter->state;
+  const float delay = filter->settings->delay;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    estimate->rate[i] = gyro[i] - state->bias[i];
+  }
+  estimate->orientation = gc_quaternion_normalised(
+      gc_quaternion_product(state->orientation, gc_quaternion_exponential(estimate->rate[0] * delay, estimate->rate[1] * delay,
+                                                                          estimate->rate[2] * delay)));
+  estimate->rest = rest;
+  estimate->problem = problem;
+}
+
+// Set which sensors of a sample can be used: repeated values can, unless they contradict each other.
+static void set_usable(gc_orientation *filter, const gc_verdict *verdict, gc_filter_step *step) {
+  const bool stuck = verdict->gyro_stuck || verdict->accel_stuck;
+  filter->contradicted = stuck && (filter->contradicted || length_of(filter->state.velocity) > GC_CONTRADICTION);
+  step->gyro_usable = !verdict->gyro_saturated && !(verdict->gyro_stuck && filter->contradicted);
+  step->accel_usable = !verdict->accel_saturated && !(verdict->accel_stuck && filter->contradicted);
+}
+
+bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyro, const float *accel,
+                         gc_orientation_estimate *estimate) {
+  const gc_verdict verdict = gc_sample_check_take(&filter->check, filter->settings, stamp, gyro, accel);
+  estimate->problem = verdict.problem;
+  if (gc_problem_rejects(verdict.problem)) {
+    return false;
+  }
+  if (!filter->started || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
+    start(filter, gyro, accel, verdict.dt);
+    forget_suspects(filter);
+    estimate_of(filter, gyro, false, verdict.problem, estimate);
+    return true;
+  }
+  gc_filter_step step;
+  step.dt = verdict.dt;
+  gc_copy(step.gyro, gyro, sizeof step.gyro);
+  gc_copy(step.accel, accel, sizeof step.accel);
+  set_usable(filter, &verdict, &step);
+  without_spikes(filter, &step);
+  const advance_result result = advance(filter, &step);
+  if (result == CONTRADICTED) {
+    forget_suspects(filter);
+    estimate_of(filter, step.gyro, false, GC_PROBLEM_CONTRADICTED, estimate);
+    return true;
+  }
+  if (filter->suspecting) {
+    if (filter->undecided_count == GC_UNDECIDED_MAX) {
+      forget_suspects(filter);  // the gates decide long before
+    } else {
+      filter->undecided[filter->undecided_count++] = step;
+    }
+  }
+  estimate_of(filter, step.gyro_usable ? step.gyro : filter->state.bias, result == RESTING, verdict.problem, estimate);
+  return true;
+}

@@ -1,0 +1,119 @@
+#include "standalone.h"
+
+#include "../core/maths.h"
+#include "../core/memory.h"
+#include "../core/heater.h"
+
+#define GC_STANDARD_GRAVITY 9.80665f
+#define GC_COUNTS 32767.0f
+#define GC_DEGREE 0.0174532925f
+
+static const float COUNTS_PER_G[4] = {10920.0f, 5460.0f, 2730.0f, 1365.0f};              // of the ranges 3, 6, 12, 24 g
+static const float FULL_RATE[5] = {2000.0f, 1000.0f, 500.0f, 250.0f, 125.0f};            // deg/s
+
+bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
+  gc_model model;
+  loop->refusal = gc_model_open(&model, blob, size, loop->loaded ? loop->model.robot : NULL);
+  if (loop->refusal != GC_MODEL_OK) {
+    return false;
+  }
+  gc_zero(loop, sizeof *loop);
+  loop->model = model;
+  loop->loaded = true;
+  loop->target = gc_target_stored(model.settings);
+  gc_gravity_reset(&loop->gravity, model.settings);
+  gc_equilibrium_reset(&loop->equilibrium, &loop->model);
+  float zero[GC_CABLES_MAX];  // homing leaves the cables where the straight robot has them
+  gc_zero(zero, sizeof zero);
+  gc_inverse_reset(&loop->controller, &loop->model, zero);
+  return true;
+}
+
+// Convert a sample's counts: gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false for ranges that the chip does not have.
+static bool converted(const gc_sample *sample, float *gyro, float *accel) {
+  if (sample->force_range >= 4u || sample->rate_range >= 5u) {
+    return false;
+  }
+  const float force = GC_STANDARD_GRAVITY / COUNTS_PER_G[sample->force_range];
+  const float rate = FULL_RATE[sample->rate_range] * (GC_DEGREE / GC_COUNTS);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    gyro[i] = rate * (float)sample->rate[i];
+    accel[i] = force * (float)sample->force[i];
+  }
+  return true;
+}
+
+// Return the time in s since the last sample, and follow its stamp, which wraps.
+static float elapsed(gc_standalone *loop, uint32_t time) {
+  const int32_t step = loop->has_sample ? (int32_t)(time - loop->time) : 0;
+  const float period = loop->model.settings->period;
+  const float interval = loop->has_sample && step > 0 ? (float)step * 1e-6f : period;
+  loop->time = time;
+  loop->stamp += step;
+  loop->has_sample = true;
+  return interval;
+}
+
+// Estimate gravity from a sample. Returns whether it is known.
+static bool weigh(gc_standalone *loop, const gc_sample *sample) {
+  float gyro[3], accel[3];
+  if (sample->temperature != GC_NO_READING) {
+    gc_gravity_temperature(&loop->gravity, loop->stamp, 23.0f + 0.125f * (float)sample->temperature);
+  }
+  if (converted(sample, gyro, accel) && gc_gravity_take(&loop->gravity, loop->stamp, gyro, accel, loop->down)) {
+    loop->has_gravity = true;
+  }
+  return loop->has_gravity;
+}
+
+// Write the command by motors. Returns false where a cable's motor is missing.
+static bool by_motors(const gc_standalone *loop, uint8_t motors, float *displacement, float *tension) {
+  for (uint32_t i = 0; i < loop->model.cables; ++i) {
+    const uint32_t number = (uint32_t)gc_clamp(loop->model.settings->cable_motor[i], 0.0f, 8.0f);
+    if (number == 0u || (motors & (1u << (number - 1u))) == 0u) {
+      return false;
+    }
+    displacement[number - 1u] = loop->controller.displacement[i];
+    tension[number - 1u] = loop->controller.tension[i];
+  }
+  return true;
+}
+
+bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval) {
+  gc_equilibrium_step(&loop->equilibrium, gravity, loop->controller.displacement, &loop->shape);
+  if (!loop->shape.loaded) {
+    return false;
+  }
+  loop->target = loop->joystick ? gc_target_joystick(loop->model.settings, loop->stick[0], loop->stick[1])
+                                : gc_target_stored(loop->model.settings);
+  gc_inverse_step(&loop->controller, &loop->shape, &loop->target, interval);
+  return true;
+}
+
+bool gc_standalone_step(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
+  gc_standalone *loop = (gc_standalone *)context;
+  if (!loop->loaded) {
+    return false;
+  }
+  const float interval = elapsed(loop, sample->time);
+  return weigh(loop, sample) && gc_standalone_follow(loop, loop->down, interval) &&
+         by_motors(loop, motors, displacement, tension);
+}
+
+bool gc_standalone_receive(void *context, const gc_frame *frame, gc_frame *reply) {
+  gc_standalone *loop = (gc_standalone *)context;
+  if (frame->id != GC_ID_JOYSTICK || !gc_frame_is_whole(frame, 8u) || frame->data[4] > 1u) {
+    return false;
+  }
+  loop->stick[0] = (float)(int16_t)gc_get16(&frame->data[0]) / GC_COUNTS;
+  loop->stick[1] = (float)(int16_t)gc_get16(&frame->data[2]) / GC_COUNTS;
+  loop->joystick = frame->data[4] == 1u;
+  *reply = gc_frame_of(GC_ID_LOOP_STATUS, 8u);
+  reply->data[0] = (uint8_t)loop->controller.code;
+  reply->data[1] = (uint8_t)loop->refusal;
+  reply->data[2] = (uint8_t)loop->model.modes;
+  reply->data[3] = (uint8_t)loop->controller.solver_steps;
+  gc_put16(&reply->data[4], (uint16_t)gc_clamp(1e6f * loop->shape.left, 0.0f, 65535.0f));
+  gc_frame_seal(reply);
+  return true;
+}

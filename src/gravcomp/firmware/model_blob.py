@@ -1,0 +1,123 @@
+"""A reduced model as the blob that the board reads in place from flash (gravcomp_hw/firmware/standalone/model.h)."""
+
+import dataclasses
+import struct
+import zlib
+
+import numpy as np
+
+from gravcomp.cache import content_key
+from gravcomp.description import Robot
+from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.strain_polynomials import StrainPolynomials
+
+MAGIC, VERSION = b"GCMB", 1
+TILE = 4
+SETTINGS = 74  # floats of gc_settings
+MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX = 48, 96, 192, 64
+_HEADER = struct.Struct("<4sIII16s8I")
+_IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis
+
+
+def robot_digest(robot: Robot) -> bytes:
+    """Return 16 bytes that say which robot a blob belongs to: its description, whatever the basis of the reduced model."""
+    return bytes.fromhex(content_key(robot))
+
+
+def truncated(model: ReducedModel, modes: int, extra: int) -> ReducedModel:
+    """Return the model on its first modes, a multiple of four, with the strains of these and the first `extra` principal ones."""
+    r, m = model.elasticity.linear.shape
+    strains = np.r_[0:modes, r : min(m, r + extra)]
+    pairs = modes * (modes + 1) // 2
+    elasticity = StrainPolynomials(
+        np.ascontiguousarray(model.elasticity.linear[:modes, strains]),
+        np.ascontiguousarray(model.elasticity.quadratic[:pairs, strains]),
+    )
+    return dataclasses.replace(
+        model,
+        basis=model.basis[:, :modes],
+        coordinates_of=model.coordinates_of[:modes],
+        force_norm=np.ascontiguousarray(model.force_norm[:modes, :modes]),
+        elasticity=elasticity,
+        deviation=model.deviation._replace(gradient=np.ascontiguousarray(model.deviation.gradient[:modes])),
+        weight=model.weight[:modes],
+        cables=model.cables._replace(change=np.ascontiguousarray(model.cables.change[:, :modes])),
+        section_change=np.ascontiguousarray(model.section_change[..., :modes]),
+    )
+
+
+def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension: np.ndarray) -> bytes:
+    """Return the blob.
+
+    model: with a multiple of four modes; settings (n,): of `model_settings.settings`; least_tension (m,) in N. Raises
+    ValueError for a model that the blob cannot hold; `model_fit` finds that out before.
+    """
+    modes, cables = model.size, model.cables
+    linear, quadratic = model.elasticity.linear, model.elasticity.quadratic
+    if modes % TILE or np.abs(linear[:, :modes] - np.eye(modes)).max() > _IDENTITY:
+        raise ValueError(f"a basis of {modes} modes whose linear strains are not the coordinates; a multiple of {TILE} is needed")
+    missing = -linear.shape[1] % TILE
+    tables = (
+        _by_tiles(np.pad(quadratic, ((0, 0), (0, missing))), modes),
+        _cable_stiffness(model)[:, _tile_order(modes)].T,
+        cables.change,
+        model.weight.T,
+        model.section_change[-1].reshape(9, modes),
+        model.section_rest[-1],
+        cables.rest,
+        model.section_change[:-1, 0],
+        model.section_rest[:-1, 0],
+        cables.rest_length,
+        cables.axial_compliance,
+        cables.friction,
+        cables.sheath_angle,
+        cables.free_length,
+        least_tension,
+        settings,
+    )
+    count = len(cables.cable)
+    body = b"".join(np.ascontiguousarray(table, dtype="<f4").tobytes() for table in tables)
+    body += cables.cable.astype("u1").tobytes() + bytes(-count % 4)
+    points = len(model.section_rest) - 1
+    counts = (modes, linear.shape[1] + missing, len(cables.rest_length), count, len(settings), points, 0, 0)
+    header = _HEADER.pack(MAGIC, VERSION, _HEADER.size + len(body), 0, robot_digest(robot), *counts)
+    return with_crc(header + body)
+
+
+def with_crc(blob: bytes) -> bytes:
+    """Return the blob with the CRC of its content."""
+    return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
+
+
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int) -> int:
+    """Return the number of bytes of a blob with these counts."""
+    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
+    floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
+    return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
+
+
+def _cable_stiffness(model: ReducedModel) -> np.ndarray:
+    """Return the stiffness (m, r (r + 1) / 2) of each cable under unit tension at rest, without the part along its pieces."""
+    cables, modes = model.cables, model.size
+    change = cables.change.reshape(-1, 3, modes) / np.sqrt(np.linalg.norm(cables.rest, axis=1))[:, None, None]
+    whole = np.zeros((len(cables.rest_length), modes, modes))
+    for i in range(len(whole)):
+        rows = change[cables.cable == i].reshape(-1, modes)
+        whole[i] = rows.T @ rows
+    return whole[(slice(None), *np.tril_indices(modes))]
+
+
+def _by_tiles(quadratic: np.ndarray, modes: int) -> np.ndarray:
+    """Return B^T (r (r + 1) / 2, k), its rows in the order of the tiles, by blocks of four strains."""
+    order = _tile_order(modes)
+    return quadratic[order].reshape(len(order), -1, TILE).transpose(1, 0, 2)
+
+
+def _tile_order(modes: int) -> list[int]:
+    """Return the positions, row by row in a lower triangle, of the entries in the order of the tiles."""
+    order = []
+    for first in range(0, modes, TILE):
+        rows = range(first, first + TILE)
+        order += [i * (i + 1) // 2 + j for j in range(first) for i in rows]
+        order += [i * (i + 1) // 2 + j for i in rows for j in range(first, i + 1)]
+    return order

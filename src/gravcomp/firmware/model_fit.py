@@ -1,0 +1,160 @@
+"""Which basis of a reduced model the board has room and time for, what it costs, and the error of a smaller one."""
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from gravcomp.cables.friction import Sliding
+from gravcomp.config import ConfigError
+from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
+from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, POINTS_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
+from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.store import Reduction, load, why_not
+from gravcomp.reduction.tracking import ReducedTracker
+
+SLOT_BYTES = 384 * 1024
+"""Room for a blob in the flash of the STM32F407 (boards/stm32f407/image.ld)."""
+
+CLOCK_HZ = 168e6
+LONGEST_MS = 7.0
+"""For a step, of the 10 ms between two samples; the rest is for interrupts, and for what the estimate may lack."""
+
+_EXTRA = (36, 16, 8, 4, 0)
+"""Principal strains beside those of the modes, in the order in which they are tried."""
+
+# Cycles of the Cortex-M4 for one multiply-add of each part, with its loads and the wait states of the flash; measured on the
+# emulated image (`bench board`).
+_CYCLES = {"elasticity": 4.1, "cables": 8.4, "factor": 9.7, "answers": 6.1, "tension": 14.5}
+_REST_CYCLES = 215_000  # inverse problem, filter, tip, compliance: hardly depend on the basis
+
+
+@dataclasses.dataclass(frozen=True)
+class Fit:
+    """A basis that fits: its model, bytes of the blob, multiply-adds of a step, estimated ms, and error in m.
+
+    error: worst distance of the tip from that of the whole reduced model in the closed loop; reduction_error: of that from the
+    full model, where it was built.
+    """
+
+    model: ReducedModel
+    blob: bytes
+    strains: int
+    multiply_adds: int
+    milliseconds: float
+    error: float
+    reduction_error: float
+
+
+def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joystick_bend: float = np.pi / 3) -> Fit:
+    """Return the basis with the smallest error that the board has room and time for, as a blob.
+
+    joystick_bend: rad at full deflection of the joystick. Raises ConfigError, with the number, for a robot that does not fit.
+    """
+    whole = reduction.reduced_model(model)
+    _check(model, whole, parameters)
+    run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200))
+    best: tuple[float, ReducedModel] | None = None
+    for smaller in _candidates(whole):
+        error = _error(smaller, model, run)
+        if best is None or error < best[0]:
+            best = error, smaller
+    if best is None:
+        raise ConfigError(_too_big(whole, parameters))
+    error, chosen = best
+    values = settings(parameters, chosen.reach, joystick_bend)
+    blob = pack(chosen, model.robot, values, least_tensions(parameters))
+    adds, milliseconds = cost(chosen)
+    return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
+
+
+def blob_for(parameters: LoopParameters) -> bytes:
+    """Return the blob of a robot. Raises ConfigError where it does not fit, or its reduced model is not built."""
+    model = RobotModel(parameters.robot)
+    reduction = load(model)
+    if reduction is None:
+        reason = why_not(model) or "it is not built: run ./gravcomp model build"
+        raise ConfigError(f"{parameters.source}: there is no reduced model for the board: {reason}")
+    return fit(model, reduction, parameters).blob
+
+
+def cost(model: ReducedModel) -> tuple[int, float]:
+    """Return the multiply-adds of a step and its estimated time in ms at 168 MHz."""
+    r, k = model.elasticity.linear.shape
+    m, s, pairs = len(model.cables.rest_length), len(model.cables.cable), r * (r + 1) // 2
+    parts = {
+        "elasticity": 4 * pairs * k,  # J = a + B q and K = J^T J + sum eps B
+        "cables": 6 * s * r,
+        "factor": r**3 // 6,
+        "answers": r * r * -(-(m + 4) // 4) * 4,
+        "tension": pairs * m,
+    }
+    cycles = sum(_CYCLES[name] * count for name, count in parts.items()) + _REST_CYCLES
+    return sum(parts.values()), 1e3 * cycles / CLOCK_HZ
+
+
+def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -> None:
+    """Raise ConfigError for a robot that the loop on the board does not model, whatever the basis."""
+    source, points, cables = parameters.source, len(whole.deviation.weight), len(whole.cables.rest_length)
+    if points:
+        adds = 9 * points * whole.size * (whole.size + 3)
+        raise ConfigError(
+            f"{source}: the material's law needs {points} points of the body and {1e-6 * adds:.2f} million multiply-adds a step,"
+            f" {1e3 * adds * _CYCLES['elasticity'] / CLOCK_HZ:.0f} ms of {LONGEST_MS:g} ms; the loop on the board has the law svk"
+        )
+    if any(material.branches for material in model.mesh.materials):
+        raise ConfigError(f"{source}: a material creeps; the loop on the board has no memory of the material")
+    if cables > min(CABLES_MAX, 8):
+        raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
+    if len(whole.section_rest) - 1 > POINTS_MAX:
+        raise ConfigError(
+            f"{source}: has {len(whole.section_rest) - 1} points of the backbone; the firmware has room for {POINTS_MAX}"
+        )
+    if len(whole.cables.cable) > PIECES_MAX:
+        raise ConfigError(f"{source}: its cables have {len(whole.cables.cable)} pieces; the firmware has room for {PIECES_MAX}")
+
+
+def _candidates(whole: ReducedModel) -> Iterator[ReducedModel]:
+    """Yield the bases with most strains of every size that fits."""
+    for modes in range(min(whole.size, MODES_MAX) // TILE * TILE, 0, -TILE):
+        for extra in _EXTRA:
+            smaller = truncated(whole, modes, extra)
+            if fits(smaller):
+                yield smaller
+                break
+
+
+def fits(model: ReducedModel) -> bool:
+    """Return whether the board has room and time for a model."""
+    strains = model.elasticity.linear.shape[1]
+    return strains <= STRAINS_MAX and _bytes(model) <= SLOT_BYTES and cost(model)[1] <= LONGEST_MS
+
+
+def _bytes(model: ReducedModel) -> int:
+    r, k = model.elasticity.linear.shape
+    return blob_bytes(r, k + -k % TILE, len(model.cables.rest_length), len(model.cables.cable), len(model.section_rest) - 1)
+
+
+def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:
+    """Return the worst distance in m of the tip from the run's with the same gravity and commands, infinite where it is lost."""
+    tracker, count = ReducedTracker(smaller, model.length), len(model.robot.cables)
+    tracker.place(np.zeros(smaller.size), np.zeros(count), Sliding.none(count))
+    worst = 0.0
+    for gravity, wound, tip in zip(run.gravity, run.wound, run.tip):
+        state = tracker.track(gravity, CableInput(wound=wound), iterations=10)
+        if not state.converged:
+            return np.inf
+        worst = max(worst, float(np.linalg.norm(smaller.tip(state.q) - tip)))
+    return worst
+
+
+def _too_big(whole: ReducedModel, parameters: LoopParameters) -> str:
+    """Return why not even the smallest basis fits."""
+    smallest = truncated(whole, TILE, 0)
+    return (
+        f"{parameters.source}: no basis fits: {TILE} modes take {_bytes(smallest) / 1024:.0f} of {SLOT_BYTES // 1024} KB"
+        f" and {cost(smallest)[1]:.1f} of {LONGEST_MS:g} ms"
+    )

@@ -1,0 +1,103 @@
+"""Settings of the standalone loop from a robot file, in the order of gravcomp_hw/firmware/standalone/settings.h."""
+
+import dataclasses
+
+import numpy as np
+
+from gravcomp.config import ConfigError, from_mapping
+from gravcomp.description import Robot, RobotFile
+from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
+from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
+from gravcomp.inverse.target import Target, direction_weight, straight_target
+from gravcomp.orientation import quaternion as quat
+
+SAMPLE_PERIOD = 0.01  # s, of the board's IMU
+CABLES_MAX = 9
+"""Room for cables in the firmware (GC_CABLES_MAX)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopParameters:
+    """What the loop takes from a robot file: `source` is its path."""
+
+    source: str
+    robot: Robot
+    estimator: ImuEstimatorParameters
+    controller: InverseControllerParameters
+    hardware: Hardware
+
+    @classmethod
+    def of(cls, file: RobotFile) -> "LoopParameters":
+        """Return the parameters of a robot file. Raises ConfigError."""
+
+        def section(kind: type, name: str) -> object:
+            return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
+
+        estimator, controller = (
+            section(ImuEstimatorParameters, "imu_estimator"),
+            section(InverseControllerParameters, "inverse_controller"),
+        )
+        assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
+        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        return cls(file.source, file.robot, estimator, controller, hardware)
+
+    @property
+    def straight(self) -> Target:
+        """The straight robot with the controller's weights, which the board keeps until another target arrives."""
+        length = self.robot.length
+        weight = direction_weight(length, self.controller.tip_direction_weight)
+        return straight_target(length, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight)
+
+
+def least_tensions(parameters: LoopParameters) -> np.ndarray:
+    """Return the lower bounds (m,) of the tensions in N, as the inverse controller's."""
+    robot, option = parameters.robot, parameters.controller.inverse.pretension
+    own = [option if cable.pretension is None else cable.pretension for cable in robot.cables]
+    return np.minimum(np.maximum(own, robot.limits.tension_min), robot.limits.tension_max)
+
+
+def motor_numbers(parameters: LoopParameters) -> list[int]:
+    """Return the number, 1 to 8, of each cable's motor on the board's bus. Raises ConfigError for motors that are shared."""
+    hardware = parameters.hardware
+    if not hardware.transmission.direct:
+        raise ConfigError(
+            f"{parameters.source}: motors move several cables, or cables several motors;"
+            " the loop on the board needs one motor for each cable"
+        )
+    numbers = {cable: motor.can_id for motor in hardware.motors for cable in motor.ratios}
+    return [numbers[name] for name in parameters.robot.cable_names]
+
+
+def settings(parameters: LoopParameters, reach: float, joystick_bend: float, target: Target | None = None) -> np.ndarray:
+    """Return the floats (n,) of gc_settings.
+
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; target: that is stored, default: the straight
+    robot. Raises ConfigError for a target that the board cannot keep.
+    """
+    robot, wanted = parameters.robot, target or parameters.straight
+    if wanted.backbone_station.size:
+        raise ConfigError("the target has points of the backbone; the board keeps position and direction of the tip only")
+    options, orientation = parameters.controller.inverse, parameters.estimator.filter
+    calibration, prediction = parameters.estimator.calibration, parameters.estimator.prediction
+    numbers = motor_numbers(parameters)
+    limits, rest, sensor, spikes = robot.limits, orientation.rest, orientation.sensor, orientation.spikes
+    values: list[float] = [
+        robot.length, reach, SAMPLE_PERIOD,
+        limits.tension_max, limits.tension_rate, limits.displacement_min, limits.displacement_max, limits.displacement_rate,
+        options.axial_weight, options.energy_weight, options.proximal_weight, options.slack_of(robot.length),
+        options.tolerance_of(robot.length),
+        options.tilt_tolerance,
+        *wanted.tip_position, *wanted.direction_or_zeros, wanted.tip_position_weight, wanted.tip_direction_weight, joystick_bend,
+        *quat.normalised(quat.from_roll_pitch_yaw(*robot.imu_mount.rpy)),
+        *calibration.accel_scale, *calibration.accel_offset, *calibration.gyro_offset,
+        prediction.horizon, prediction.trend_time, prediction.longest_trend,
+        orientation.gravity, orientation.gyro_noise, orientation.gyro_noise_per_rate, orientation.accel_noise,
+        orientation.bias_walk, orientation.bias_walk_stable, orientation.bias_initial, orientation.velocity_noise,
+        orientation.rest_noise, float(orientation.bias_estimation),
+        rest.time_constant, rest.gyro_deviation, rest.accel_deviation, rest.accel_drift, rest.minimum_time, rest.largest_bias,
+        sensor.gyro_range, sensor.accel_range, sensor.delay, sensor.stuck_time, sensor.largest_gap,
+        spikes.gyro, spikes.accel, spikes.ratio, spikes.time_constant, float(spikes.longest),
+        *numbers, *[0] * (CABLES_MAX - len(numbers)),
+    ]  # fmt: skip
+    return np.array(values, dtype="<f4")

@@ -1,0 +1,182 @@
+"""The loop on the board: its C code against the host's loop, in the image bit for bit, and models that it refuses."""
+
+import ctypes
+import dataclasses
+import os
+import struct
+
+import numpy as np
+import pytest
+
+from gravcomp.config import ConfigError
+from gravcomp.description import Elements, PronyTerm, load_robot_file
+from gravcomp.firmware import model_blob
+from gravcomp.firmware.cycles import MEMORY_AT, MODEL_AT, Processor, sample_bytes
+from gravcomp.firmware.host_library import load as library
+from gravcomp.firmware.image import build_image
+from gravcomp.firmware.loop_on_host import LOADING_STEPS, run_on_host, turning_gravity
+from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit
+from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, settings
+from gravcomp.firmware.standalone_loop import StandaloneLoop
+from gravcomp.orientation import GravityEstimator
+from gravcomp.orientation import quaternion as quat
+from gravcomp.reduction import load
+from gravcomp.simulation import RobotModel
+from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training.build import alone
+
+# That of test_reduction, which shares its cache.
+SMALL = BuildOptions(
+    modes=30,
+    strains=24,
+    training=TrainingOptions(paths=24, steps=12, bend=0.3),
+    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
+)
+STEPS = 120
+
+
+@pytest.fixture(scope="module")
+def parameters():
+    file = load_robot_file("article")
+    return LoopParameters.of(
+        dataclasses.replace(file, robot=dataclasses.replace(file.robot, elements=Elements(around=4, along=4)))
+    )
+
+
+@pytest.fixture(scope="module")
+def built(parameters, tmp_path_factory):
+    """A coarse model and its reduction, in a cache of this run."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GRAVCOMP_CACHE", str(folder))
+        model = RobotModel(parameters.robot)
+        with alone(model):
+            yield model, load(model) or build(model, SMALL)[0]
+
+
+@pytest.fixture(scope="module")
+def found(parameters, built):
+    return fit(*built, parameters)
+
+
+def started(blob: bytes, gravity: np.ndarray) -> StandaloneLoop:
+    loop = StandaloneLoop(blob)
+    for _ in range(LOADING_STEPS - 1):
+        assert not loop.follow(SAMPLE_PERIOD, gravity)
+    return loop
+
+
+def test_the_loop_in_float32_follows_that_of_the_host(parameters, built, found):
+    assert found.milliseconds <= LONGEST_MS and len(found.blob) <= SLOT_BYTES and found.error < 0.05e-3
+    path = turning_gravity(np.radians(90.0), 0, 0)[:STEPS]  # from the hanging robot
+    host = run_on_host(built[0], parameters, path)
+    loop = started(found.blob, path[0])
+    for step, gravity in enumerate(path):
+        assert loop.follow(SAMPLE_PERIOD, gravity)
+        result = loop.read()
+        assert result.converged
+        if step > 20:  # both have settled; the host may use the full model
+            assert np.linalg.norm(result.tip - host.tip[step]) < 0.15e-3
+            np.testing.assert_allclose(result.displacement, host.command[step], atol=0.15e-3)
+    assert result.code == 1
+
+
+def test_the_joystick_bends_the_robot_toward_it(parameters, found):
+    loop = started(found.blob, np.array([0.0, 0.0, -9.81]))
+    loop.steer(0.2, 0.0)
+    for _ in range(150):
+        loop.follow(SAMPLE_PERIOD, (0.0, 0.0, -9.81))
+    tip = loop.read().tip
+    bend = 0.2 * np.pi / 3
+    assert tip[0] == pytest.approx(parameters.robot.length * (1.0 - np.cos(bend)) / bend, abs=1e-3)
+    assert abs(tip[1]) < 0.5e-3
+
+
+def test_a_lost_equilibrium_holds_the_robot_at_its_last_one(found):
+    loop = started(found.blob, np.array([0.0, 0.0, -9.81]))
+    for _ in range(60):
+        loop.follow(SAMPLE_PERIOD, (0.0, 0.0, -9.81))
+    before = loop.read()
+    loop.follow(SAMPLE_PERIOD, (-900.0, 0.0, 0.0))
+    after = loop.read()
+    assert not after.converged
+    np.testing.assert_array_equal(after.tip, before.tip)
+    np.testing.assert_allclose(after.displacement, before.displacement, atol=1e-5)
+    for _ in range(100):
+        loop.follow(SAMPLE_PERIOD, (0.0, 0.0, -9.81))
+    assert loop.read().converged and np.all(np.isfinite(loop.read().displacement))
+
+
+def changed(blob: bytes, at: int, value: int) -> bytes:
+    return model_blob.with_crc(blob[:at] + struct.pack("<I", value) + blob[at + 4 :])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda b: b[:40], "cut off"),
+        (lambda b: b[:-8], "cut off"),
+        (lambda b: b"GCMX" + b[4:], "no blob"),
+        (lambda b: changed(b, 4, 2), "another version"),
+        (lambda b: changed(b, 32, 52), "more modes"),
+        (lambda b: changed(b, 40, CABLES_MAX + 1), "more modes"),
+        (lambda b: changed(b, 8, len(b) - 4), "size"),
+        (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
+        (lambda b: changed(b, 16, 0), "another robot"),
+        (lambda b: changed(b, 80, 0x7FC00000), "not finite"),
+    ],
+)
+def test_a_spoilt_model_is_refused_and_the_old_one_goes_on(found, spoil, reason):
+    gravity = np.array([-4.0, 0.0, -8.9])
+    loop, untouched = started(found.blob, gravity), started(found.blob, gravity)
+    assert reason in loop.load(spoil(found.blob))
+    for each in (loop, untouched):
+        each.follow(SAMPLE_PERIOD, gravity)
+    np.testing.assert_array_equal(loop.read().displacement, untouched.read().displacement)
+
+
+def test_the_settings_have_the_length_that_the_firmware_reads(parameters):
+    library().gc_loop_settings.restype = ctypes.c_size_t
+    assert len(settings(parameters, 1.0, 1.0)) == model_blob.SETTINGS == library().gc_loop_settings()
+
+
+def test_a_robot_that_creeps_is_refused(parameters, built):
+    creeping = parameters.robot.with_material(prony=(PronyTerm(share=0.1, time=1.0),))
+    with pytest.raises(ConfigError, match="creeps"):
+        fit(RobotModel(creeping), built[1], dataclasses.replace(parameters, robot=creeping))
+
+
+def test_the_estimator_in_float32_follows_that_of_the_host(parameters, found):
+    rng = np.random.default_rng(0)
+    host = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))
+    loop, orientation, worst = StandaloneLoop(found.blob), quat.IDENTITY, 0.0
+    for k in range(1500):
+        rate = np.zeros(3) if k < 500 else np.array([1.0, -0.5, 0.3]) * np.sin(0.01 * k)
+        orientation = quat.normalised(quat.multiply(orientation, quat.exponential(*(0.01 * rate))))
+        accel = np.array(quat.rotate(quat.conjugate(orientation), (0.0, 0.0, 9.81))) + rng.normal(0.0, 0.02, 3)
+        gyro = rate + 0.01 + rng.normal(0.0, 1e-3, 3)
+        if k % 217 == 100:
+            gyro[0] += 20.0  # a spike
+        if k in (700, 701):
+            continue  # samples are lost
+        estimate = host.update(k * 10_000_000, gyro.tolist(), accel.tolist())
+        assert loop.weigh(k * 10_000, gyro, accel)
+        worst = max(worst, float(np.linalg.norm(np.subtract(loop.gravity, estimate.gravity))))
+    assert np.degrees(worst / 9.81) < 0.05
+
+
+def test_the_image_computes_the_same_bits_as_the_host(found):
+    """The inner loops are written in the processor's instructions there."""
+    processor, loop = Processor(build_image(standalone=True), found.blob), StandaloneLoop(found.blob)
+    sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
+    assert processor.call("gc_standalone_load", MEMORY_AT, MODEL_AT, len(found.blob))[0] & 0xFF
+    on_host = (ctypes.c_float * 8)(), (ctypes.c_float * 8)()
+    memory = ctypes.create_string_buffer(24)
+    for k in range(LOADING_STEPS + 5):
+        data = sample_bytes([5000, 100 + k, -2000, 3 * k, 20, -10], 10_000 * k, 1, 0)
+        processor.write(sample, data)
+        processor.call("gc_standalone_step", MEMORY_AT, sample, 0xFF, targets, targets + 32)
+        ctypes.memmove(memory, data, 24)
+        library().gc_standalone_step(ctypes.c_void_p(loop.address), memory, 0xFF, *on_host)
+    assert any(on_host[0]) and processor.read(targets, 64) == bytes(on_host[0]) + bytes(on_host[1])
