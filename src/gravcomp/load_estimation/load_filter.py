@@ -66,14 +66,19 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(self, elapsed: float, load_rate: float, tension_change: np.ndarray) -> None:
+    def diffuse(self, elapsed: float, deviation: float, time: float, tension_change: np.ndarray) -> None:
         """Let what walks walk, for `elapsed` s.
 
-        load_rate: standard deviation of the load in 1 s; tension_change (m,) N: since the last call.
+        The load forgets what it was within `time` s and is then anything of this standard deviation around 0, so that what no
+        sensor sees of it stays bounded. tension_change (m,) N: since the last call.
         """
         k, m = self._k, self._m
         step = np.zeros(len(self.state))
-        step[:k] = load_rate**2 * elapsed
+        kept = np.exp(-elapsed / time)
+        self.state[:k] *= kept
+        self.covariance[:k] *= kept
+        self.covariance[:, :k] *= kept
+        step[:k] = (1.0 - kept**2) * deviation**2
         step[k + 2 : k + 5] = (self._options.drift * self._sag) ** 2 * elapsed
         step[k + 5 : k + 5 + m] = (self._options.cable_friction * tension_change) ** 2
         step[k + 5 + m :] = self._displacement**2 * np.minimum(1.0, np.abs(tension_change) / self._largest)

@@ -240,6 +240,7 @@ class LoadObserver:
         if self._last_change is not None:
             before, tension = self._last_change
             time = _CONSTANT if self.options.kind == "payload" else self.options.change_time
-            rate = self._scale / np.sqrt(time) if self._released else 0.0
-            self._filter.diffuse(max(0.0, then.stamp - before), rate, then.tension - tension)
+            self._filter.diffuse(
+                max(0.0, then.stamp - before), self._scale if self._released else 0.0, time, then.tension - tension
+            )
         self._last_change = then.stamp, then.tension
