@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "target.h"
+#include "fuzz_target.h"
 
 #define LONGEST 4096u
 #define MOST 4096u

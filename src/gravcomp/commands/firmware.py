@@ -7,7 +7,7 @@ from pathlib import Path
 from gravcomp.commands import output
 from gravcomp.commands.parsers import add_subcommand
 
-_TESTS = ("src/test/test_firmware.py", "src/test/test_virtual_board.py")
+_TESTS = ("src/test/test_firmware.py", "src/test/test_virtual_board.py", "src/test/test_standalone.py")
 _FOLDER = "build/firmware"
 
 

@@ -17,6 +17,7 @@ from gravcomp.firmware.settings import FAULTS, STATES
 
 _ASKED = 50  # requests
 _HEATER_PERIOD, _HEATER_END = 0.1, 1.5  # s
+_STATE_WAIT = 0.5  # s; five periods of the frame
 _PERIOD = 10.0  # ms between samples
 _JITTER = 0.5  # ms of the board's stamps
 _DELAY = 5.0  # ms: a tick, two frames and a host that is not a real-time one
@@ -124,10 +125,10 @@ def _heater(client: BoardClient, seconds: float) -> list[Finding]:
 
 
 def _state(client: BoardClient) -> list[Finding]:
-    frame = next((f for f in client.listen(0.5) if f.arbitration_id == requests.STATE_ID), None)
+    frame = next((f for f in client.listen(_STATE_WAIT) if f.arbitration_id == requests.STATE_ID), None)
     values = _values(frame) if frame is not None else None
     if values is None:
-        return [Finding("missing", "state", "no BoardState in 0.5 s")]
+        return [Finding("missing", "state", f"no BoardState in {_STATE_WAIT:g} s")]
     faults = [text for bit, text in enumerate(FAULTS) if int(values.faults) >> bit & 1]
     state = int(values.state)
     name = STATES[state] if state < len(STATES) else str(state)

@@ -1,6 +1,6 @@
 // The board under hostile frames: what must hold whatever comes.
-#ifndef GC_TARGET_H
-#define GC_TARGET_H
+#ifndef GC_FUZZ_TARGET_H
+#define GC_FUZZ_TARGET_H
 
 #include <stddef.h>
 #include <stdint.h>

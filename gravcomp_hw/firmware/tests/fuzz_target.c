@@ -5,7 +5,7 @@
 //   - no current of a host that has been silent for more than 100 ms
 //   - no heating without a command for more than 500 ms, none above the limit of the duty
 //   - each parameter in its range, each frame of the board with a right check byte
-#include "target.h"
+#include "fuzz_target.h"
 
 #include "../boards/host/host.h"
 #include "../core/crc.h"
