@@ -20,7 +20,7 @@ from ros2_line import run_node
 pytestmark = pytest.mark.timeout(900)
 
 # Not installed by this project.
-FOREIGN = ("ros2 launch foxglove_bridge", "ros2 run plotjuggler", "ros2 run robot_state_publisher")
+FOREIGN = ("ros2 launch foxglove_bridge", "ros2 launch gravcomp_fem", "ros2 run plotjuggler", "ros2 run robot_state_publisher")
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 

@@ -27,6 +27,11 @@ def test_an_own_robot_is_demonstrated(type_in):
     assert code == 0 and "sag without compensation" in output, output
 
 
+def test_a_robot_with_joints_is_demonstrated(type_in):
+    code, output = type_in("./gravcomp demo --robot src/examples/joint_robot.yaml --headless", "--duration 12")
+    assert code == 0 and "joint_bridge active" in output, output
+
+
 @pytest.fixture
 def own_domain(monkeypatch):
     """A ROS domain without other nodes."""
@@ -51,6 +56,10 @@ def test_a_bag_is_replayed(type_in, folder, own_domain, line):
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/left -r joint_states:=/joint_states -r robot_description:=/robot_description -p base_frame:=left_soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
+        "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/right -r joint_states:=/joint_states -r robot_description:=/robot_description -p base_frame:=right_soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
+        "ros2 run gravcomp_hw joint_bridge --ros-args -r __ns:=/soft -r joint_states:=/joint_states -p robot:=src/examples/joint_robot.yaml",  # noqa: E501 (a whole line of a document)
+        "ros2 run gravcomp_hw joint_robot --ros-args -p robot:=src/examples/joint_robot.yaml -p joints:=mock",
     ],
 )
 def test_a_node_runs_until_ctrl_c(folder, own_domain, monkeypatch, line):

@@ -105,6 +105,10 @@ def check_ros2(words: list[str]) -> None:
             for word in words:
                 if word.startswith(PACKAGES):
                     assert (ROOT / word).exists(), f"{word} does not exist"
+        case ["launch", package, file, *rest]:
+            text = (ROOT / package / "launch" / file).read_text()
+            for word in rest:
+                assert re.search(rf"""["{{]\W*(name: )?{word.partition(":=")[0]}\b""", text), f"{file} has no argument {word}"
         case ["run", package, executable, *rest]:
             assert EXECUTABLES.get(executable) == package
             entry = node(executable)

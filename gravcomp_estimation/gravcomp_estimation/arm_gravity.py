@@ -4,6 +4,7 @@ The arm measures its pose with encoders, the IMU measures gravity. If both are a
 loose mount, a wrong URDF or a saturated sensor.
 """
 
+import sys
 import time
 from typing import Any
 
@@ -15,13 +16,17 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
 
+from gravcomp.arm.acceleration import CarriedPoint
 from gravcomp.arm.chain import Chain, angle_between, gravity_in
+from gravcomp.arm.frames import FrameTree
+from gravcomp.arm.fusion import GravityFusion
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_gravity import ArmGravityParameters
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 
 _CHECK_PERIOD = 0.1  # s, between two checks of arm and IMU
+_SHOWN = 8  # names in a message
 _KEPT = 50  # messages of joint_states that are kept between two checks
 # A source without messages for longer is stale.
 STALE = 0.5  # s
@@ -42,13 +47,21 @@ class ArmGravity(ManagedNode):
                     self._take_urdf(file.read(), self.parameters.urdf)
             except OSError as error:
                 raise ConfigError(f"arm_gravity: urdf '{self.parameters.urdf}' cannot be read: {error.strerror}") from error
-        topic = "gravity" if self.parameters.use == "publish" else "gravity/arm"
+        if self.parameters.feed_acceleration and self.parameters.source != "joint_states":
+            raise ConfigError("arm_gravity: feed_acceleration needs source: joint_states; TF has no stamps that are dense enough")
+        topic = "gravity/arm" if self.parameters.use == "check" else "gravity"
         self._gravity = self.create_publisher(Vector3Stamped, topic, SENSOR)
+        self._acceleration = None
+        if self.parameters.feed_acceleration:
+            self._acceleration = self.create_publisher(Vector3Stamped, "arm/acceleration", SENSOR)
 
     def activate(self) -> None:
         """Create the subscriptions. Raises ConfigError when the source is tf and tf2_msgs is not installed."""
         self._positions: dict[str, float] = {}
-        self._frames: dict[str, tuple[str, np.ndarray]] = {}
+        p = self.parameters
+        self._frames = FrameTree(p.base_frame, p.world_frame, STALE)
+        self._fusion = GravityFusion(p.imu_std, p.arm_std, p.tolerance, p.patience, STALE)
+        self._point: CarriedPoint | None = None
         self._arm: tuple[float, np.ndarray] | None = None  # monotonic s, (3,)
         self._imu: tuple[float, np.ndarray] | None = None
         self._agreed = time.monotonic()
@@ -56,7 +69,7 @@ class ArmGravity(ManagedNode):
         self._polled_imu: Polled | None = None
         if self.parameters.source == "tf":
             self._inputs = self._tf_subscriptions()
-        elif self.parameters.use == "publish":
+        elif self.parameters.use != "check" or self.parameters.feed_acceleration:
             self._inputs = [self.create_subscription(JointState, "joint_states", self._on_joints, QoSProfile(depth=10))]
         else:
             # A check needs only the newest message of each period.
@@ -66,6 +79,8 @@ class ArmGravity(ManagedNode):
             self._inputs.append(self.create_subscription(String, "robot_description", self._on_description, LATCHED))
         if self.parameters.use == "check":
             self._polled_imu = Polled(self, Vector3Stamped, "gravity", SENSOR)
+        elif self.parameters.use == "fuse":
+            self._inputs.append(self.create_subscription(Vector3Stamped, "gravity/imu", self._on_imu, SENSOR))
         self._watch = self.create_timer(_CHECK_PERIOD, self._check)
 
     def deactivate(self) -> None:
@@ -79,8 +94,9 @@ class ArmGravity(ManagedNode):
 
     def cleanup(self) -> None:
         """Destroy the publisher."""
-        if hasattr(self, "_gravity"):
-            self.destroy_publisher(self._gravity)
+        for publisher in (getattr(self, "_gravity", None), getattr(self, "_acceleration", None)):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
 
     # The arm's pose.
 
@@ -92,14 +108,20 @@ class ArmGravity(ManagedNode):
 
     def _take_urdf(self, text: str, source: str) -> None:
         self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, source)
+        self._point = CarriedPoint(self._chain, np.array(self.robot_file.robot.imu_mount.position))
 
     def _on_joints(self, message: JointState) -> None:
-        self._positions.update(zip(message.name, message.position))
+        self._positions.update(_finite(message))
         self._take_positions(message.header)
 
     def _take_positions(self, header: Header) -> None:
-        if self._chain and all(name in self._positions for name in self._chain.moving):
-            self._publish_gravity(self._chain.gravity(self._positions), header)
+        if self._chain is None or not all(name in self._positions for name in self._chain.moving):
+            return
+        self._publish_gravity(self._chain.gravity(self._positions), header)
+        if self._acceleration is not None and self._point is not None:
+            acceleration = self._point.take(header.stamp.sec + 1e-9 * header.stamp.nanosec, self._positions)
+            if acceleration is not None:
+                self._acceleration.publish(self._vector(acceleration, header))
 
     def _tf_subscriptions(self) -> list:
         try:
@@ -110,30 +132,46 @@ class ArmGravity(ManagedNode):
             ) from error
         latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         return [
-            self.create_subscription(TFMessage, "/tf", self._on_tf, QoSProfile(depth=100)),
-            self.create_subscription(TFMessage, "/tf_static", self._on_tf, latched),
+            self.create_subscription(TFMessage, "/tf", lambda m: self._on_tf(m, static=False), QoSProfile(depth=100)),
+            self.create_subscription(TFMessage, "/tf_static", lambda m: self._on_tf(m, static=True), latched),
         ]
 
-    def _on_tf(self, message: Any) -> None:
+    def _on_tf(self, message: Any, *, static: bool) -> None:
+        now = time.monotonic()
         for t in message.transforms:
-            q = t.transform.rotation
-            self._frames[t.child_frame_id] = t.header.frame_id, rotation_from_quaternion(q.x, q.y, q.z, q.w)
-        frame, rotation = self.parameters.base_frame, np.eye(3)
-        for _ in range(len(self._frames) + 1):
-            if frame == self.parameters.world_frame:
-                self._publish_gravity(gravity_in(rotation), message.transforms[-1].header)
-                return
-            if frame not in self._frames:
-                return
-            frame, above = self._frames[frame]
-            rotation = above @ rotation
+            q, stamp = t.transform.rotation, t.header.stamp
+            try:
+                rotation = rotation_from_quaternion(q.x, q.y, q.z, q.w)
+            except ValueError as error:
+                self.get_logger().warning(f"TF of '{t.child_frame_id}': {error}", throttle_duration_sec=5.0)
+                continue
+            seconds = stamp.sec + 1e-9 * stamp.nanosec
+            self._frames.take(t.child_frame_id, t.header.frame_id, rotation, seconds, now, static=static)
+        rotation = self._frames.rotation(now)
+        if rotation is not None:
+            self._publish_gravity(gravity_in(rotation), message.transforms[-1].header)
 
     def _publish_gravity(self, gravity: np.ndarray, header: Header) -> None:
-        self._arm = time.monotonic(), gravity
+        now = time.monotonic()
+        self._arm = now, gravity
+        alone = self._fusion.arm(now, gravity) if self.parameters.use == "fuse" else gravity
+        if alone is not None:
+            self._gravity.publish(self._vector(alone, header))
+
+    def _on_imu(self, message: Vector3Stamped) -> None:
+        """Publish the fused gravity, with the stamp of the IMU's sample."""
+        v, now = message.vector, time.monotonic()
+        gravity = np.array([v.x, v.y, v.z])
+        if not 0.0 < float(np.linalg.norm(gravity)) < np.inf:
+            return
+        self._imu = now, gravity
+        self._gravity.publish(self._vector(self._fusion.imu(now, gravity), message.header))
+
+    def _vector(self, value: np.ndarray, header: Header) -> Vector3Stamped:
         message = Vector3Stamped()
         message.header.stamp, message.header.frame_id = header.stamp, self.parameters.base_frame
-        message.vector.x, message.vector.y, message.vector.z = map(float, gravity)
-        self._gravity.publish(message)
+        message.vector.x, message.vector.y, message.vector.z = map(float, value)
+        return message
 
     # The check.
 
@@ -146,7 +184,7 @@ class ArmGravity(ManagedNode):
         if self._polled_joints is not None:
             received = self._polled_joints.take_all()
             for one in received:
-                self._positions.update(zip(one.message.name, one.message.position))
+                self._positions.update(_finite(one.message))
             if received:
                 self._take_positions(received[-1].message.header)
         if self._polled_imu is not None and (newest := self._polled_imu.take()):
@@ -157,18 +195,36 @@ class ArmGravity(ManagedNode):
         self._read_polled()
         now = time.monotonic()
         if self._arm is None or now - self._arm[0] > STALE:
-            missing = (
-                "no URDF has been received"
-                if self.parameters.source == "joint_states" and self._chain is None
-                else "no pose of the arm is received"
-            )
-            self.report(WARN, missing)
+            self.report(WARN, self._missing())
         elif self.parameters.use == "publish":
             self.report(OK, "gravity from the arm")
         elif self._imu is None or now - self._imu[0] > STALE:
-            self.report(WARN, "no gravity is received from the IMU")
+            what = "no gravity is received from the IMU"
+            self.report(WARN, what if self.parameters.use == "check" else f"{what}: gravity from the arm alone")
+        elif self.parameters.use == "fuse":
+            self._report_fusion()
         else:
             self._compare(now)
+
+    def _missing(self) -> str:
+        """Return why there is no pose of the arm."""
+        if self.parameters.source == "tf":
+            return f"no pose of the arm: {self._frames.problem or 'no TF is received'}"
+        if self._chain is None:
+            return "no URDF has been received"
+        absent = [name for name in self._chain.moving if name not in self._positions]
+        if not absent or not self._positions:
+            return "no pose of the arm is received"
+        others = ", ".join(sorted(set(self._positions) - set(self._chain.moving))[:_SHOWN])
+        return f"joint_states does not bring {', '.join(absent)}" + (f"; it has {others}: is a prefix missing?" if others else "")
+
+    def _report_fusion(self) -> None:
+        angle = self._fusion.angle
+        degrees = None if angle is None else round(float(np.degrees(angle)), 2)
+        if self._fusion.disagrees:
+            self._report_disagreement(f"arm and IMU disagree on gravity by {degrees:g} deg: the IMU counts alone", degrees)
+        else:
+            self.report(OK, "gravity from arm and IMU", angle_deg=degrees)
 
     def _compare(self, now: float) -> None:
         angle = angle_between(self._arm[1], self._imu[1])
@@ -181,10 +237,24 @@ class ArmGravity(ManagedNode):
         sentence = (
             f"arm and IMU disagree on gravity by {degrees:g} deg: is the IMU's mount, the URDF or one of the sensors wrong?"
         )
+        self._report_disagreement(sentence, degrees)
+
+    def _report_disagreement(self, sentence: str, degrees: float | None) -> None:
         self.get_logger().error(sentence, throttle_duration_sec=5.0)
         self.report(ERROR, sentence, angle_deg=degrees)
+
+
+def _finite(message: JointState) -> dict[str, float]:
+    """Return the positions of a message by joint, without those that are not numbers; empty where the arrays do not fit."""
+    if len(message.name) != len(message.position):
+        return {}
+    return {name: position for name, position in zip(message.name, message.position) if np.isfinite(position)}
 
 
 def main() -> int:
     """Run the node; return the exit code."""
     return run(ArmGravity)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -34,6 +34,7 @@ FOLLOW_PERIOD = 0.5  # s
 SAVE_PERIOD = 60.0  # s
 CHECKS_MEMORY = 120.0  # s for which the checks of the stream remember
 BIAS_PERIOD_NS = 100_000_000  # of imu/bias, which changes over minutes
+KNOWN_AGE_NS = 100_000_000  # between a sample and arm/acceleration; an older acceleration is that of another motion
 LEVELS = {ImuStatus.OK: OK, ImuStatus.INITIALISING: OK, ImuStatus.UNCALIBRATED: WARN}
 
 
@@ -76,6 +77,10 @@ class ImuEstimator(ManagedNode):
             SensorStream(self, Temperature, "imu/temperature", self._on_temperature, reliability),
         ]
         # Steady clock: the status must be published also when the clock of a replay has stopped.
+        self._known, self._known_stamp_ns = (0.0, 0.0, 0.0), 0
+        self._known_input = None
+        if self.parameters.arm_acceleration:
+            self._known_input = self.create_subscription(Vector3Stamped, "arm/acceleration", self._on_acceleration, SENSOR)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers_active = [
             self.create_timer(STATUS_PERIOD, self._on_status, clock=steady),
@@ -87,6 +92,8 @@ class ImuEstimator(ManagedNode):
         """Unsubscribe, switch the heater off and save the bias model."""
         for stream in self._streams:
             stream.close()
+        if self._known_input is not None:
+            self.destroy_subscription(self._known_input)
         for timer in self._timers_active:
             self.destroy_timer(timer)
         self._heater_duty.publish(Float32(data=0.0))
@@ -130,7 +137,8 @@ class ImuEstimator(ManagedNode):
         now = time.monotonic()
         self._sample_time = now
         stamp, gyro, accel = messages.sample_of(message)
-        estimate = self._estimator.update(stamp, gyro, accel)
+        known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
+        estimate = self._estimator.update(stamp, gyro, accel, known)
         self._monitor.add(stamp, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
         problem = estimate if isinstance(estimate, Problem) else estimate.imu.problem
         if problem is not Problem.NONE:
@@ -148,6 +156,11 @@ class ImuEstimator(ManagedNode):
         if not 0 <= stamp - self._bias_stamp_ns < BIAS_PERIOD_NS:
             self._bias_stamp_ns = stamp
             self._bias.publish(messages.vector(stamp, parameters.imu_frame, estimate.bias))
+
+    def _on_acceleration(self, message: Vector3Stamped) -> None:
+        v = message.vector
+        if math.isfinite(v.x + v.y + v.z):
+            self._known, self._known_stamp_ns = (v.x, v.y, v.z), messages.stamp_ns(message.header)
 
     def _on_temperature(self, message: Temperature) -> None:
         self._estimator.add_temperature(messages.stamp_ns(message.header), message.temperature)

@@ -30,6 +30,7 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
     message.residual = float(shape.residual)
     message.error_estimate = float(shape.error_estimate)
     message.solve_time = float(shape.solve_time)
+    message.contact = shape.contacts.sentence
     return message
 
 

@@ -16,15 +16,21 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.time import Time
 from rclpy.timer import Timer
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
+from gravcomp.arm.shape_chain import joint_names, joint_positions
+from gravcomp.config import ConfigError
+from gravcomp.external_loads import LivePayload
+from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
 from gravcomp_fem.conversion import deformation_message, pose_message
+from gravcomp_fem.load_inputs import LoadInputs
 from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
@@ -48,7 +54,11 @@ class FemSimulator(ManagedNode):
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
         self._dynamic = self.parameters.mode == "dynamic"
-        self._simulator = (DynamicSimulator if self._dynamic else Simulator)(self.robot_file.robot)
+        scene = self.robot_file.scene
+        if self._dynamic and scene:
+            raise ConfigError(f"{self.robot_file.source}: scene needs the mode static of fem_simulator; mode is dynamic")
+        robot = self.robot_file.robot.with_assumed_lines()
+        self._simulator = DynamicSimulator(robot) if self._dynamic else Simulator(robot, scene=scene)
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
         # The first step compiles functions that are not cached yet; do it before the first sample arrives.
@@ -65,6 +75,10 @@ class FemSimulator(ManagedNode):
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
         self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
+        robot = self.robot_file.robot
+        self._chain_names = joint_names(self.parameters.joint_prefix, len(robot.effectors.backbone_station))
+        self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
+        self._loads = LoadInputs(self, self.robot_file.robot, self.parameters)
 
     def activate(self) -> None:
         """Reset the simulator and subscribe."""
@@ -72,6 +86,7 @@ class FemSimulator(ManagedNode):
         self._refused = 0
         self._last_stamp: float | None = None
         self._last_markers = -np.inf
+        self._loads.begin()
         self._gravity_subscription = self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR)
         # Read when gravity arrives, because the cables are needed then; a second wake-up per sample costs 10 % of a core.
         if self.parameters.cables_from == "command":
@@ -84,6 +99,7 @@ class FemSimulator(ManagedNode):
         """Unsubscribe."""
         self.destroy_subscription(self._gravity_subscription)
         self._cable_topic.destroy()
+        self._loads.end()
 
     def cleanup(self) -> None:
         """Destroy the publishers and end the build of the reduced model."""
@@ -92,9 +108,21 @@ class FemSimulator(ManagedNode):
         if self._builder is not None:
             self._builder.terminate()
             self._builder.wait()
-        for publisher in (self._deformation, self._tip, self._markers):
-            self.destroy_publisher(publisher)
+        for publisher in (self._deformation, self._tip, self._markers, self._chain):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
         self._transforms.destroy()
+        self._loads.destroy()
+
+    def check_parameters(self, new: FemSimulatorParameters) -> None:
+        """Refuse a payload that the robot cannot carry."""
+        if new.payload_mass >= 0.0:
+            LivePayload(self.robot_file.robot, 0.0).check(new.payload_mass)
+
+    def parameters_changed(self, old: FemSimulatorParameters, new: FemSimulatorParameters) -> None:
+        """Apply a new payload and new options of the loads."""
+        if hasattr(self, "_loads"):
+            self._loads.change(new)
 
     def _start_builder(self) -> None:
         """Build the reduced model in a process of low priority, when no launcher does."""
@@ -147,7 +175,8 @@ class FemSimulator(ManagedNode):
         interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
         self._move_cables(interval or _LONGEST_GAP)
         self._late_reduction.exchange()
-        shape = self._shape(gravity, interval if self._dynamic else elapsed)
+        carried = self._loads.carried(gravity, stamp)
+        shape = self._shape(gravity, interval if self._dynamic else elapsed, carried)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # otherwise the next step would start at an invalid shape
             self._refuse(
@@ -156,27 +185,30 @@ class FemSimulator(ManagedNode):
             return
         message.header.frame_id = self.parameters.base_frame
         self._deformation.publish(deformation_message(shape, message.header))
+        self._loads.observe(message.header, shape, self._simulator, carried, self._cables)
         if self._tip.get_subscription_count():
             tip = pose_message(shape.tip_position, shape.tip_orientation)
             self._tip.publish(PoseStamped(header=message.header, pose=tip))
         self._show(shape, message.header)
         level = {ShapeStatus.OK: OK, ShapeStatus.FALLBACK: WARN}.get(shape.status, ERROR)
+        of_loads, values = self._loads.report(gravity, stamp)
         self.report(
-            level,
-            shape.message or "following gravity",
+            max(level, WARN) if of_loads else level,
+            "; ".join(part for part in (shape.message or "following gravity", of_loads) if part),
             model=shape.model,
             solve_time_ms=round(1e3 * shape.solve_time, 3),
             residual_n=f"{shape.residual:.2e}",
             refused_messages=self._refused,
+            **values,
         )
 
-    def _shape(self, gravity: np.ndarray, interval: float | None) -> Shape:
-        """Return the shape; interval: s since the last sample, or None when it is not known."""
+    def _shape(self, gravity: np.ndarray, interval: float | None, carried: tuple[Wrench, ...]) -> Shape:
+        """Return the shape; interval: s since the last sample, or None when it is not known; carried: external loads."""
         if not self._dynamic:  # a body that creeps is relaxed in its first equilibrium
-            return self._simulator.step(gravity, self._cables, duration=interval)
+            return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried)
         if interval is None:
             return self._simulator.settle(gravity, self._cables)
-        return self._simulator.step(gravity, self._cables, duration=interval)
+        return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried)
 
     def _show(self, shape: Shape, header: Header) -> None:
         rate = self.parameters.marker_rate
@@ -188,6 +220,9 @@ class FemSimulator(ManagedNode):
         if self._markers.get_subscription_count():
             self._markers.publish(self._robot_markers.of(shape, header))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
+        if self._chain is not None:
+            positions = joint_positions(shape.backbone_position, self.robot_file.robot.length)
+            self._chain.publish(JointState(header=header, name=self._chain_names, position=positions))
 
     def _refuse(self, sentence: str) -> None:
         self._refused += 1

@@ -157,6 +157,7 @@ class InverseController(ManagedNode):
                 tension=message.cable_tension,
                 interval=interval,
                 followed=message.status != Deformation.NOT_CONVERGED,
+                contact=message.contact,
             )
         else:
             self._publish_code(

@@ -24,7 +24,8 @@ class Viewer(ManagedNode):
     def configure(self) -> None:
         """Start to serve the page; create publishers and clients."""
         self._page = Page(self.robot_file.robot, self.parameters)
-        self.sender = RequestSender(self, self.parameters, self.robot_file.robot.length, self._page.notify)
+        bridge = "joint_bridge" if self.robot_file.has_joints else "can_bridge"
+        self.sender = RequestSender(self, self.parameters, self.robot_file.robot.length, self._page.notify, bridge)
         self.get_logger().info(f"the page is at {self._page.address}")
 
     def activate(self) -> None:

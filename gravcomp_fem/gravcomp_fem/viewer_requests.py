@@ -23,10 +23,8 @@ from gravcomp_node import COMMAND
 _SERVICES = {
     "inverse_controller/enable": SetBool,
     "inverse_controller/relax": Trigger,
-    "can_bridge/home": Trigger,
-    "can_bridge/stop": Trigger,
-    "can_bridge/release": Trigger,
 }
+_BRIDGE_SERVICES = ("home", "stop", "release")  # each a Trigger
 
 
 class Notify(Protocol):
@@ -42,15 +40,19 @@ class RequestSender:
     Attributes: shape_target, base, fault (publishers), services (clients by name), recorder (its process, or None).
     """
 
-    def __init__(self, node: LifecycleNode, parameters: ViewerParameters, length: float, notify: Notify):
-        """length: of the robot in m."""
+    def __init__(
+        self, node: LifecycleNode, parameters: ViewerParameters, length: float, notify: Notify, bridge: str = "can_bridge"
+    ):
+        """length: of the robot in m; bridge: name of the node that drives its motors."""
         self._node, self._parameters, self.notify = node, parameters, notify
         self._weight = direction_weight(length, parameters.tip_direction_weight)
         self.shape_target = node.create_publisher(ShapeTarget, "target/shape", COMMAND)
         self.base = node.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
         faults = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
         self.fault = node.create_publisher(String, "virtual/fault", faults)
-        self.services = {name: node.create_client(kind, name) for name, kind in _SERVICES.items()}
+        self._bridge = bridge
+        kinds = {**_SERVICES, **{f"{bridge}/{name}": Trigger for name in _BRIDGE_SERVICES}}
+        self.services = {name: node.create_client(kind, name) for name, kind in kinds.items()}
         self.recorder: NodeProcess | None = None
         self._bag = ""
 
@@ -77,7 +79,7 @@ class RequestSender:
             case requests.Compensate(mode):
                 self._call("inverse_controller/enable", SetBool.Request(data=mode == "compensate"))
             case requests.BridgeService(name):
-                self._call(f"can_bridge/{name}", Trigger.Request())
+                self._call(f"{self._bridge}/{name}", Trigger.Request())
             case requests.Record(True):
                 self._start_recording()
             case requests.Record(False):

@@ -93,3 +93,9 @@ def test_plotjuggler_plots_fields_that_exist():
 @pytest.mark.parametrize("path", sorted(CONFIG.iterdir()), ids=lambda path: path.name)
 def test_every_layout_is_described(path):
     assert path.name in (CONFIG.parents[1] / "src" / "doc" / "tools.md").read_text()
+
+
+def test_each_node_is_in_one_group_of_the_diagnostics():
+    groups = yaml.safe_load((CONFIG / "diagnostics.yaml").read_text())["/**"]["ros__parameters"]
+    contained = [name for group in groups.values() if isinstance(group, dict) for name in group["contains"]]
+    assert sorted(contained) == sorted(entry.executable for entry in NODES if entry.executable != "judge")

@@ -59,7 +59,7 @@ class ImuTopics:
         self._temperature = node.create_publisher(Temperature, "imu/temperature", SENSOR)
 
     def publish(self, sample: ImuSample) -> None:
-        """Publish a sample, and now and then the temperature."""
+        """Publish a sample, and with one in ten the temperature."""
         message = Imu()
         message.header.stamp = to_time(round(1e9 * sample.stamp))
         message.header.frame_id = self._frame

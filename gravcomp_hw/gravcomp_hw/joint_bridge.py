@@ -26,6 +26,7 @@ from gravcomp.graph.parameters.joint_bridge import JointBridgeParameters
 from gravcomp.motors.joint_driver import JointDriver, JointDriverOptions
 from gravcomp.motors.state import CableSnapshot
 from gravcomp_hw.bridge_topics import LOG_PERIOD, cable_state, level, trigger
+from gravcomp_hw.joint_guard_client import JointGuardClient, JointGuardError
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -52,7 +53,15 @@ class JointBridgeNode(ManagedNode):
         self._looked, self._controller_missing = -math.inf, None
         self._publishing = False
         options = JointDriverOptions(p.control_rate, p.state_rate, p.require_imu)
-        self._driver = JointDriver(hardware, options, self._send, self._publish_state, self._missing_controller)
+        self._guard: JointGuardClient | None = None
+        if p.guard and self._joints.command == "effort":
+            try:
+                # The resolved name: a remapping of the bridge holds for its guard as well.
+                self._guard = JointGuardClient(self._commands.topic_name, len(self._names), self.get_namespace())
+            except JointGuardError as error:
+                raise ConfigError(str(error)) from error
+        beat = self._guard.beat if self._guard is not None else lambda: True
+        self._driver = JointDriver(hardware, options, self._send, self._publish_state, self._missing_controller, beat)
         self._driver.open()
 
     def activate(self) -> None:
@@ -89,6 +98,8 @@ class JointBridgeNode(ManagedNode):
         if driver is None:
             return
         driver.close()
+        if self._guard is not None:
+            self._guard.close()
         for publisher in (self._commands, self._state):
             self.destroy_publisher(publisher)
         self._driver = None

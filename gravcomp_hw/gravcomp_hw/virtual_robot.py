@@ -14,6 +14,7 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from gravcomp.canbus.bus import BusError
@@ -21,6 +22,7 @@ from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
 from gravcomp.virtual.described import described
 from gravcomp.virtual.faults import Fault
+from gravcomp.virtual.load_cells import VirtualLoadCells
 from gravcomp.virtual.motion import rotation_from_quaternion
 from gravcomp.virtual.motions import make_motion
 from gravcomp.virtual.realtime import RealtimeRobot
@@ -48,7 +50,8 @@ class VirtualRobotNode(ManagedNode):
             parameters = dataclasses.replace(parameters, motors=motors)
         motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
-        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, self.parameters.board)
+        scene = self.robot_file.scene
+        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, self.parameters.board, scene)
         self.get_logger().info(robot.true.summary())
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
@@ -57,6 +60,10 @@ class VirtualRobotNode(ManagedNode):
         if self.parameters.tracker.rate > 0.0:
             self._tracker = VirtualTracker(self.parameters.tracker, virtual.robot.length, virtual.seed)
             self._publisher_measured = self.create_publisher(PoseStamped, "measured/tip", SENSOR)
+        self._cells, self._publisher_tension = None, None
+        if self.parameters.load_cells.rate > 0.0:
+            self._cells = VirtualLoadCells(self.parameters.load_cells, virtual.robot.limits.tension_max, virtual.seed)
+            self._publisher_tension = self.create_publisher(JointState, "measured/tension", SENSOR)
         self._live = RealtimeRobot(robot, hardware, self._publish, self.parameters.truth_rate, self._commanded_base)
         self._base: Polled | None = None
 
@@ -84,7 +91,7 @@ class VirtualRobotNode(ManagedNode):
 
     def cleanup(self) -> None:
         """Destroy the publishers."""
-        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity", "_publisher_measured"):
+        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity", "_publisher_measured", "_publisher_tension"):
             if getattr(self, name, None) is not None:
                 self.destroy_publisher(getattr(self, name))
                 delattr(self, name)
@@ -108,6 +115,11 @@ class VirtualRobotNode(ManagedNode):
                 taken = self.get_clock().now() - Duration(seconds=truth.time - measured.time)
                 message.header.stamp, message.header.frame_id = taken.to_msg(), frame
                 self._publisher_measured.publish(message)
+        tension = None if self._cells is None else self._cells.observe(truth)
+        if tension is not None:
+            state = JointState(name=list(self.robot_file.robot.cable_names), effort=tension.tolist())
+            state.header.stamp = stamp
+            self._publisher_tension.publish(state)
         for publisher, message in messages:
             message.header.stamp, message.header.frame_id = stamp, frame
             publisher.publish(message)

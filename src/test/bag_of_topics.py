@@ -114,6 +114,16 @@ class TopicBag:
             linear_acceleration_covariance=none,
         )
 
+    def joints(self, topic: str, time: float, names, positions) -> None:
+        none, positions = np.zeros(0), np.asarray(positions, float)
+        self._write(topic, "sensor_msgs/msg/JointState", time, name=list(names), position=positions, velocity=none, effort=none)
+
+    def text(self, topic: str, time: float, text: str) -> None:
+        kind = "std_msgs/msg/String"
+        self._topics[topic] = self._bag.add_connection(topic, kind, typestore=self._store)
+        message = self._store.types[kind](data=text)
+        self._bag.write(self._topics[topic], round(1e9 * time), self._store.serialize_cdr(message, kind))
+
     def _write(self, topic: str, kind: str, time: float, late: float = 0.0, **fields) -> None:
         if topic not in self._topics:
             self._topics[topic] = self._bag.add_connection(topic, kind, typestore=self._store)

@@ -8,8 +8,10 @@ import pytest
 
 from gravcomp.arm.chain import Chain, angle_between
 from gravcomp.arm.description import expanded
+from gravcomp.arm.shape_chain import joint_names, joint_positions
 from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
+from gravcomp.description import load_robot_file
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 URDF = Path(__file__).resolve().parents[2] / "gravcomp_fem" / "urdf"
@@ -60,6 +62,22 @@ def test_the_root_may_be_any_link_above():
         (TWO_JOINTS, "a", "b", "link 'a' is not below 'b' in the tree; its root is 'world'"),
         (TWO_JOINTS.replace('<parent link="b"/>', ""), "soft_base", None, "joint 'j3' has no parent link"),
         (TWO_JOINTS.replace("revolute", "floating"), "soft_base", None, "joint 'j1' is of type 'floating'"),
+        (
+            TWO_JOINTS.replace('<link name="b"/>', '<link name="b"/><link name="table"/>'),
+            "soft_base",
+            None,
+            "several roots, the links world, table",
+        ),
+        (TWO_JOINTS.replace('<parent link="world"/>', '<parent link="b"/>'), "soft_base", None, "links a, b are a loop"),
+        (
+            TWO_JOINTS.replace('<child link="b"/>', '<child link="a"/>'),
+            "soft_base",
+            None,
+            "link 'a' is below two joints, 'j1' and 'j2'",
+        ),
+        (TWO_JOINTS.replace('<link name="a"/>', ""), "soft_base", None, "joint 'j1' has the child link 'a', which is not in it"),
+        (TWO_JOINTS.replace("0.5 0 0", "0.5 0"), "soft_base", None, "joint 'j3' has xyz '0.5 0'; three numbers are needed"),
+        (TWO_JOINTS.replace("0 2 0", "0 0 0"), "soft_base", None, "joint 'j1' has an axis of length 0"),
     ],
 )
 def test_the_error_says_what_is_wrong_with_a_urdf(urdf, tip, root, sentence):
@@ -109,11 +127,31 @@ def test_the_macro_takes_prefix_parent_and_origin(tmp_path):
 
 
 def test_the_macros_joints_are_the_robots_cables():
-    from gravcomp.description import load_robot_file
-
     urdf = expanded(URDF / "soft_robot_alone.urdf.xacro")
     for name in load_robot_file("article").robot.cable_names:
         assert f'<joint name="{name}" type="prismatic">' in urdf
+
+
+@pytest.mark.parametrize(("robot", "cables"), [("article", ("left_s1c1", "left_s2c3")), ("three_segment", ("left_s3c1",))])
+def test_the_macro_takes_the_robot_from_its_file_and_shows_its_shape(tmp_path, robot, cables):
+    file = load_robot_file(robot)
+    own = tmp_path / "own.urdf.xacro"
+    own.write_text(f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
+    <xacro:include filename="{URDF}/soft_robot.urdf.xacro"/>
+    <link name="table"/>
+    <xacro:soft_robot name="left" parent="table" robot_yaml="{file.source}"><origin xyz="0 0 0"/></xacro:soft_robot>
+    </robot>""")
+    urdf = expanded(own)
+    assert all(f'<joint name="{cable}" type="prismatic">' in urdf for cable in cables)
+    imu = Chain(urdf, "left_imu_link", "left_soft_base").pose({})
+    np.testing.assert_allclose(imu[:3, :3], file.robot.imu_mount.rotation, atol=1e-9)
+    count = len(file.robot.effectors.backbone_station)
+    angle = np.linspace(0.0, 1.2, count)
+    bent = file.robot.length * 0.9 * np.column_stack([1 - np.cos(angle), 0.3 * angle**2, np.sin(angle)]) / 1.2
+    positions = dict(zip(joint_names("left_", count), joint_positions(bent, file.robot.length)))
+    for i in (1, count // 2, count - 1):
+        chain = Chain(urdf, f"left_chain_{i}", "left_soft_base")
+        np.testing.assert_allclose(chain.pose(positions)[:3, 3], bent[i] - bent[0], atol=1e-9)
 
 
 def test_a_broken_xacro_is_named(tmp_path):

@@ -10,7 +10,7 @@ import yaml
 
 from gravcomp.calibration.apply import calibrated_robot, write_calibrated
 from gravcomp.calibration.fit import cable_compliance
-from gravcomp.calibration.statics import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.canbus.codec import encode
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
@@ -224,6 +224,23 @@ def test_a_line_that_nobody_describes_is_stiff_in_the_virtual_robot():
     assert true.cables.free_length == pytest.approx([2.0 * robot.length] * 6, rel=0.1)
 
 
+def test_the_loop_assumes_the_most_probable_line_where_none_is_described():
+    """Lines of 20 seeds scatter around the one in the model. What is described stays, and so does the described robot."""
+    robot = article()
+    hardware = parse_hardware(load_robot_file("article").section("hardware"), source="article")
+    drawn = [draw(VirtualRobotParameters(), robot, hardware, seed).cables for seed in range(20)]
+    inside = np.array([robot.line_length(cable) for cable in robot.cables])
+    true = np.array([(lines.free_length + inside) / lines.axial_stiffness for lines in drawn])
+    assumed = robot.with_assumed_lines()
+    found = np.array([assumed.cable_compliance(cable) for cable in assumed.cables])
+    assert (true.min(axis=0) < found).all() and (found < true.max(axis=0)).all()
+    assert true.mean(axis=0) == pytest.approx(found, rel=0.15)
+    described = article(NYLON)
+    assert described.with_assumed_lines() is described
+    half = article(dataclasses.replace(NYLON, free_length=None)).with_assumed_lines()
+    assert half.cables[0].stiffness == pytest.approx(EA) and half.cables[0].free_length == pytest.approx(2.0 * half.length)
+
+
 def test_stiff_lines_do_not_slow_the_virtual_robot_down():
     """Motors pull the robot up with lines of 5 and of 200 kN; the tips move alike, and every step is solved."""
     file = load_robot_file("article")
@@ -277,7 +294,7 @@ def test_a_calibration_replaces_the_described_line(tmp_path):
     )
     compliance = np.array([0.3e-3, 0.3e-3, 0.3e-3, 0.0, 0.4e-3, 0.4e-3])
     fitted = calibrated_robot(robot, StaticParameters(0.8e6, np.zeros(6), compliance))
-    write_calibrated(path, target, fitted, None)
+    write_calibrated(path, target, robot, fitted, None)
     mine = load_robot_file(target).robot
     assert cable_compliance(mine) == pytest.approx(compliance, abs=1e-6)
     assert mine.cables[0].free_length == pytest.approx(0.2)

@@ -91,12 +91,12 @@ def complete(shell_script: str, *words: str) -> list[str]:
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (("calibrate",), {"calibrate", "calibrate-imu"}),
+        (("calibrate",), {"calibrate", "calibrate-imu", "calibrate-mount"}),
         (("model", ""), {"build", "info", "solve", "view"}),
         (("model", "solve", "--dis"), {"--displacement"}),
         (("model", "info", "long"), {"long_segment"}),
         (("demo", "--robot", "three"), {"three_segment"}),
-        (("arm", "--gravity", ""), {"imu", "arm", "both"}),
+        (("arm", "--gravity", ""), {"imu", "arm", "both", "fused"}),
         (("reproduce", "imu"), {"imu-ablation"}),
         (("completion", "z"), {"zsh"}),
     ],

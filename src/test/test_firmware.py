@@ -1,5 +1,6 @@
 """The board's firmware, as C code on this machine and as the image in the emulator: limits, safety, parameters, bad input."""
 
+import copy
 import itertools
 import random
 
@@ -200,6 +201,17 @@ def test_saved_parameters_come_back_and_a_supply_lost_at_any_word_leaves_the_las
     assert b.ask(requests.write("current_limit", 333)).done and b.ask(requests.save()).done
     b.restart()
     assert b.board.word("current_limit") == 333
+
+
+def test_a_copy_of_a_board_goes_on_by_itself():
+    board = HostBoard(SETTINGS)
+    copied = copy.deepcopy(board)
+    copied.receive(requests.write("current_limit", 123))
+    copied.receive(requests.save())
+    assert (copied.word("current_limit"), board.word("current_limit")) == (123, 1000)
+    for one in (copied, board):
+        one.restart()
+    assert (copied.word("current_limit"), board.word("current_limit")) == (123, 1000)
 
 
 def test_two_boards_of_one_number_fall_silent_and_say_so(bench):

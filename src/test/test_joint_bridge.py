@@ -11,6 +11,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Drive, Hardware, Motor, Watchdog, parse_hardware
 from gravcomp.description.joint_motors import COMMANDS, JointMotor, Lookup
 from gravcomp.motors.joint_bridge import JointBridge
+from gravcomp.motors.joint_guard import JointGuard
 from gravcomp.motors.joint_output import JointOutput
 from gravcomp.motors.joint_scale import JointScale
 from gravcomp.motors.joint_states import JointStates
@@ -241,6 +242,22 @@ def test_the_stand_in_goes_to_the_points_of_a_trajectory():
     assert controller.wanted(9.0) == [0.1, 0.2]
     controller.on_trajectory(["a", "b"], [TrajectoryPoint([0.5, 0.6], [], 0.0)], None, 9.0, [0.1, 0.2])
     assert controller.wanted(9.0) == [0.5, 0.6]
+
+
+def test_the_guard_acts_when_the_bridge_is_blocked_or_killed():
+    guard = JointGuard(0.0)
+    guard.on_bytes(b"..", 0.05)
+    assert not guard.acting(0.14) and guard.acting(0.16) and not guard.done(100.0)
+    guard.on_bytes(b".", 0.2)
+    assert not guard.acting(0.25)
+    guard.on_bytes(b"", 0.3)
+    assert guard.acting(0.3) and not guard.done(15.2) and guard.done(15.4)
+
+
+def test_the_guard_ends_with_a_good_bye():
+    guard = JointGuard(0.0)
+    guard.on_bytes(b".q", 0.1)
+    assert guard.done(0.1) and not guard.acting(9.0)
 
 
 def test_hostile_messages_move_no_joint_beyond_its_limits():

@@ -145,7 +145,9 @@ def test_searches_for_an_equilibrium_that_does_not_exist_become_rare(monkeypatch
     with monkeypatch.context() as patch:  # the same failure without its cost
         failed, searches = dataclasses.replace(simulator.solver.state, converged=False), []
         patch.setattr(simulator.solver, "track", lambda *a, **k: failed)
-        patch.setattr(simulator.solver, "solve", lambda *a: searches.append(1) or dataclasses.replace(failed, load_fraction=0.9))
+        patch.setattr(
+            simulator.solver, "solve", lambda *a, **_: searches.append(1) or dataclasses.replace(failed, load_fraction=0.9)
+        )
         lost += [simulator.step([-G, 0.0, 0.0], tension=beyond) for _ in range(58)]
         assert len(searches) == 1
         lost += [simulator.step([-G, 0.0, 0.0], tension=beyond) for _ in range(60)]
@@ -164,7 +166,7 @@ def test_an_equilibrium_lost_by_a_small_step_is_not_searched_for_immediately(mon
     held = simulator.solve(gravity, wound)
     assert held.is_equilibrium
     searches = []
-    monkeypatch.setattr(simulator.solver, "solve", lambda *a: searches.append(1) or simulator.solver.state)
+    monkeypatch.setattr(simulator.solver, "solve", lambda *a, **_: searches.append(1) or simulator.solver.state)
     monkeypatch.setattr(simulator.solver, "track", lambda *a, **k: dataclasses.replace(simulator.solver.state, converged=False))
     lost = [simulator.step(gravity, wound + 1e-4) for _ in range(45)]
     assert not searches and not any(shape.is_equilibrium for shape in lost)

@@ -288,11 +288,10 @@ static void watch_host(gc_board *board) {
   const uint32_t holding = 1000u * (uint32_t)gc_parameter_int(&board->parameters, GC_HOLD_TIME);
   if (board->state == GC_FOLLOWING && board->now - board->host_time >= timeout) {
     board->went_silent = true;
-    if (!has_current(board)) {
-      gc_board_enter(board, GC_RELEASED);
-    } else if (is_between(board)) {
+    const bool current = has_current(board);
+    if (current && is_between(board)) {
       hold(board);
-    } else if (board->now - board->host_time >= timeout + holding) {
+    } else if (!current || board->now - board->host_time >= timeout + holding) {
       gc_board_enter(board, GC_RELEASED);
     } else {
       // The hold time passes.

@@ -13,7 +13,7 @@ typedef struct {
 // Start at rest at a displacement (m) with a current (A) that holds the cable there.
 void gc_position_loop_reset(gc_position_loop *loop, float displacement, float holding);
 
-// What a step needs beside the parameters.
+// What a step needs in addition to the parameters.
 typedef struct {
   float target;        // m
   float pull;          // N, feed-forward

@@ -77,7 +77,7 @@ static uint8_t save(gc_board *board, uint32_t value) {
   if (value != GC_SAVE_WORD) {
     return GC_OUT_OF_RANGE;
   }
-  // The processor stands still while the flash is erased.
+  // The processor waits while the flash is erased.
   if (drives(board)) {
     return GC_WRONG_STATE;
   }

@@ -46,10 +46,8 @@ class Chain:
             document = xml.fromstring(urdf)
         except xml.ParseError as error:
             raise ConfigError(f"{source}: is not a URDF: {error}") from error
-        joint_above = {
-            _link(joint, "child", source): joint for joint in document.iter("joint") if joint.find("child") is not None
-        }
         links = [link.get("name", "") for link in document.iter("link")]
+        joint_above = _tree(document, links, source)
         for name in (tip, root):
             if name is not None and name not in links:
                 raise ConfigError(f"{source}: has no link '{name}'; it has: {', '.join(links) or 'none'}")
@@ -94,16 +92,56 @@ def _joint(element: xml.Element, source: str) -> Joint:
     if kind not in (*_MOVING, "fixed"):
         allowed = ", ".join((*_MOVING, "fixed"))
         raise ConfigError(f"{source}: joint '{name}' is of type '{kind}'; allowed between the root and the robot: {allowed}")
+
+    def numbers(element: xml.Element | None, key: str, default: str) -> list[float]:
+        text = default if element is None else element.get(key, default)
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        if len(values) != 3 or not all(map(math.isfinite, values)):
+            raise ConfigError(f"{source}: joint '{name}' has {key} '{text}'; three numbers are needed")
+        return values
+
     origin = np.eye(4)
     given = element.find("origin")
     if given is not None:
-        origin[:3, 3] = _numbers(given.get("xyz", "0 0 0"))
-        roll, pitch, yaw = _numbers(given.get("rpy", "0 0 0"))
+        origin[:3, 3] = numbers(given, "xyz", "0 0 0")
+        roll, pitch, yaw = numbers(given, "rpy", "0 0 0")
         x, y, z = np.eye(3)
         origin[:3, :3] = _turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll)
     axis = element.find("axis")
-    direction = np.array(_numbers(axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"))
-    return Joint(name, kind, origin, direction / np.linalg.norm(direction))
+    direction = np.array(numbers(axis, "xyz", "1 0 0"))
+    length = float(np.linalg.norm(direction))
+    if kind in _MOVING and length == 0.0:
+        raise ConfigError(f"{source}: joint '{name}' has an axis of length 0")
+    return Joint(name, kind, origin, direction / (length or 1.0))
+
+
+def _tree(document: xml.Element, links: list[str], source: str) -> dict[str, xml.Element]:
+    """Return the joint above each link. Raises ConfigError for links that are not one tree: two parents, a loop, two roots."""
+    above: dict[str, xml.Element] = {}
+    for joint in document.iter("joint"):
+        if joint.find("child") is None:
+            continue
+        child, name = _link(joint, "child", source), joint.get("name")
+        if child in above:
+            raise ConfigError(f"{source}: link '{child}' is below two joints, '{above[child].get('name')}' and '{name}'")
+        if child not in links:
+            raise ConfigError(f"{source}: joint '{name}' has the child link '{child}', which is not in it")
+        above[child] = joint
+    for link in links:
+        way = [link]
+        while way[-1] in above:
+            way.append(_link(above[way[-1]], "parent", source))
+            if way[-1] == link:
+                raise ConfigError(f"{source}: the links {', '.join(way[:-1])} are a loop; a URDF is a tree")
+            if len(way) > len(links):
+                break  # below a loop, which the loop's own links report
+    roots = [link for link in links if link not in above]
+    if len(roots) > 1:
+        raise ConfigError(f"{source}: has several roots, the links {', '.join(roots)}; a URDF has one: is a joint missing?")
+    return above
 
 
 def _link(joint: xml.Element, end: str, source: str) -> str:
@@ -113,10 +151,6 @@ def _link(joint: xml.Element, end: str, source: str) -> str:
     if name is None:
         raise ConfigError(f"{source}: joint '{joint.get('name')}' has no {end} link")
     return name
-
-
-def _numbers(text: str) -> list[float]:
-    return [float(word) for word in text.split()]
 
 
 def _turn(axis: np.ndarray, angle: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 Good messages of mock joints and of a controller alternate with bursts of malformed ones on every input: joint states of other
 joints, of wrong sizes, not finite, of far away, out of order; commands of every kind; requests; a controller that vanishes; a
-clock that stands still or jumps. Violations are
+clock that stops or jumps. Violations are
 
     output in a state in which nothing may be sent; not finite; beyond the limits of a joint; an effort beyond the current limit;
     an angle that moves faster than the velocity limit allows, from the last one or from where the joint is said to be
@@ -57,7 +57,7 @@ def run(hardware: Hardware, messages: int, seed: int, progress: Callable[[str], 
     result = {}
     for command in COMMANDS:
         progress(f"hostile messages, command: {command}")
-        result[command] = _Attack(with_joints(hardware, command), random.Random(seed)).run(messages // len(COMMANDS))
+        result[command] = _Attack(with_joints(hardware, command), random.Random(seed)).run(-(-messages // len(COMMANDS)))
     return result
 
 

@@ -78,6 +78,13 @@ ROWS = {
         Row("stack_kb", "largest stack with the loop on the board", "KB", 8.0),
         Row("emulated_residual_pct", "lateral residual with the C code as board, against the Python board", "%", 5.0),
     ),
+    "contact": (
+        Row("contact_error_pct", "tip and force of contact against closed forms, worst", "%", 0.5),
+        Row("penetration_mm", "deepest place in a rigid wall, 200 seeded scenes with motion", "mm", 0.02),
+        Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
+        Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
+        Row("lost_steps", "steps without an equilibrium, share", ""),
+    ),
     "robots": (
         Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),
         Row("robots.*.rest_error_pct", "tip without load and gravity, share of the length", "%", 1e-7),
@@ -87,6 +94,7 @@ ROWS = {
         Row("robots.article.reduced_step_ms", "article: step of the reduced model with the inverse problem, median", "ms", 0.11),
         Row("robots.*.uncalibrated_pct", "lateral residual held, of the released sag, worst seed", "%", 8.0),
         Row("robots.*.moving_pct", "the same while the base turns at 30 deg/s", "%", 4.0),
+        Row("robots.*.similarity_pct", "robots of 0.5 to 4 times the size, largest difference in model and loop", "%", 2.0),
         Row("ccx_error_pct", "against CalculiX, worst row, share of the length", "%", 0.2),
         Row("disks_error_pct", "backbones with disks, worst, share of the length", "%", 0.3),
         Row("rod_error_pct", "rod under gravity, worst, share of the length", "%", 0.3),
@@ -103,6 +111,15 @@ ROWS = {
         Row("robots.article.tracked_mm", "article: held with a tracker, lateral RMS, worst", "mm", 0.3),
         Row("robots.*.untracked_moving_mm", "base turning at 30 deg/s, without tracker: lateral RMS, worst", "mm"),
         Row("robots.*.tracked_moving_mm", "base turning at 30 deg/s, with a tracker: lateral RMS, worst", "mm"),
+    ),
+    "loads": (
+        Row("wrench_error_pct", "rod under gravity and wrenches against SoRoSim: tip, worst, share of the length", "%", 0.3),
+        Row("payload_error_pct", "unknown payload, found from tensions and tracker: error, worst", "%", 10.0),
+        Row("payload_residual_mm", "the same: lateral tip error once it is found, RMS, worst", "mm", 1.0),
+        Row("payload_outside", "payloads outside the interval that is reported, all sensors", "", 0.0),
+        Row("payload_imu_frames", "IMU frames that a payload changes while an arm turns the base", ""),
+        Row("force_error_pct", "force across the tip, 0.05 to 0.5 N, tensions and tracker: error, worst", "%", 20.0),
+        Row("force_error_deg", "the same: error of its direction across the robot, worst", "deg", 15.0),
     ),
     "estimator": (
         Row("broad_deg", "inclination: mean RMSE of five BROAD trials, larger of 95.2 Hz and full rate", "deg", 0.37),

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gravcomp.bench import robot_figures, robot_loop, whole_figures
+from gravcomp.bench import robot_calibration, robot_figures, robot_loop, whole_figures
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
 from gravcomp.experiments.measured import default_folder
@@ -57,8 +57,8 @@ def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, eve
     for file in files or _all_files():
         try:
             name = load_robot_file(str(file)).robot.name
-            progress(f"{name}: loop")
-            measured = robot_loop.measure(str(file), every)
+            calibrated = not figures or any(key in figures for key in robot_calibration.FIGURES)
+            measured = robot_loop.measure(str(file), every, progress, calibrated=calibrated)
         except (ConfigError, MeshError, ArithmeticError, ValueError, RuntimeError) as error:
             name, measured = Path(str(file)).stem, dict.fromkeys(robot_loop.FIGURES) | {"errors": {"loop": str(error)}}
             logging.getLogger(__name__).warning("%s: %s", name, error)

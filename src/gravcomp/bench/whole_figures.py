@@ -7,6 +7,7 @@ from typing import Any
 from gravcomp.bench.engine import calculix_error
 from gravcomp.config import ConfigError
 from gravcomp.experiments import measured
+from gravcomp.trials.coverage import coverage_of_robots
 
 Progress = Callable[[str], None]
 
@@ -19,8 +20,17 @@ FIGURES = {
     "tentacle_mm": "tentacle",
     "tentacle_held_mm": "tentacle",
     "tdcr_mm": "tdcr",
+    "coverage_pct": "coverage",
+    "coverage_width": "coverage",
 }
-"""Each figure and what it comes from: CalculiX' stored table, or a part of `reproduce measured`."""
+"""Each figure and what it comes from: CalculiX' stored table, a part of `reproduce measured`, or `trials.coverage`.
+
+coverage_pct: share of the 95 % intervals of a calibration that contain the truth, of the worst kind of parameter and robot;
+coverage_width: half width of the intervals over the deviation of the errors, widest kind and robot.
+"""
+
+_COVERED = ("tpu_3_long", "silicone_long")  # in addition to the article's, of ../shared/robots
+_SEEDS = 50
 
 
 def run(progress: Progress, wanted: Sequence[str], every: int = 1) -> dict[str, Any]:
@@ -31,6 +41,8 @@ def run(progress: Progress, wanted: Sequence[str], every: int = 1) -> dict[str, 
         try:
             if source == "calculix":
                 data = {"ccx_error_pct": calculix_error(progress, every)["calculix_error_pct"]}
+            elif source == "coverage":
+                data = _coverage(progress, every)
             else:
                 data = measured.run(folder, progress, (source,), brief=every > 1).data
         except ConfigError as error:
@@ -42,3 +54,17 @@ def run(progress: Progress, wanted: Sequence[str], every: int = 1) -> dict[str, 
                 if result[name] is None:
                     logging.getLogger(__name__).warning("%s: %s is not computed from these data", source, name)
     return result
+
+
+def _coverage(progress: Progress, every: int) -> dict[str, Any]:
+    """Return the coverage of the article's robot and two strangers, where their files are. every > 1: fewer seeds."""
+    folder = measured.default_folder().parent / "robots"
+    files = ["article", *(str(folder / f"{name}.yaml") for name in _COVERED if (folder / f"{name}.yaml").is_file())]
+    if len(files) < 1 + len(_COVERED):
+        logging.getLogger(__name__).warning("%s: not all of %s are there; fewer robots are covered", folder, ", ".join(_COVERED))
+    found = coverage_of_robots(files[:1] if every > 1 else files, range(1, 1 + max(3, _SEEDS // every)), progress)
+    shares = {f"{name} {kind}": one for name, kinds in found.items() for kind, one in kinds.items()}
+    return {
+        "coverage_pct": round(100.0 * min(one.share for one in shares.values()), 1),
+        "coverage_width": round(max(one.width for one in shares.values()), 2),
+    }

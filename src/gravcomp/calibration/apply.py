@@ -1,18 +1,20 @@
-"""Calibrated values in the descriptions of robot and motors, and in the robot file, whose comments are kept."""
+"""Calibrated values in the descriptions of robot and motors, and the file that lays them over the robot's."""
 
 import dataclasses
+import datetime
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gravcomp.calibration.motion import MotionFit
+from gravcomp.calibration.parameters import StaticParameters, with_cable_places, with_moduli
 from gravcomp.calibration.pose_prediction import with_moved_cables
 from gravcomp.calibration.poses import PoseParameters
-from gravcomp.calibration.statics import StaticParameters, with_moduli
 from gravcomp.config import ConfigError
-from gravcomp.description import Cable, Robot
+from gravcomp.description import Cable, PronyTerm, Robot, load_robot_file, shipped_robots
+from gravcomp.description.default_hardware import has_motors
 from gravcomp.description.hardware import Hardware
 from gravcomp.orientation.calibration import RestCalibration
 
@@ -20,24 +22,63 @@ if TYPE_CHECKING:
     from ruamel.yaml import YAML
 
 _STIFFEST = 1e6  # N: a stiffer cable is described as inextensible
+_NO_CREEP = 1e-4  # ratio of a branch that is not described
 
 
-def calibrated_robot(robot: Robot, parameters: StaticParameters, damping_time: float | None = None) -> Robot:
-    """Return the robot with the fitted moduli, cable elasticity and, if given, damping time in s."""
+def calibrated_robot(
+    robot: Robot,
+    parameters: StaticParameters,
+    damping_time: float | None = None,
+    creep_times: tuple[float, ...] = (),
+) -> Robot:
+    """Return the robot with the fitted parameters and, if given, damping time in s; creep_times: of its branches in s."""
+    robot = with_cable_places(robot, parameters.radius, parameters.angle)
     cables = tuple(
-        cable.with_stiffness(_stiffness(robot, cable, float(compliance)))
+        dataclasses.replace(
+            cable.with_stiffness(_stiffness(robot, cable, float(compliance))),
+            friction=cable.friction if not parameters.friction else (cable.friction or 0.0) + parameters.friction,
+        )
         for cable, compliance in zip(robot.cables, parameters.compliance)
     )
     if damping_time is not None:
         robot = robot.with_material(damping_time=damping_time)
+    if creep_times:
+        robot = robot.with_material(prony=_terms(parameters.creep, creep_times), creep_ratio=0.0)
     moduli = np.broadcast_to(parameters.youngs_modulus, len(robot.materials))
-    return dataclasses.replace(with_moduli(robot, moduli), cables=cables)
+    robot = with_moduli(robot, moduli)
+    robot = robot.with_materials([dataclasses.replace(m, density=parameters.density * m.density) for m in robot.materials])
+    return dataclasses.replace(
+        robot,
+        cables=cables,
+        payload=dataclasses.replace(robot.payload, mass=parameters.payload * robot.payload.mass),
+        imu_mount=dataclasses.replace(robot.imu_mount, rpy=_turned(robot.imu_mount.rpy, parameters.mount)),
+    )
+
+
+def _terms(ratio: np.ndarray, times: tuple[float, ...]) -> tuple[PronyTerm, ...]:
+    """Return the Prony series of branches of these ratios (b,) to the long-term stiffness."""
+    whole = 1.0 + float(ratio.sum())
+    return tuple(PronyTerm(share=float(one) / whole, time=time) for one, time in zip(ratio, times) if one > _NO_CREEP)
+
+
+def _turned(rpy: tuple[float, float, float], mount: np.ndarray) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw in rad after a further turn by the rotation vector `mount` (3,)."""
+    from scipy.spatial.transform import Rotation
+
+    if not mount.any():
+        return rpy
+    roll, pitch, yaw = (Rotation.from_rotvec(mount) * Rotation.from_euler("xyz", rpy)).as_euler("xyz")
+    return float(roll), float(pitch), float(yaw)
 
 
 def with_behaviour(robot: Robot, motion: MotionFit) -> Robot:
-    """Return the robot with the damping time and the creep that were fitted to its motion."""
+    """Return the robot with the damping time and, if it was fitted, the creep that its motion shows."""
     found = motion.robot.materials[0]
-    return robot.with_material(damping_time=found.damping_time, creep_ratio=found.creep_ratio, creep_time=found.creep_time)
+    if not np.isfinite(motion.creep_ratio_interval):
+        return robot.with_material(damping_time=found.damping_time)
+    return robot.with_material(
+        damping_time=found.damping_time, creep_ratio=found.creep_ratio, creep_time=found.creep_time, prony=()
+    )
 
 
 def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Hardware:
@@ -57,56 +98,108 @@ def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
     return with_moved_cables(robot.with_material(youngs_modulus=parameters.youngs_modulus), parameters)
 
 
+def overlay_path(source: str | Path, name: str) -> Path:
+    """Return where a calibrated robot goes by default: next to the robot file; for a shipped robot into the present folder."""
+    path = Path(source)
+    shipped = path.resolve() in [one.resolve() for one in shipped_robots().values()]
+    return (Path() if shipped else path.parent) / f"{name}-calibrated.yaml"
+
+
 def write_calibrated(
     source: str | Path,
     target: str | Path,
+    before: Robot,
     robot: Robot,
     hardware: Hardware | None,
     virtual_seed: int | None = None,
-    about: str = "",
+    origin: dict[str, Any] | None = None,
 ) -> None:
-    """Write the robot's file `source` to `target` with the calibrated values of `robot` and, if given, `hardware`.
+    """Write to `target` what is different in `robot` from `before`, the robot of the file `source`, and the motors' offsets.
 
-    virtual_seed: of the virtual robot that was measured; the new file names `source` as its description, because a virtual robot
-    drawn around the calibrated values would be another one. about: where the values are from, as a comment at the top. Comments
-    and order are kept. Raises ConfigError if it cannot be written, and for a target that is the source.
+    The new file names `source` as its `base`, so that what is changed there later still counts. virtual_seed: of the virtual
+    robot that was measured; the new file names `source` as its description, because a virtual robot drawn around the calibrated
+    values would be another one. origin: where the values are from, for the key `calibration`. Raises ConfigError if it cannot be
+    written, and for a target that is the source.
     """
-    if Path(target).exists() and Path(target).samefile(source):
+    source, target = Path(source), Path(target)
+    if target.exists() and target.samefile(source):
         raise ConfigError(f"{target}: is the robot file that was calibrated, and is not overwritten; give --write another name")
-    document = _document(source)
-    entries = document["robot"]["segments"] if robot.body is None else [document["robot"]["body"]]
-    shared: set[int] = set()
-    for entry, calibrated in zip(entries, robot.materials):
-        material = entry.setdefault("material", {})
-        if id(material) in shared:  # by a YAML alias: each segment gets values of its own
-            material = entry["material"] = type(material)(material)
-        shared.add(id(material))
-        material["youngs_modulus_mpa"] = round(calibrated.youngs_modulus * 1e-6, 5)
-        material["damping_time_ms"] = round(calibrated.damping_time * 1e3, 3)
-        if calibrated.creep_ratio:
-            material["creep_ratio"] = round(calibrated.creep_ratio, 5)
-            material["creep_time"] = round(calibrated.creep_time, 4)
-    if robot.body is not None and Path(target).resolve().parent != Path(source).resolve().parent:
-        entries[0]["file"] = robot.body.file  # relative to the source, another folder than the target's
-    for entry, cable in zip(document["robot"].get("cables", []), robot.cables):
-        if cable.axial_stiffness is not None:
-            for described in ("material", "diameter_mm"):
-                entry.pop(described, None)
-            entry["axial_stiffness"] = round(cable.axial_stiffness, 2)
-        if cable.angle is not None and abs(math.degrees(cable.angle) - entry["angle_deg"]) > 1e-6:
-            entry["angle_deg"] = round(math.degrees(cable.angle), 3)
-        if cable.tip_radius is not None:
-            entry["tip_radius_mm"] = round(1e3 * cable.tip_radius, 4)
-    motors = document.get("hardware") or {} if hardware is not None else {}
-    if hardware is not None and motors:
-        for entry, motor in zip(motors.get("motors", []), hardware.motors):
-            entry["offset_mm"] = round(motor.offset * 1e3, 4)
-        motors.setdefault("drive", {})["capstan_radius_mm"] = round(hardware.drive.capstan_radius * 1e3, 5)
+    shipped = {path.resolve(): name for name, path in shipped_robots().items()}
+    base = shipped.get(source.resolve()) or (
+        source.name if source.resolve().parent == target.resolve().parent else str(source.resolve())
+    )
+    document: dict[str, Any] = {"base": base}
+    if origin is not None:
+        document["calibration"] = origin
+    document["robot"] = _changed_robot(before, robot)
+    if hardware is not None and has_motors(dict(load_robot_file(source).sections.get("hardware") or {})):
+        document["hardware"] = {
+            "drive": {"capstan_radius_mm": round(hardware.drive.capstan_radius * 1e3, 5)},
+            "motors": [
+                {"cable": motor.cable, "can_id": motor.can_id, "offset_mm": round(motor.offset * 1e3, 4)}
+                for motor in hardware.motors
+            ],
+        }
     if virtual_seed is not None:
-        former = document.get("virtual_robot") or {}
-        origin = former.get("description") or str(Path(source).resolve())
-        document["virtual_robot"] = {"description": origin, "seed": virtual_seed}
+        document["virtual_robot"] = {"description": base, "seed": virtual_seed}
+    about = f"Calibrated on {datetime.date.today().isoformat()}. What is not given here is in the file that `base` names."
     _write(document, target, about)
+
+
+def _changed_robot(before: Robot, robot: Robot) -> dict[str, Any]:
+    """Return the keys of the section `robot` whose values changed."""
+    section: dict[str, Any] = {}
+    materials = [_changed_material(a, b) for a, b in zip(before.materials, robot.materials)]
+    if robot.body is not None:
+        section["body"] = {"material": materials[0]}
+    else:
+        section["segments"] = [{"name": s.name, "material": found} for s, found in zip(robot.segments, materials)]
+    cables = [_changed_cable(a, b) for a, b in zip(before.cables, robot.cables)]
+    if any(len(found) > 1 for found in cables):
+        section["cables"] = cables
+    if robot.payload.mass != before.payload.mass:
+        section["payload"] = {"mass_g": round(1e3 * robot.payload.mass, 4)}
+    if robot.imu_mount.rpy != before.imu_mount.rpy:
+        section["imu_mount"] = {"rpy_deg": [round(math.degrees(angle), 4) for angle in robot.imu_mount.rpy]}
+    return section
+
+
+def _changed_material(before: Any, after: Any) -> dict[str, Any]:
+    """Return the keys of a material whose values changed; modulus and damping time always."""
+    found: dict[str, Any] = {
+        "youngs_modulus_mpa": round(after.youngs_modulus * 1e-6, 5),
+        "damping_time_ms": round(after.damping_time * 1e3, 3),
+    }
+    if after.density != before.density:
+        found["density"] = round(after.density, 2)
+    if after.branches != before.branches:
+        found |= {"creep_ratio": None, "creep_time": None, "prony": None}
+        if after.prony:
+            found["prony"] = [{"share": round(term.share, 5), "time_s": round(term.time, 4)} for term in after.prony]
+        elif after.creep_ratio:
+            found |= {"creep_ratio": round(after.creep_ratio, 5), "creep_time": round(after.creep_time, 4)}
+    return found
+
+
+def _changed_cable(before: Cable, after: Cable) -> dict[str, Any]:
+    """Return the keys of a cable whose values changed, and its name."""
+    found: dict[str, Any] = {"name": after.name}
+    if after.axial_stiffness is not None and after.axial_stiffness != before.axial_stiffness:
+        found |= {"material": None, "diameter_mm": None, "axial_stiffness": round(after.axial_stiffness, 2)}
+    if after.friction != before.friction and after.friction is not None:
+        found["friction"] = round(after.friction, 4)
+    if after.via_points is not None:
+        if after.via_points != before.via_points:
+            found["via_points_mm"] = [[round(1e3 * value, 4) for value in point] for point in after.via_points]
+        return found
+    assert after.angle is not None and after.radius is not None  # Cable.__post_init__
+    if after.angle != before.angle:
+        found["angle_deg"] = round(math.degrees(after.angle), 3)
+    if after.radius != before.radius:
+        found["radius_mm"] = round(1e3 * after.radius, 4)
+    if after.tip_radius is not None and after.tip_radius != before.tip_radius:
+        found["tip_radius_mm"] = round(1e3 * after.tip_radius, 4)
+    return found
 
 
 def write_imu_calibration(source: str | Path, target: str | Path, found: RestCalibration, bias_model: Path | None = None) -> None:
@@ -124,6 +217,13 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
         estimator["bias_model_file"] = str(bias_model.resolve())
     if found.mount is not None:
         _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in found.mount]
+    _write(document, target)
+
+
+def write_mount(source: str | Path, target: str | Path, rpy: tuple[float, float, float]) -> None:
+    """Write the robot's file `source` to `target` with the mount of the IMU: roll, pitch, yaw in rad. Raises ConfigError."""
+    document = _document(source)
+    _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
     _write(document, target)
 
 

@@ -1,30 +1,24 @@
-"""Estimates of a static fit with their intervals, and warnings about parameters that the data do not determine."""
+"""Estimates of a static fit with their intervals, and why the data do not determine some of them."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.measured import StillWindows
-from gravcomp.calibration.statics import StaticParameters
-from gravcomp.calibration.unknowns import Unknown
+from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.description import Robot
 
 SEEN = 0.7  # a posterior deviation above this fraction of the prior's means that the data do not determine the value
 SEEN_MODULUS = 0.1  # the same for a modulus, which has no prior of its own: relative deviation
 IMPLAUSIBLE = 4.0  # in deviations of the prior: no maker is so far off, so the value stands for something else
-CORRELATED = 0.95
+_WEAK = 1.0 / SEEN**2 - 1.0  # information in x, below which the prior outweighs the data
+_PARTNER = 0.3  # of the largest entry of a weak combination: what belongs to it
 
-
-def unfit(unknown: Unknown, value: float, sigma: float, half: float) -> str:
-    """Return why an unknown is not fitted, empty where data determine it; value, deviation and half interval are in x."""
-    if unknown.kind == "modulus":
-        return ""
-    if sigma >= SEEN:
-        return f"its interval would be {half / 1.96:.0%} of what was assumed before; less than {SEEN:.0%} is needed"
-    if unknown.kind == "winding" and abs(value) > IMPLAUSIBLE:
-        found, most = 1.0 + value * unknown.scale, IMPLAUSIBLE * unknown.scale
-        return f"{found:.3f} fits best, and no capstan is wrong by more than {most:.0%}: the description is wrong elsewhere"
-    return ""
+_UNITS = {
+    "modulus": ("MPa", 1e-6), "offset": ("mm", 1e3), "compliance": ("mm/N", 1e3), "radius": ("%", 100.0),
+    "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -32,7 +26,7 @@ class Estimate:
     """One fitted parameter in its edge unit.
 
     interval: half width at 95 %; seen: whether the data determine it; one that they do not keeps the value `initial`, and its
-    interval says how little they show.
+    interval says how little they show. kind and index: of the unknown.
     """
 
     name: str
@@ -42,6 +36,60 @@ class Estimate:
     interval: float
     seen: bool
     reason: str = ""  # why it is not fitted
+    kind: str = ""
+    index: int = 0
+
+
+def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> str:
+    """Return the name of an unknown; times: of the branches of creep in s."""
+    first = unknown.index[0]
+    if unknown.kind == "modulus":
+        return "Young's modulus" + (f" of {robot.segments[first].name}" if len(robot.materials) > 1 else "")
+    if unknown.kind in ("offset", "compliance", "radius", "angle"):
+        return f"{unknown.kind} of {', '.join(robot.cables[c].name for c in unknown.index)}"
+    if unknown.kind == "creep":
+        return f"creep within {times[first]:.3g} s"
+    names = {
+        "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
+        "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
+    }  # fmt: skip
+    return names[unknown.kind]
+
+
+def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: list[str]) -> str:
+    """Return why an unknown is not fitted, empty where data determine it; value, deviation and half interval are in x.
+
+    partners: names of what moves no tip if it changes together with this one.
+    """
+    if unknown.kind == "modulus":
+        return ""
+    if sigma >= SEEN:
+        if partners:
+            return f"changed together with {', '.join(partners)}, it moves no tip: the data show one combination of them only"
+        return f"its interval would be {half / 1.96:.0%} of what was assumed before; less than {SEEN:.0%} is needed"
+    if unknown.kind == "winding" and abs(value) > IMPLAUSIBLE:
+        found, most = 1.0 + value * unknown.scale, IMPLAUSIBLE * unknown.scale
+        return f"{found:.3f} fits best, and no capstan is wrong by more than {most:.0%}: the description is wrong elsewhere"
+    return ""
+
+
+def partners_of(information: np.ndarray, unknowns: list[Unknown], priors: Priors) -> list[list[int]]:
+    """Return for each unknown those that no tip tells apart from it, by the weak eigenvectors of the information (u, u) in x.
+
+    The moduli have no prior of their own; their entries count in deviations of their scatter.
+    """
+    scale = np.array([priors.moduli if unknown.kind == "modulus" else 1.0 for unknown in unknowns])
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    weak = vectors[:, values < _WEAK]
+    found: list[list[int]] = []
+    for i in range(len(unknowns)):
+        if not weak.shape[1] or np.abs(weak[i]).max() < _PARTNER:
+            found.append([])
+            continue
+        # What in all weak combinations goes along with this one: its projection onto them.
+        along = weak @ weak[i]
+        found.append([j for j in range(len(unknowns)) if j != i and abs(along[j]) >= _PARTNER * abs(along[i])])
+    return found
 
 
 def estimate(
@@ -52,51 +100,34 @@ def estimate(
     half: float,
     sigma: float,
     reason: str,
+    times: tuple[float, ...] = (),
 ) -> Estimate:
     """Return the estimate of an unknown; half width of its interval and standard deviation sigma are in x."""
-    cables, interval = list(unknown.index), unknown.scale * half
+    first, (unit, factor) = unknown.index[0], _UNITS.get(unknown.kind, ("", 1.0))
+    before, value = (float(factor * p.values(unknown.kind)[first]) for p in (initial, final))
+    name = name_of(robot, unknown, times)
     if unknown.kind == "modulus":
-        s = cables[0]
-        name = "Young's modulus" + (f" of {robot.segments[s].name}" if len(robot.materials) > 1 else "")
-        before, value = initial.youngs_modulus[s] * 1e-6, final.youngs_modulus[s] * 1e-6
-        return Estimate(name, "MPa", before, value, value * half, sigma < SEEN_MODULUS)
-    names, seen = ", ".join(robot.cables[c].name for c in cables), not reason
-    if unknown.kind == "offset":
-        return Estimate(f"offset of {names}", "mm", 0.0, 1e3 * final.offset[cables[0]], 1e3 * interval, seen, reason)
-    if unknown.kind == "winding":
-        return Estimate("winding ratio", "", initial.winding, final.winding, interval, seen, reason)
-    before, after = 1e3 * initial.compliance[cables[0]], 1e3 * final.compliance[cables[0]]
-    return Estimate(f"compliance of {names}", "mm/N", before, after, 1e3 * interval, seen, reason)
+        return Estimate(name, unit, before, value, value * half, bool(sigma < SEEN_MODULUS), "", "modulus", first)
+    return Estimate(name, unit, before, value, factor * unknown.scale * half, not reason, reason, unknown.kind, first)
 
 
-def warnings(
-    robot: Robot, windows: StillWindows, unknowns: list[Unknown], estimates: tuple[Estimate, ...], covariance: np.ndarray
-) -> list[str]:
-    """Return sentences about the parameters that these data do not determine."""
+def warnings(robot: Robot, unknowns: list[Unknown], estimates: tuple[Estimate, ...], driven: bool) -> list[str]:
+    """Return sentences about the parameters that these data do not determine. driven: whether cables were pulled in the data."""
     found = []
     with_offset = {u.index[0] for u in unknowns if u.kind == "offset"}
     slack = [cable.name for i, cable in enumerate(robot.cables) if i not in with_offset]
     if slack and with_offset:
         found.append(f"{', '.join(slack)}: never taut in these data, so the offset cannot be fitted and keeps its value")
-    if not with_offset and np.isfinite(windows.displacement).any():
+    if not with_offset and driven:
         found.append("no cable is ever taut in these data: only the modulus was fitted")
-    found += [
-        f"{e.name}: cannot be told from these data, and keeps {f'{e.initial:.4g} {e.unit}'.strip()}: {e.reason}"
-        for u, e in zip(unknowns, estimates)
-        if not e.seen and u.kind != "modulus"
-    ]
+    for reason in dict.fromkeys(e.reason for e in estimates if e.reason):
+        alike = [e for e in estimates if e.reason == reason]
+        kept = ", ".join(dict.fromkeys(f"{e.initial:.4g} {e.unit}".strip() for e in alike))
+        names = ", ".join(e.name for e in alike)
+        found.append(f"{names}: cannot be told from these data, and keeps {kept}: {reason}")
     found += [
         f"{e.name}: these data hardly determine it (± {e.interval:.2g} {e.unit})"
-        for u, e in zip(unknowns, estimates)
-        if not e.seen and u.kind == "modulus"
+        for e in estimates
+        if not e.seen and e.kind == "modulus"
     ]
-    deviation = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(deviation, deviation)
-    for i in range(len(estimates)):
-        for j in range(i):
-            if estimates[i].seen and estimates[j].seen and abs(correlation[i, j]) > CORRELATED:
-                found.append(
-                    f"{estimates[j].name} and {estimates[i].name} can hardly be distinguished"
-                    f" (correlation {correlation[i, j]:+.2f}): add poses in other directions"
-                )
     return found

@@ -30,17 +30,34 @@ def read_measured(path: str | Path, cables: tuple[str, ...], tip_topic: str | No
 
 def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
     """Write a CSV file that `read_measured` reads."""
-    gravity, tip = ["gravity_x", "gravity_y", "gravity_z"], ["tip_x_mm", "tip_y_mm", "tip_z_mm"]
-    direction = ["direction_x", "direction_y", "direction_z"] if measured.tip_direction is not None else []
+    directed = measured.tip_direction is not None
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["trial", "time_s", *gravity, *(f"{name}_mm" for name in cables), *tip, *direction])
+        writer.writerow(csv_header(cables, directed))
         for row in range(len(measured.time)):
-            wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in measured.displacement[row]]
-            values = [f"{x:.5f}" for x in measured.gravity[row]] + wound + [f"{1e3 * x:.4f}" for x in measured.tip_position[row]]
-            if measured.tip_direction is not None:
-                values += [f"{x:.6f}" for x in measured.tip_direction[row]]
-            writer.writerow([int(measured.trial[row]), f"{measured.time[row]:.4f}", *values])
+            direction = None if measured.tip_direction is None else measured.tip_direction[row]
+            writer.writerow(
+                csv_row(
+                    int(measured.trial[row]), float(measured.time[row]), measured.gravity[row], measured.displacement[row],
+                    measured.tip_position[row], direction,
+                )
+            )  # fmt: skip
+
+
+def csv_header(cables: tuple[str, ...], directed: bool) -> list[str]:
+    """Return the header of such a file; directed: with the tip's direction."""
+    gravity, tip = ["gravity_x", "gravity_y", "gravity_z"], ["tip_x_mm", "tip_y_mm", "tip_z_mm"]
+    direction = ["direction_x", "direction_y", "direction_z"] if directed else []
+    return ["trial", "time_s", *gravity, *(f"{name}_mm" for name in cables), *tip, *direction]
+
+
+def csv_row(
+    trial: int, time: float, gravity: np.ndarray, displacement: np.ndarray, tip: np.ndarray, direction: np.ndarray | None
+) -> list:
+    """Return the row of one sample, in SI."""
+    wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in displacement]
+    values = [f"{x:.5f}" for x in gravity] + wound + [f"{1e3 * x:.4f}" for x in tip]
+    return [trial, f"{time:.4f}", *values, *([] if direction is None else [f"{x:.6f}" for x in direction])]
 
 
 def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:

@@ -44,6 +44,29 @@ class Measured:
 
 
 @dataclass(frozen=True)
+class Start:
+    """The first sample of a trial: time in s, gravity (3,), displacement (m,). The robot counts as relaxed there."""
+
+    time: float
+    gravity: np.ndarray
+    displacement: np.ndarray
+
+
+@dataclass(frozen=True)
+class History:
+    """When k windows were, in the order of time within each trial.
+
+    trial (k,); began (k,) in s: since when gravity and cables are as in the window; time (k,) in s: of its middle; starts: of the
+    trials, by number.
+    """
+
+    trial: np.ndarray
+    began: np.ndarray
+    time: np.ndarray
+    starts: dict[int, Start]
+
+
+@dataclass(frozen=True)
 class StillWindows:
     """Means over k windows in which nothing moves, one row per window."""
 
@@ -51,43 +74,98 @@ class StillWindows:
     displacement: np.ndarray  # (k, m), NaN: released
     tip_position: np.ndarray  # (k, 3)
     tip_direction: np.ndarray | None = None  # (k, 3), of length 1; None: not measured
+    history: History | None = None  # None: every window is relaxed
+    share: np.ndarray | None = None  # (k,): one over the number of windows of the same rest; None: one each
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(k,) weight of each window: those of one rest count as one measurement, because the model's error is one."""
+        return np.ones(len(self.gravity)) if self.share is None else self.share
 
 
-def still_windows(measured: Measured, still: Standstill) -> StillWindows:
-    """Return the last window of every period of rest of each trial; at rest, gravity, cables and tip do not move.
+def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> StillWindows:
+    """Return the windows at rest of each trial; at rest, gravity, cables and tip do not move.
 
-    Raises MeasurementError if there is none.
+    parts: windows of each rest, equally long in the logarithm of the time since cables and base came to rest, because a body
+    creeps by such times; with one it is the last window of the rest. Raises MeasurementError if there is none.
     """
-    found = []
+    found, starts = [], {}
     for trial in measured.trials():
-        found += _windows_of(trial, still)
+        number = int(trial.trial[0])
+        starts[number] = Start(float(trial.time[0]), trial.gravity[0], trial.displacement[0])
+        for first, last in rests_of(trial, still):
+            began = _began(trial, first, last, still)
+            pieces = _pieces(trial, began, first, last, still, parts)
+            for rows in pieces:
+                window = trial.rows(rows)
+                direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
+                found.append(
+                    (
+                        *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
+                        direction,
+                        number,
+                        trial.time[began],
+                        window.time.mean(),
+                        1.0 / len(pieces),
+                    )
+                )
     if not found:
         raise MeasurementError(
             f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    gravity, displacement, tip, direction = (np.array(column) for column in zip(*found))
-    if measured.tip_direction is None or np.ptp(measured.tip_direction, axis=0).max() == 0.0:
-        # A tracker of positions alone publishes one and the same orientation.
-        return StillWindows(gravity, displacement, tip)
-    return StillWindows(gravity, displacement, tip, direction / np.linalg.norm(direction, axis=1, keepdims=True))
+    gravity, displacement, tip, direction, trials, since, middle, share = (np.array(column) for column in zip(*found))
+    directed = measured.tip_direction is not None and np.ptp(measured.tip_direction, axis=0).max() > 0.0
+    # A tracker of positions alone publishes one and the same orientation.
+    unit = direction / np.linalg.norm(direction, axis=1, keepdims=True) if directed else None
+    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share)
 
 
-def _windows_of(trial: Measured, still: Standstill) -> list[tuple]:
-    """Return the last window at rest before each movement, and before the end of the trial."""
+def rests_of(trial: Measured, still: Standstill) -> list[tuple[int, int]]:
+    """Return first and last sample of every rest."""
     count, limit = still.samples(trial.time), still.tip_limit(trial.tip_position)
-    windows, last = [], None
+    rests: list[tuple[int, int]] = []
+    resting = False
     for start in range(0, len(trial.time) - count + 1, max(1, count // 2)):
-        window = trial.rows(np.arange(start, start + count))
-        if _is_still(window, still, limit):
-            direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
-            last = (
-                window.gravity.mean(axis=0), window.displacement.mean(axis=0), window.tip_position.mean(axis=0), direction
-            )  # fmt: skip
-        elif last is not None:
-            windows.append(last)
-            last = None
-    return windows + ([last] if last is not None else [])
+        if not _is_still(trial.rows(np.arange(start, start + count)), still, limit):
+            resting = False
+        elif resting and _same(trial, rests[-1][1], start + count - 1, still):
+            rests[-1] = rests[-1][0], start + count - 1
+        else:
+            rests.append((start, start + count - 1))
+            resting = True
+    return rests
+
+
+def _same(trial: Measured, one: int, other: int, still: Standstill) -> bool:
+    """Return whether cables and gravity are the same at two samples: slow turns are no rest."""
+    return _away(trial, other, np.array([one]), still)[0] <= 1.0
+
+
+def _away(trial: Measured, row: int, rows: np.ndarray, still: Standstill) -> np.ndarray:
+    """Return (r,) how far cables and gravity at `rows` are from those at `row`, over what counts as the same."""
+    moved = np.abs(np.nan_to_num(trial.displacement[rows]) - np.nan_to_num(trial.displacement[row])).max(axis=1, initial=0.0)
+    released = (np.isnan(trial.displacement[rows]) != np.isnan(trial.displacement[row])).any(axis=1)
+    unit = trial.gravity / np.linalg.norm(trial.gravity, axis=1, keepdims=True)
+    turned = np.abs(unit[rows] - unit[row]).max(axis=1)
+    return np.maximum(np.maximum(moved / (2.0 * still.cable), turned / (2.0 * still.gravity)), np.where(released, np.inf, 0.0))
+
+
+def _began(trial: Measured, first: int, last: int, still: Standstill) -> int:
+    """Return the sample since which cables and gravity are as in the rest."""
+    away = np.flatnonzero(_away(trial, last, np.arange(first), still) > 1.0)
+    return int(away[-1]) + 1 if len(away) else 0
+
+
+def _pieces(trial: Measured, began: int, first: int, last: int, still: Standstill, parts: int) -> list[np.ndarray]:
+    """Return the samples of the windows of a rest."""
+    count = still.samples(trial.time)
+    if parts == 1:
+        return [np.arange(last - count + 1, last + 1)]
+    since = trial.time[first : last + 1] - trial.time[began]
+    edges = np.geomspace(max(since[0], 0.1 * still.time), since[-1] + 1e-9, parts + 1)[1:-1]
+    pieces = np.split(np.arange(first, last + 1), np.searchsorted(since, edges))
+    return [piece for piece in pieces if len(piece) >= count // 2]
 
 
 def _is_still(window: Measured, still: Standstill, limit: float) -> bool:

@@ -18,9 +18,9 @@ def calibration_result(
     rows = [
         (
             e.name,
-            f"{e.initial:.4g} {e.unit}",
-            f"{e.value:.5g} {e.unit}" if e.seen or not e.reason else "kept",
-            f"± {e.interval:.2g} {e.unit}",
+            f"{e.initial:.4g} {e.unit}".strip(),
+            f"{e.value:.5g} {e.unit}".strip() if e.seen or not e.reason else "kept",
+            f"± {e.interval:.2g} {e.unit}".strip(),
             e.seen,
         )
         for e in statics.estimates
@@ -77,10 +77,16 @@ def calibration_result(
         parts=[Table("Parameters", ("parameter", "before", "after", "interval", "seen in the data"), rows), *parts],
         notes=[
             *warnings,
-            "The density is taken as given: gravity bends the robot by density over modulus, so the data cannot determine both.",
+            *(
+                ["The density is taken as given: gravity bends the robot by density over modulus, so tips cannot tell both."]
+                if "density" not in statics.fitted
+                else []
+            ),
         ],
         data={
             "parameters": [vars(e) for e in statics.estimates],
+            "tip_error_before_mm": 1e3 * statics.rms_before,
+            "tip_error_after_mm": 1e3 * statics.rms_after,
             "damping_time_ms": None
             if motion is None or not motion.damping_seen
             else [1e3 * motion.damping_time, 1e3 * motion.damping_interval],
@@ -89,17 +95,22 @@ def calibration_result(
     )
 
 
-def origin_of(source: str, measured: Measured, statics: StaticFit) -> str:
-    """Return where calibrated values are from, in lines for the top of the robot file: date, data, intervals, residuals."""
-    lines = [
-        f"Calibrated on {datetime.date.today().isoformat()}: {source} fitted to {measured.source},"
-        f" {len(statics.windows.tip_position)} poses at rest.",
-        f"Tip error at rest: {1e3 * statics.rms_before:.3g} mm before, {1e3 * statics.rms_after:.3g} mm after (RMS). At 95 %:",
-    ]
+def origin_of(source: str, data: str, statics: StaticFit) -> dict:
+    """Return where calibrated values are from: date, data, residuals, and each value with its interval at 95 %."""
+    values = {}
     for e in statics.estimates:
-        value = f"{e.value:.5g} +- {e.interval:.2g} {e.unit}".rstrip() if e.seen or not e.reason else "kept, not seen in the data"
-        lines.append(f"  {e.name}: {value}")
-    return "\n".join(lines)
+        unit = f" {e.unit}".rstrip()
+        kept = f"kept: {e.reason}" if e.reason else "hardly seen in the data"
+        values[e.name] = f"{e.value:.5g} +- {e.interval:.2g}{unit}" if e.seen else f"{e.initial:.5g}{unit}, {kept}"
+    return {
+        "date": datetime.date.today().isoformat(),
+        "robot": source,
+        "data": data,
+        "rests": round(float(statics.windows.shares.sum())),
+        "tip_error_before_mm": round(1e3 * statics.rms_before, 4),
+        "tip_error_after_mm": round(1e3 * statics.rms_after, 4),
+        "values_at_95_percent": values,
+    }
 
 
 def _tips(fit: StaticFit) -> str:

@@ -16,9 +16,7 @@ class StandstillOptions:
     tip_share: float = parameter(0.006, minimum=1e-6, maximum=0.5, description="largest motion of the tip, over the length")
     tip_noises: float = parameter(6.0, minimum=2.0, maximum=100.0, description="the same in deviations of the tracker's noise")
     cable_share: float = parameter(5e-4, minimum=1e-6, maximum=0.5, description="largest motion of a cable, over the length")
-    gravity: float = parameter(
-        float(np.radians(0.5)), edge="deg", minimum=1e-4, maximum=90.0, description="largest turn of the base"
-    )
+    gravity: float = parameter(0.5, edge="deg", minimum=1e-4, maximum=90.0, description="largest turn of the base")
     motion_share: float = parameter(
         0.03, minimum=1e-4, maximum=1.0, description="a tip that moves this far in a window shows the damping, over the length"
     )

@@ -1,11 +1,14 @@
-"""Predicted resting tips and their derivatives by the moduli, cable offsets, cable compliance and winding ratio.
+"""Predicted resting tips and their derivatives by the parameters of a robot.
 
-One model serves all moduli: their ratios to the described ones scale the stiffness of its elements. A cable that the motor
-displaces by u pulls the path in by w u + o - c lambda, where o is its offset, c its compliance, lambda its tension and w the
-winding ratio of all motors: it accounts for the real radius of the capstans and the real distance of the cables from the axis.
+A cable that the motor displaces by u pulls the path in by w u + o - c lambda, where o is its offset, c its compliance, lambda its
+tension and w the winding ratio of all motors. The path itself may lie farther from the axis and be turned about it; gravity acts
+through the density, the payload and the mount of the IMU; the body creeps by branches of given times (`full_model.viscosity`).
 
-Derivatives follow from the linear response of each shape (taut cables a): dtip/do = W_ea W_aa^-1, dtip/dc = -dtip/do lambda,
-dtip/dw = dtip/do u. Those by the moduli are difference quotients.
+One model serves all parameters: moduli scale the stiffness of its elements, density and payload its weights. Windows are computed
+in the order of time, so that each begins with what the branches hold (`walk`).
+
+Derivatives by offset, compliance and winding follow from the linear response of each shape (taut cables a): dtip/do = W_ea
+W_aa^-1, dtip/dc = -dtip/do lambda, dtip/dw = dtip/do u. All others are difference quotients.
 """
 
 import dataclasses
@@ -13,115 +16,174 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.cables.routing import route_cables
+from gravcomp.cables.tendons import Tendons
 from gravcomp.calibration.measured import StillWindows
-from gravcomp.description import Robot
-from gravcomp.simulation import Shape, Simulator
+from gravcomp.calibration.parameters import StaticParameters, with_cable_places, with_moduli
+from gravcomp.calibration.walk import Step, Walk, steps_of
+from gravcomp.description import PronyTerm, Robot
+from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.mesh.tube import with_coarse_elements
 
-_MODULUS_STEP = 1e-3
+_STEPS = {
+    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 2e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
+    "angle": 5e-3,
+}  # fmt: skip
+"""Steps of the difference quotients, in the units of `StaticParameters`; of the modulus: of its logarithm."""
 
-
-@dataclass(frozen=True)
-class StaticParameters:
-    """Parameters of the static fit.
-
-    youngs_modulus (s,) in Pa of the segments, or of the body from a file; offset (m,) in m; compliance (m,) in m/N; winding:
-    ratio w.
-    """
-
-    youngs_modulus: np.ndarray
-    offset: np.ndarray
-    compliance: np.ndarray
-    winding: float = 1.0
+_SMALL = 1e-9  # ratio of a branch that does not creep, so that the model has it
 
 
 @dataclass(frozen=True)
 class StaticPrediction:
-    """Predictions for k windows.
-
-    tip (k, 6): position in m and direction; its derivatives by_modulus (k, 6, s) by the logarithms of the moduli, by_offset (k,
-    6, m) in 1/m, by_compliance (k, 6, m) in N/m, by_winding (k, 6); tension (k, m) in N.
-    """
+    """Predictions for k windows: tip (k, 6), position in m and direction; tension (k, m) in N."""
 
     tip: np.ndarray
-    by_modulus: np.ndarray
-    by_offset: np.ndarray
-    by_compliance: np.ndarray
-    by_winding: np.ndarray
     tension: np.ndarray
-
-
-def with_moduli(robot: Robot, moduli: np.ndarray) -> Robot:
-    """Return the robot with these moduli (s,) in Pa of its segments, or of its body from a file; caps keep theirs."""
-    return robot.with_materials(
-        [dataclasses.replace(material, youngs_modulus=float(modulus)) for material, modulus in zip(robot.materials, moduli)]
-    )
 
 
 class StaticPredictor:
     """Predicts the tips of a robot at rest in given windows."""
 
-    def __init__(self, robot: Robot, windows: StillWindows):
-        self.windows = windows
-        self._simulator = Simulator(robot, reduced=False)
-        self._present = np.array([material.youngs_modulus for material in robot.materials])
-        self._elements = self._elements_of_segments()
+    def __init__(self, robot: Robot, windows: StillWindows, creep_times: tuple[float, ...] = ()):
+        """creep_times: of the branches in s; none: the body creeps as it is described. Raises MeshError."""
+        self.windows, self._robot = windows, robot
+        self._described = np.array([material.youngs_modulus for material in robot.materials])
+        model = RobotModel(_with_branches(robot, creep_times) if creep_times else robot)
+        self._model, self._present = model, self._described
+        self._elements = _elements_of_segments(model, len(self._described))
+        self._payload = robot.payload.mass * model.effectors.tip_weights
+        self._carried = model.nodal_weight - model.body_weight - self._payload
+        self._friction = model.tendons.friction.coefficient.copy()
+        self._steps = steps_of(windows, crept=bool(creep_times))
+        self._tendons: dict[tuple[float, ...], Tendons] = {self._key(np.zeros((2, model.tendons.count))): model.tendons}
+        self._walk = Walk(model, creep_times)
+        self._last: tuple[bytes, list[Step]] | None = None
+        self._coarse: StaticPredictor | None = None
+        self._creep_times = creep_times
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
-        self._simulator.model.tendons.axial_compliance = parameters.compliance
-        rows = [self._window(k, parameters) for k in range(len(self.windows.tip_position))]
-        return StaticPrediction(*(np.array(column) for column in zip(*rows)))
+        shown = [step for step in self._walked(parameters) if step.window is not None]
+        return StaticPrediction(np.array([step.tip for step in shown]), np.array([step.tension for step in shown]))
 
-    def _elements_of_segments(self) -> np.ndarray:
-        """Return (s, k) whether the modulus of segment s is that of element k; caps of their own material belong to none."""
-        model = self._simulator.model
-        robot, region, count = model.robot, model.mesh.region, len(self._present)
-        if robot.body is not None:
-            return np.ones((1, len(region)), dtype=bool)
-        found = []
-        for s in range(count):
-            changed = with_moduli(robot, self._present * np.where(np.arange(count) == s, 2.0, 1.0)).pieces
-            differs = [a.material.youngs_modulus != b.material.youngs_modulus for a, b in zip(robot.pieces, changed)]
-            found.append(np.array(differs)[region])
-        return np.array(found)
+    def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
+        """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.
 
-    def _set(self, moduli: np.ndarray) -> None:
-        """Give the model the moduli (s,) in Pa."""
-        factor = np.where(self._elements, (moduli / self._present)[:, None], 1.0).prod(axis=0)
-        self._simulator.model.elements.scale_stiffness(factor)
-        self._present = moduli
+        They are those of a coarse mesh, which are right within a few per cent.
+        """
+        if self._coarse is None:
+            coarse = with_coarse_elements(self._robot)
+            self._coarse = self if coarse == self._robot else StaticPredictor(coarse, self.windows, self._creep_times)
+        if self._coarse is not self:
+            return self._coarse.differentiate(parameters, kinds)
+        steps = self._walked(parameters)
+        shown = [step for step in steps if step.window is not None]
+        found = {kind: self._differences(parameters, kind, steps, shown) for kind in _WALKED if kind in kinds}
+        by_offset = np.array([step.by_offset for step in shown])
+        wound = np.nan_to_num(np.array([self.windows.displacement[step.window] for step in shown]))
+        found["offset"] = by_offset
+        found["compliance"] = -by_offset * np.array([step.tension for step in shown])[:, None, :]
+        found["winding"] = np.einsum("kec,kc->ke", by_offset, wound)[:, :, None]
+        self._apply(parameters)
+        for kind in ("radius", "angle"):
+            if kind in kinds:
+                found[kind] = self._by_place(parameters, kind, shown)
+        return found
 
-    def _window(self, k: int, parameters: StaticParameters) -> tuple:
-        """Return window k's entries of a StaticPrediction."""
-        count = len(self._present)
-        moduli = np.array(np.broadcast_to(parameters.youngs_modulus, count))
-        self._set(moduli)
-        shape = self._solve(k, parameters)
-        tip, by_modulus = _tip(shape), np.zeros((6, count))
-        taut = shape.cable_tension > 0.0
-        by_offset = np.zeros((6, len(taut)))
-        if taut.any():
-            response = shape.response
-            own = response.compliance_aa[np.ix_(taut, taut)]
-            by_offset[:, taut] = np.linalg.solve(own.T, response.compliance_ea[:6, taut].T).T
-        by_winding = by_offset @ np.nan_to_num(self.windows.displacement[k])
-        for s in range(count):
-            self._set(moduli * np.where(np.arange(count) == s, 1.0 + _MODULUS_STEP, 1.0))
-            by_modulus[:, s] = (_tip(self._solve(k, parameters)) - tip) / np.log1p(_MODULUS_STEP)
-        tension = shape.cable_tension
-        return tip, by_modulus, by_offset, -by_offset * tension, by_winding, tension
+    def _walked(self, parameters: StaticParameters) -> list[Step]:
+        """Return the steps at the parameters; those of the last call are kept."""
+        key = parameters.key
+        if self._last is None or self._last[0] != key:
+            self._apply(parameters)
+            self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, self._last and self._last[1])
+        return self._last[1]
 
-    def _solve(self, k: int, parameters: StaticParameters) -> Shape:
-        """Return the shape in window k at the model's present moduli."""
-        displacement = parameters.winding * self.windows.displacement[k] + parameters.offset
-        shape = self._simulator.step(self.windows.gravity[k], displacement)
-        if shape.status != 0:
-            raise RuntimeError(
-                f"no equilibrium at {', '.join(f'{e * 1e-6:.3g}' for e in self._present)} MPa in window {k + 1}: {shape.message}"
+    def _inputs(self, parameters: StaticParameters) -> list[Step]:
+        """Return the steps with the gravity and the displacements that the parameters make of the measured ones."""
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_rotvec(parameters.mount)
+        return [
+            dataclasses.replace(
+                step,
+                gravity=turn.apply(step.gravity),
+                displacement=parameters.winding * step.displacement + parameters.offset,
             )
-        return shape
+            for step in self._steps
+        ]
+
+    def _apply(self, parameters: StaticParameters) -> None:
+        """Give the model the parameters."""
+        model = self._model
+        moduli = np.broadcast_to(parameters.youngs_modulus, len(self._described))
+        model.elements.scale_stiffness(np.where(self._elements, (moduli / self._present)[:, None], 1.0).prod(axis=0))
+        self._present = np.array(moduli)
+        model.nodal_weight = parameters.density * model.body_weight + parameters.payload * self._payload + self._carried
+        self._set_tendons(parameters, np.stack([parameters.radius, parameters.angle]))
+
+    def _set_tendons(self, parameters: StaticParameters, places: np.ndarray) -> None:
+        """Give the model cables at the places (2, m): radius and angle, as in `StaticParameters`."""
+        key = self._key(places)
+        if key not in self._tendons:
+            robot = with_cable_places(self._model.robot, *places)
+            mesh = self._model.mesh
+            self._tendons[key] = Tendons(robot.cables, route_cables(robot, mesh), mesh.nodes, self._model.pattern)
+            while len(self._tendons) > 6 * places.shape[1] + 2:
+                self._tendons.pop(next(iter(self._tendons)))
+        self._model.tendons = tendons = self._tendons[key]
+        tendons.axial_compliance = parameters.compliance
+        tendons.friction.coefficient = self._friction + parameters.friction
+
+    @staticmethod
+    def _key(places: np.ndarray) -> tuple[float, ...]:
+        return tuple(places.ravel().tolist())
+
+    def _differences(self, parameters: StaticParameters, kind: str, steps: list[Step], shown: list[Step]) -> np.ndarray:
+        """Return the difference quotients (k, 6, n) by a field, each from a walk of its own near `steps`."""
+        here, columns = np.array([step.tip for step in shown]), []
+        for index in range(parameters.count(kind)):
+            moved = parameters.changed(kind, (index,), _STEPS[kind])
+            self._apply(moved)
+            walked = self._walk.run(self._inputs(moved), moved.creep, steps)
+            there = np.array([step.tip for step in walked if step.window is not None])
+            columns.append((there - here) / _STEPS[kind])
+        return np.stack(columns, axis=2)
+
+    def _by_place(self, parameters: StaticParameters, kind: str, shown: list[Step]) -> np.ndarray:
+        """Return the derivatives (k, 6, m) by the places of the cables: only taut ones move the tip."""
+        result = np.zeros((len(shown), 6, parameters.count(kind)))
+        inputs = [step for step in self._inputs(parameters) if step.window is not None]
+        for cable in range(result.shape[2]):
+            taut = [k for k, step in enumerate(shown) if step.tension[cable] > 0.0]
+            if not taut:
+                continue
+            moved = parameters.changed(kind, (cable,), _STEPS[kind])
+            self._set_tendons(parameters, np.stack([moved.radius, moved.angle]))
+            for k in taut:
+                there = self._walk.near(inputs[k], shown[k])
+                result[k, :, cable] = (there - shown[k].tip) / _STEPS[kind]
+        return result
 
 
-def _tip(shape: Shape) -> np.ndarray:
-    """Return position and direction (6,) of the tip."""
-    return np.concatenate([shape.tip_position, shape.tip_direction])
+_WALKED = ("modulus", "density", "payload", "mount", "creep", "friction")
+
+
+def _with_branches(robot: Robot, times: tuple[float, ...]) -> Robot:
+    """Return the robot whose segments have branches of these times in s, without stiffness."""
+    terms = tuple(PronyTerm(share=_SMALL, time=time) for time in times)
+    return robot.with_material(prony=terms, creep_ratio=0.0)
+
+
+def _elements_of_segments(model: RobotModel, count: int) -> np.ndarray:
+    """Return (s, k) whether the modulus of segment s is that of element k; caps of their own material belong to none."""
+    robot, region = model.robot, model.mesh.region
+    if robot.body is not None:
+        return np.ones((1, len(region)), dtype=bool)
+    moduli = np.array([material.youngs_modulus for material in robot.materials])
+    found = []
+    for s in range(count):
+        changed = with_moduli(robot, moduli * np.where(np.arange(count) == s, 2.0, 1.0)).pieces
+        differs = [a.material.youngs_modulus != b.material.youngs_modulus for a, b in zip(robot.pieces, changed)]
+        found.append(np.array(differs)[region])
+    return np.array(found)

@@ -4,13 +4,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.statics import StaticParameters, StaticPrediction
+from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.statics import StaticPrediction
 from gravcomp.config import parameter
 from gravcomp.description import Cable, Robot
 
 MODULUS_RANGE = (0.02, 50.0)  # times the modulus at the start
 _FARTHEST = 20.0  # bound of the other unknowns, in their scales
 _TAUT = 1e-4  # of the largest tension: a cable with more counts as taut
+
+GROUPS = {
+    "offsets": ("offset",),
+    "compliance": ("compliance",),
+    "winding": ("winding",),
+    "places": ("radius", "angle"),
+    "weight": ("density", "payload"),
+    "mount": ("mount",),
+    "creep": ("creep",),
+    "friction": ("friction",),
+}
+"""What may be fitted in addition to the moduli, and the kinds of unknowns that it means."""
 
 
 @dataclass(frozen=True)
@@ -25,15 +38,24 @@ class Priors:
     moduli: float = parameter(
         0.15, minimum=1e-4, maximum=10.0, description="scatter of the segments' moduli about their common error, relative"
     )
+    radius: float = parameter(
+        0.01, minimum=1e-6, maximum=1.0, description="scatter of a cable's distance from the axis, relative"
+    )
+    angle: float = parameter(0.6, edge="deg", minimum=1e-4, maximum=90.0, description="error of a cable's angle about the axis")
+    density: float = parameter(0.012, minimum=1e-6, maximum=1.0, description="error of the density, relative")
+    payload: float = parameter(0.02, minimum=1e-6, maximum=1.0, description="error of the payload's mass, relative")
+    mount: float = parameter(0.5, edge="deg", minimum=1e-4, maximum=90.0, description="error of the IMU's mount about each axis")
+    creep: float = parameter(0.05, minimum=1e-6, maximum=10.0, description="ratio of a branch of creep")
+    friction: float = parameter(0.05, minimum=1e-6, maximum=1.0, description="error of the cables' coefficient of friction")
 
 
 @dataclass(frozen=True)
 class Unknown:
     """One entry of x.
 
-    kind: 'modulus' (x is the logarithm of its ratio to the start), 'offset', 'compliance' or 'winding'; index: of the cables
-    that it stands for, or of the segment; scale: change of the parameter per unit of x. The standard deviation of its prior is 1
-    in x; the moduli have one only for their differences.
+    kind: of `StaticParameters`, where x of 'modulus' is the logarithm of its ratio to the start; index: entries of that kind that
+    it stands for; scale: change of the parameter per unit of x. The standard deviation of its prior is 1 in x; the moduli have
+    one only for their differences.
     """
 
     kind: str
@@ -44,44 +66,52 @@ class Unknown:
         """Return the lower bound in x."""
         if self.kind == "modulus":
             return float(np.log(MODULUS_RANGE[0]))
-        if self.kind == "compliance":  # a cable cannot become shorter under tension
-            return -float(initial.compliance[list(self.index)].min()) / self.scale
+        if self.kind in ("compliance", "creep", "friction"):  # none of them is below zero
+            return -float(initial.values(self.kind)[list(self.index)].min()) / self.scale
         return -_FARTHEST
 
     def highest(self) -> float:
         """Return the upper bound in x."""
         return float(np.log(MODULUS_RANGE[1])) if self.kind == "modulus" else _FARTHEST
 
-    def derivative(self, prediction: StaticPrediction) -> np.ndarray:
-        """Return d tip / dx (k, 6), position in m and direction."""
-        if self.kind == "modulus":
-            return prediction.by_modulus[:, :, self.index[0]] * self.scale
-        if self.kind == "winding":
-            return prediction.by_winding * self.scale
-        by_cable = prediction.by_offset if self.kind == "offset" else prediction.by_compliance
-        return by_cable[:, :, list(self.index)].sum(axis=2) * self.scale
+    def derivative(self, derivatives: dict[str, np.ndarray]) -> np.ndarray:
+        """Return d tip / dx (k, 6), position in m and direction, from those of `StaticPredictor.differentiate`."""
+        return derivatives[self.kind][:, :, list(self.index)].sum(axis=2) * self.scale
 
 
 def unknowns_of(
-    robot: Robot, before: StaticPrediction, offsets: bool, compliance: bool, winding: bool, priors: Priors
+    robot: Robot, before: StaticPrediction, initial: StaticParameters, groups: set[str] | None, priors: Priors
 ) -> list[Unknown]:
     """Return the unknowns that the windows of `before`, the prediction at the start, can show.
 
-    They are the moduli, first; an offset for every cable that is taut in a window; one compliance for all cables of a segment
-    with a taut cable; the winding ratio if any cable is taut.
+    They are the moduli, first; of `groups` (None: all `GROUPS`): offset, place, winding of the cables that are taut in a window,
+    one compliance for all cables of a segment with a taut cable, density, payload, mount, branches of creep, friction.
     """
+    wanted = set(GROUPS) if groups is None else groups
     taut = [c for c in range(len(robot.cables)) if (before.tension[:, c] > _TAUT * robot.limits.tension_max).any()]
     ends = [robot.cable_end(cable) for cable in robot.cables]
     unknowns = [Unknown("modulus", (s,), 1.0) for s in range(len(robot.materials))]
-    if offsets:
+    if "offsets" in wanted:
         unknowns += [Unknown("offset", (c,), priors.offset_share * robot.length) for c in taut]
-    if compliance:
+    if "compliance" in wanted:
         for end in sorted({ends[c] for c in taut}):
             cables = tuple(c for c in range(len(ends)) if ends[c] == end)
             scale = max(compliance_scale(robot, robot.cables[c], priors) for c in cables)
             unknowns.append(Unknown("compliance", cables, scale))
-    if winding and taut:
-        unknowns.append(Unknown("winding", tuple(taut), priors.winding))
+    if "winding" in wanted and taut:
+        unknowns.append(Unknown("winding", (0,), priors.winding))
+    if "places" in wanted:
+        unknowns += [Unknown(kind, (c,), getattr(priors, kind)) for kind in ("radius", "angle") for c in taut]
+    if "weight" in wanted:
+        unknowns.append(Unknown("density", (0,), priors.density))
+        if robot.payload.mass > 0.0:
+            unknowns.append(Unknown("payload", (0,), priors.payload))
+    if "mount" in wanted:
+        unknowns += [Unknown("mount", (axis,), priors.mount) for axis in range(3)]
+    if "creep" in wanted:
+        unknowns += [Unknown("creep", (b,), priors.creep) for b in range(len(initial.creep))]
+    if "friction" in wanted and taut:
+        unknowns.append(Unknown("friction", (0,), priors.friction))
     return unknowns
 
 
@@ -101,16 +131,7 @@ def prior_rows(unknowns: list[Unknown], priors: Priors) -> np.ndarray:
 
 def parameters_at(x: np.ndarray, unknowns: list[Unknown], initial: StaticParameters) -> StaticParameters:
     """Return the parameters at x; `initial` are those at x = 0."""
-    modulus, offset, own = (array.copy() for array in (initial.youngs_modulus, initial.offset, initial.compliance))
-    ratio = initial.winding
+    found = initial
     for unknown, entry in zip(unknowns, x):
-        index = list(unknown.index)
-        if unknown.kind == "modulus":
-            modulus[index] = initial.youngs_modulus[index] * np.exp(entry * unknown.scale)
-        elif unknown.kind == "offset":
-            offset[index] = initial.offset[index] + entry * unknown.scale
-        elif unknown.kind == "winding":
-            ratio += float(entry * unknown.scale)
-        else:
-            own[index] = initial.compliance[index] + entry * unknown.scale
-    return StaticParameters(modulus, offset, own, ratio)
+        found = found.changed(unknown.kind, unknown.index, float(entry * unknown.scale))
+    return found

@@ -28,9 +28,13 @@ from gravcomp.closed_loop.trace import Trace
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
 from gravcomp.firmware.standalone_loop import StandaloneLoop
+from gravcomp.full_model.wrench import Wrench
+from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import InverseController, Target
 from gravcomp.inverse.limits import within_limits
+from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
 from gravcomp.orientation import GravityEstimator, Problem
@@ -39,15 +43,18 @@ from gravcomp.simulation import Shape, Simulator
 from gravcomp.thermal import HeaterControl
 from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.tip_observer import TipObserver
+from gravcomp.virtual.load_cells import VirtualLoadCells
 from gravcomp.virtual.motion import BaseMotion
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.tracker import VirtualTracker
+from gravcomp.virtual.truth import Truth
 
 SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _HEATER_PERIOD = 0.1  # s
+_COMPLIANCE_STEPS = 50  # bus steps between two computations of the tip's compliance
 _IDLE = 4e-4  # of the largest tension, below which a cable counts as idle
 _RELEASE_SLACK = 0.05
 """Of the robot's length: released cables are paid out so far beyond their paths that no motion of the robot makes them taut."""
@@ -69,15 +76,17 @@ class ClosedLoop:
         heating: bool = True,
         warm: bool = True,
         tracker: VirtualTrackerParameters | None = None,
+        load: LoadEstimationOptions | None = None,
+        cells: VirtualLoadCellParameters | None = None,
         board: str = "virtual",
     ):
         """Start the bridge and the filter; virtual time advances until both run.
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
-        starts at its target temperature; tracker: of the tip, to correct the model's error, None: there is none;
-        board: of the virtual robot, see there; or "standalone": the firmware's loop in C computes the commands in place of
-        filter, simulator and inverse problem, which needs a reduced model. Raises RuntimeError where the bridge does not start,
-        ConfigError for a robot that does not fit the board.
+        starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there; or "standalone": the
+        firmware's loop in C computes the commands in place of filter, simulator and inverse problem, which needs a reduced model.
+        Raises RuntimeError where the bridge does not start, ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -87,6 +96,7 @@ class ClosedLoop:
             seed=setup.seed,
             motion=motion,
             board="virtual" if board == STANDALONE else board,
+            scene=setup.scene,
         )
         self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == STANDALONE else None
         joints = setup.hardware.joints is not None
@@ -101,6 +111,10 @@ class ClosedLoop:
         self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
         self._tracker = None if tracker is None else VirtualTracker(tracker, setup.robot.length, setup.seed)
         self.observer = TipObserver(setup.robot, setup.controller.tracker)
+        limits = setup.robot.limits
+        self._cells = None if cells is None else VirtualLoadCells(cells, limits.tension_max, setup.seed)
+        self._load = None if load is None else LoadObserver(setup.robot, load)
+        self._tip_compliance: np.ndarray | None = None
         self._target: Target | None = None
         self._weightless = False
         self._release_slack = _RELEASE_SLACK * setup.robot.length  # m
@@ -122,6 +136,11 @@ class ClosedLoop:
         return self._virtual.time
 
     @property
+    def truth(self) -> Truth:
+        """Ground truth of the virtual robot, for evaluation and for a person who sees the robot."""
+        return self._virtual.truth
+
+    @property
     def trace(self) -> Trace:
         """Record since the start or the last `forget`."""
         return Trace(*(np.array(column) for column in zip(*self._rows)))
@@ -129,6 +148,22 @@ class ClosedLoop:
     def forget(self) -> None:
         """Begin a new record."""
         self._rows.clear()
+
+    @property
+    def virtual(self) -> VirtualRobot:
+        """The virtual robot, to push it and to attach loads."""
+        return self._virtual
+
+    def zero_load(self) -> None:
+        """Begin to learn the errors of model and sensors: the robot carries no unknown load. The loop has a load to find."""
+        assert self._load is not None
+        self._load.zero(self.time)
+
+    @property
+    def load(self) -> LoadEstimate:
+        """The estimated load. The loop has a load to find."""
+        assert self._load is not None
+        return self._load.estimate(self._gravity, self.time)
 
     def release(self) -> None:
         """Pay the cables out: the robot is without compensation."""
@@ -192,7 +227,10 @@ class ClosedLoop:
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
         # The model starts at rest and relaxed, and creeps from then on.
         elapsed = None if self.shape is None else SAMPLE_PERIOD
-        self.shape = shape = self._simulator.step(gravity, None if released else self._cables, duration=elapsed)
+        carried = None if self._load is None else self._load.wrench(gravity, self.time)
+        cables = None if released else self._cables
+        self.shape = shape = self._simulator.step(gravity, cables, duration=elapsed, wrench=carried)
+        self._observe_load(shape, carried, cables)
         target = self._observed(shape)
         self._cables, tension = self._released(shape) if target is None else self._compensated(shape, target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
@@ -212,7 +250,24 @@ class ClosedLoop:
         self.observer.predict(now, shape.tip_position, shape.tip_orientation, shape.response, shape.cable_tension)
         for measured in self._tracker.observe(self._virtual.truth):
             self.observer.measure(measured.time, now, "soft_base", measured.position)
+            if self._load is not None:
+                self._load.measure_tip(measured.time, measured.position)
         return None if self._target is None else self.observer.corrected(self._target, now)
+
+    def _observe_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
+        """Pass the shape, its wrench, the winches' displacements (m,) and the load cells' tensions to the observer."""
+        if self._load is None or not shape.is_equilibrium:
+            return
+        if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < 5:
+            try:
+                self._tip_compliance = self._simulator.tip_compliance()
+            except NotPositiveDefinite:  # the next shape may be stable
+                return
+        force = np.zeros(3) if carried is None else carried.force
+        self._load.predict(self.time, shape, self._tip_compliance, force, wound)
+        measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
+        if measured is not None:
+            self._load.measure_tensions(self.time, measured)
 
     def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         free = shape.response.displacement_free - self._release_slack
@@ -257,6 +312,9 @@ class ClosedLoop:
                 shape.tip_position,
                 shape.tip_direction,
                 self._sent,
+                truth.base_position,
+                float(np.linalg.norm(truth.contact_force, axis=1).sum()),
+                float(truth.contact_depth.max(initial=0.0)),
             )
         )
 

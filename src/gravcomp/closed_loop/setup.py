@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,8 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
+from gravcomp.scene.scene import Scene
+from gravcomp.virtual.body import build_rod, first_frequency
 from gravcomp.virtual.described import described
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
@@ -22,9 +25,9 @@ from gravcomp.virtual.true_robot import TrueRobot
 class Setup:
     """Model and virtual robot of one robot.
 
-    robot, hardware: in model, controller and bridge; nominal, nominal_hardware: the description from which the virtual robot is
-    built, with what is given in `truth` and what `seed` draws. They are equal (hardware: None) unless a calibration changes
-    robot and hardware.
+    robot, hardware: in model, controller and bridge, with assumed lines where none are described; nominal, nominal_hardware: the
+    description from which the virtual robot is built, with what is given in `truth` and what `seed` draws. Otherwise they are
+    equal (hardware: None) unless a calibration changes robot and hardware.
     """
 
     source: str
@@ -36,6 +39,7 @@ class Setup:
     controller: InverseControllerParameters
     seed: int
     nominal_hardware: Hardware | None = None
+    scene: Scene | None = None  # around the virtual robot
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
@@ -49,7 +53,7 @@ class Setup:
         check_pairs(hardware, file.robot, file.source)
         return cls(
             source=file.source,
-            robot=file.robot,
+            robot=file.robot.with_assumed_lines(),
             nominal=virtual.robot,
             truth=virtual.given,
             hardware=hardware,
@@ -57,6 +61,7 @@ class Setup:
             controller=section(InverseControllerParameters, "inverse_controller"),
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
+            scene=file.scene or None,
         )
 
     @property
@@ -73,6 +78,11 @@ class Setup:
     def true_robot(self) -> TrueRobot:
         """The virtual robot as it truly is. Raises ConfigError where `truth` describes no robot."""
         return draw(self.truth, self.nominal, self.virtual_hardware, self.seed)
+
+    @functools.cached_property
+    def first_period(self) -> float:
+        """Period in s of the virtual robot's first bending motion."""
+        return 2.0 * math.pi / first_frequency(build_rod(self.true_robot))
 
     def with_model(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
         """Return the same virtual robot with another model, and with the motor offsets of `hardware` where it is given."""

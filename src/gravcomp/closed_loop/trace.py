@@ -21,6 +21,9 @@ class Trace:
     model_tip_position: np.ndarray  # (t, 3)
     model_tip_direction: np.ndarray  # (t, 3)
     command: np.ndarray  # (t, m)
+    base_position: np.ndarray  # (t, 3) true, in the world
+    wall_force: np.ndarray  # (t,) N, sum of the sizes of the walls' forces
+    depth: np.ndarray  # (t,) m, of the robot in a wall, largest
 
     def between(self, start: float, end: float = np.inf) -> "Trace":
         """Return the rows with start <= time < end."""

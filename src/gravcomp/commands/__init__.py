@@ -12,6 +12,7 @@ COMMANDS = {
     "reproduce": "reproduce the article's experiments, with report pages",
     "calibrate": "fit the robot's model to measured tip positions",
     "calibrate-imu": "fit the IMU's scale, offsets, mount and bias over temperature to a recording at rest",
+    "calibrate-mount": "fit the mount of the IMU to the poses of the arm that carries it",
     "estimate": "estimate orientation and gravity from a recorded IMU stream, offline",
     "model": "build, inspect, solve and view a robot's model",
     "mesh": "install Gmsh, which fills surfaces with elements and reads STEP files",

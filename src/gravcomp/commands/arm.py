@@ -1,6 +1,7 @@
 """`gravcomp arm`: move the virtual robot through five poses on a seven-axis arm, released and compensated."""
 
 import argparse
+import dataclasses
 import json
 import tempfile
 import time
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from gravcomp.launcher import Graph
     from gravcomp.launcher.host_client import NodeHost
+    from gravcomp.launcher.node_process import NodeSpec
 
 # s: on the first start on a machine Numba compiles.
 _START_TIMEOUT = 300.0
@@ -29,9 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--xacro", metavar="FILE", help="another seven-axis arm with the soft robot (default: the shipped one)")
     parser.add_argument(
         "--gravity",
-        choices=("imu", "arm", "both"),
+        choices=("imu", "arm", "both", "fused"),
         default="both",
-        help="from the IMU, from the arm's joints, or from the IMU and checked against the joints (default: both)",
+        help="from the IMU, from the arm's joints, from the IMU and checked against the joints, or from both together, with the"
+        " arm's acceleration fed forward (default: both)",
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="time at each pose in seconds (default: 5)")
@@ -66,9 +69,12 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
         graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), args.namespace, {"virtual_robot": motion})
         specs = [spec for spec in graph.loop(virtual=True) if args.gravity != "arm" or spec.executable != "imu_estimator"]
+        if args.gravity == "fused":
+            specs = [_fused(spec) if spec.executable == "imu_estimator" else spec for spec in specs]
         if args.gravity != "imu":
-            use = "publish" if args.gravity == "arm" else "check"
-            specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf)))
+            use = {"arm": "publish", "both": "check", "fused": "fuse"}[args.gravity]
+            fed = args.gravity == "fused"
+            specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf), feed_acceleration=fed))
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
@@ -83,6 +89,15 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             figures = _follow(processes, result)
     output.result(figures, _summary(figures))
     return 0
+
+
+def _fused(estimator: "NodeSpec") -> "NodeSpec":
+    """Return the estimator whose gravity arm_gravity fuses with its own."""
+    return dataclasses.replace(
+        estimator,
+        parameters={**estimator.parameters, "arm_acceleration": True},
+        remappings={**estimator.remappings, "gravity": "gravity/imu"},
+    )
 
 
 def _start_of_tour(urdf: Path) -> dict:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 BENCHMARKS = {
     "engine": "model and inverse problem: accuracy against CalculiX, step times, dynamics",
     "robots": "every robot's mesh, reduced model and times; the model against what others measured",
+    "contact": "a robot that touches a scene: accuracy, penetration, energy, step times",
     "track": "a wrong model that a tracker of the tip corrects",
+    "loads": "external wrenches against SoRoSim; unknown payloads and tip forces that the loop has to find",
     "estimator": "orientation on recordings with optical ground truth, temperature control",
     "streams": "faulty IMU streams: what is reported, what is held",
     "board": "the board's firmware: hostile frames, dead host, failed sensor, build",
@@ -43,6 +45,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     },
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
+    "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
@@ -55,20 +58,23 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
         "--figures": ("KEY", "only these figures, by their keys in --json"),
     },
     "track": {"files": ("FILE", "robot files or shipped robots (default: article)")},
+    "loads": {"files": ("FILE", "robot files or shipped robots (default: article)")},
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 10},
     "robots": {"every": 10},
+    "contact": {"every": 19},
     "track": {"seeds": 1},
+    "loads": {"seeds": 1, "rods": 3},
     "estimator": {"every": 13},
     "streams": {"every": 5},
     "board": {"frames": 10_000, "every": 5},
     "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
     "page": {"listen": 3.0, "settle": 1.0},
     "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
-    "joints": {"messages": 3000, "orientations": 0},
+    "joints": {"messages": 3000, "orientations": 0, "loops": 1},
     "start": {},
     "soak": {"minutes": 0.2},
 }

@@ -128,10 +128,9 @@ def _model(args: argparse.Namespace) -> int:
     }
     sentence = (
         f"{path}: {figures['modes']} of {figures['modes_of_reduced_model']} modes, {found.strains} strains;"
-        f" {len(found.blob) / 1024:.0f} of {SLOT_BYTES // 1024} KB of flash;"
-        f" {1e-3 * found.multiply_adds:.0f} thousand multiply-adds a step, about {found.milliseconds:.1f} of {LONGEST_MS:g} ms;"
-        f" the tip is up to {figures['error_mm']} mm from that of the"
-        " whole reduced model"
+        f" {len(found.blob) / 1024:.0f} of {SLOT_BYTES // 1024} KB of flash; {1e-3 * found.multiply_adds:.0f} thousand"
+        f" multiply-adds a step, about {found.milliseconds:.1f} of {LONGEST_MS:g} ms; the tip is up to {1e3 * found.error:.4f} mm"
+        " from that of the whole reduced model"
     )
     output.result(figures, sentence)
     return 0

@@ -1,5 +1,6 @@
 """Prepare a robot before its nodes start: check its file, compile what they run, build its reduced model in the background."""
 
+import contextlib
 import subprocess
 
 from gravcomp.commands import output
@@ -19,7 +20,23 @@ def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
     if virtual:
         output.note(summary)
     _compile(virtual)
+    _choose_mesh(robot)
     return ModelBuilder(robot)
+
+
+def _choose_mesh(robot: str) -> None:
+    """Choose the robot's mesh, once for a robot, where its file gives none: the simulator would do it without a word.
+
+    A robot without a mesh is left to the nodes, which report the error.
+    """
+    from gravcomp.description import load_robot_file
+    from gravcomp.full_model.mesh_choice import with_chosen_elements
+    from gravcomp.mesh.mesh import MeshError
+
+    described = load_robot_file(robot).robot
+    what = f"choosing the mesh of {described.name}, once for this robot (up to half a minute)"
+    with output.console().status(what), contextlib.suppress(MeshError):
+        with_chosen_elements(described)
 
 
 def _compile(virtual: bool) -> None:

@@ -31,11 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run pytest. Returns 0: all tests passed, 1: a test failed, 2: wrong use, or no test found."""
     from gravcomp.environment.packages import provide_extra
+    from gravcomp.firmware.toolchain import provide as provide_firmware_tools
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
     for extra in ("development", "reports"):
         provide_extra(extra, root)
     _provide_meshers()
+    provide_firmware_tools()
     if not args.fast:
         _provide_browser()
     folders = [f for f in FOLDERS if (root / f).is_dir() and not (args.fast and f == "test")]

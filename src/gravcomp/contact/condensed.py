@@ -5,21 +5,25 @@ With the linear response v = S f + v_free of the rows
     0 ... m - 1      cables: displacement, tension
     m ... m + c - 1  normal directions of the places
     2 c rows         tangents `around` and `along` of each place (only with friction)
-    c rows           tangents `around` at the middle of the section, for the curvature of the obstacles
+    e rows           directions in which the normal forces turn or move with the body
 
 the forces satisfy
 
     cable:    lambda >= 0,   s = v - wound >= 0,                 lambda s = 0
     normal:   lambda >= 0,   s = gap + v + c lambda >= 0,        lambda s = 0      (c: compliance of a wall that yields)
-    friction: |t| <= mu lambda;  v_t = 0 if less, else t = -mu lambda v_t / |v_t|
+    friction: |t| <= mu lambda along each tangent;  v_t = 0 if less, else against t
 
-with v_t counted from the last equilibrium. Where an obstacle is curved, the direction of a normal force turns with the place: it
-adds the force D v, D = lambda x curvature, to the rows of the middle, which is eliminated first.
+with v_t counted from the last equilibrium. Where an obstacle is curved, a normal force turns when the middle of the section moves
+along the tangent `around`: D = lambda x curvature. Where the gap has a minimum along the robot, the place of the force moves
+when the robot tilts there: D = -lambda / g''. These forces D v on the last rows are eliminated first.
 
-The conditions are solved as a set of states (slack or taut, open, sticking or sliding) by linear solves, in each of which every
-wrong state is changed at once (J. Judice, F. Pires, 1994; for friction the states of P. Alart, A. Curnier, 1991). When that
-does not reduce the number of wrong states any more, one at a time is changed (K. G. Murty, 1974), and a place may only change
-from sticking to sliding. The number of linear solves is bounded.
+The limits are those of a pyramid around Coulomb's cone: exact along the two tangents, up to the root of 2 too large between them.
+With given limits the conditions are those of a quadratic programme with bounds, min f^T S f / 2 + f^T v over tensions, normal
+forces and friction together. Its states, at a bound or between, are changed all at once, with one linear solve for each change
+(J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds,
+clipped and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient
+steps). The limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is
+bounded.
 """
 
 import numpy as np
@@ -27,43 +31,42 @@ from numba import njit
 
 OPEN, STICKING, SLIDING = 0, 1, 2
 _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among places that the model cannot move on their own
-_PATIENCE, _MOST = 6, 80  # solves without fewer wrong states; solves in all
+_SWITCHES = 15  # changes of all wrong states at once
+_STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
 _SMALL = 1e-12  # m of slack that is rounding error
-_STRAIGHT = 1e-9  # m by which a place may slide across the direction of its friction
-_ROUNDED = 1e-9  # of a friction limit
+_AT_LIMIT = 1e-4  # of the limit: friction nearer to it slides
+_ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
 
 
 @njit(cache=True)
 def contact_forces(
-    compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, given: np.ndarray, taut: np.ndarray, gap: np.ndarray,
-    yielding: np.ndarray, friction: np.ndarray, curvature: np.ndarray, pressed: np.ndarray, state: np.ndarray,
+    compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, given: np.ndarray, tension: np.ndarray, gap: np.ndarray,
+    yielding: np.ndarray, friction: np.ndarray, bend: np.ndarray, pressed: np.ndarray, rub: np.ndarray, state: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, bool]:  # fmt: skip
     """Return the forces (k,) of all rows, their changes (k, m) by the tensions, and whether all conditions hold.
 
     compliance S (k, k) and free (k,): of the response. wound (m,): displacement to which each cable is pulled in, NaN: released;
-    given (m,): tensions, which take precedence, or (0,); taut (m,): first guess. gap (c,) in m; yielding (c,): m/N of the walls;
-    friction (c,): coefficients, (0,) where there are no rows of friction; curvature (c,) in 1/m; pressed (c,): normal forces of
-    the last solution; state (c,): first guess, overwritten with the result. The changes by the tensions hold the places that
+    given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of walls;
+    friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; pressed (c,) and rub (c, 2):
+    normal forces and friction in N, first guesses; state (c,): the result. The changes by the tensions hold the places that
     touch in contact, and those that stick at rest.
     """
     m, c = len(wound), len(gap)
     rubbing = len(friction) > 0
     rows = m + (3 * c if rubbing else c)
-    # Eliminate the rows of the curvature.
-    bend = pressed * curvature
-    inner = np.eye(c) - compliance[rows:, rows:] * bend
-    if bend.max() > 0.0 and not _stable(compliance[rows:, rows:], bend):
-        bend = np.minimum(bend, 0.0)
-        inner = np.eye(c) - compliance[rows:, rows:] * bend
-    both = np.empty((c, rows + 1))
-    both[:, :rows] = compliance[rows:, :rows]
-    both[:, rows] = free[rows:]
-    turned = np.linalg.solve(inner, both)
-    for i in range(c):
-        turned[i] *= bend[i]
-    part, middle = np.ascontiguousarray(turned[:, :rows]), np.ascontiguousarray(compliance[:rows, rows:])
-    w = compliance[:rows, :rows] + middle @ part
-    q = free[:rows] + middle @ np.ascontiguousarray(turned[:, rows])
+    extra = len(bend)
+    w, q, turned = compliance[:rows, :rows].copy(), free[:rows].copy(), np.zeros((extra, rows + 1))
+    if extra:  # eliminate the last rows
+        own = np.ascontiguousarray(compliance[rows:, rows:])
+        if bend.max() > 0.0 and not _stable(own, bend):
+            bend = np.minimum(bend, 0.0)
+        turned[:, :rows], turned[:, rows] = compliance[rows:, :rows], free[rows:]
+        turned = np.linalg.solve(np.eye(extra) - own * bend, turned)
+        for i in range(extra):
+            turned[i] *= bend[i]
+        middle = np.ascontiguousarray(compliance[:rows, rows:])
+        w += middle @ np.ascontiguousarray(turned[:, :rows])
+        q += middle @ np.ascontiguousarray(turned[:, rows])
     soft = 0.0
     for i in range(c):
         soft += _SOFT * compliance[m + i, m + i] / c
@@ -73,15 +76,26 @@ def contact_forces(
         w[m + i, m + i] += yielding[i]
         q[m + i] += gap[i]
     force = np.zeros(rows)
-    tight = np.zeros(m, dtype=np.bool_)
-    if len(given):
-        force[:m] = given
-        q = q + np.ascontiguousarray(w[:, :m]) @ given
-    else:
-        for a in range(m):
-            q[a] -= wound[a] if np.isfinite(wound[a]) else 0.0
-            tight[a] = taut[a] and np.isfinite(wound[a])
-    settled = _states(w, q, wound, len(given) > 0, m, c, friction, tight, state, force)
+    low, high = np.full(rows, -np.inf), np.full(rows, np.inf)
+    for a in range(m):
+        if len(given):
+            low[a] = high[a] = given[a]
+        elif np.isfinite(wound[a]):
+            low[a], force[a] = 0.0, tension[a]
+            q[a] -= wound[a]
+        else:
+            low[a] = high[a] = 0.0
+    for i in range(c):
+        low[m + i], force[m + i] = 0.0, pressed[i]
+    settled = _rub(w, q, m, c, friction, rub, low, high, force) if rubbing else _bounded(w, q, low, high, force)
+    for i in range(c):
+        k = m + c + 2 * i
+        if force[m + i] <= 0.0:
+            state[i] = OPEN
+        else:
+            most = (1.0 - _AT_LIMIT) * high[k] if rubbing else 0.0
+            sticks = rubbing and abs(force[k]) < most and abs(force[k + 1]) < most
+            state[i] = STICKING if sticks else SLIDING
     # Changes by the tensions.
     held = _held(m, c, rubbing, state)
     change = np.zeros((rows, m))
@@ -96,11 +110,13 @@ def contact_forces(
         solved = np.linalg.solve(block, right)
         for i in range(len(held)):
             change[held[i]] = solved[i]
-    whole, changes = np.empty(rows + c), np.empty((rows + c, m))
+    whole, changes = np.empty(rows + extra), np.empty((rows + extra, m))
     whole[:rows] = force
     changes[:rows] = change
-    whole[rows:] = part @ force + turned[:, rows]
-    changes[rows:] = part @ change
+    if extra:
+        part = np.ascontiguousarray(turned[:, :rows])
+        whole[rows:] = part @ force + turned[:, rows]
+        changes[rows:] = part @ change
     return whole, changes, settled
 
 
@@ -132,128 +148,131 @@ def _held(m: int, c: int, rubbing: bool, state: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _states(
-    w: np.ndarray, q: np.ndarray, wound: np.ndarray, given: bool, m: int, c: int, friction: np.ndarray, taut: np.ndarray,
-    state: np.ndarray, force: np.ndarray,
+def _rub(
+    w: np.ndarray, q: np.ndarray, m: int, c: int, friction: np.ndarray, rub: np.ndarray, low: np.ndarray, high: np.ndarray,
+    force: np.ndarray,
 ) -> bool:  # fmt: skip
-    """Find the states and write the forces; returns whether all conditions hold."""
-    rubbing = len(friction) > 0
-    rows = len(q)
-    direction = np.zeros((c, 2))
+    """Find forces with friction; returns whether limits and normal forces agree. rub (c, 2): first guess of the friction."""
     for i in range(c):
-        if state[i] != OPEN and not (rubbing and friction[i] > 0.0):
-            state[i] = SLIDING
-        elif state[i] == SLIDING:
-            _slide(q[m + c + 2 * i], q[m + c + 2 * i + 1], direction[i])
-    fewest, waited, single = rows + 1, 0, False
-    for attempt in range(_MOST):
-        _solve(w, q, given, m, c, friction, taut, state, direction, force)
-        response = q + w @ (np.concatenate((np.zeros(m), force[m:])) if given else force)
-        wrong, turning = 0, False
-        if not given:
-            for a in range(m):
-                bad = force[a] < 0.0 if taut[a] else np.isfinite(wound[a]) and response[a] < -_SMALL
-                if bad and not (single and wrong):
-                    taut[a] = not taut[a]
-                wrong += bad
+        for v in range(2):
+            k = m + c + 2 * i + v
+            high[k], low[k] = friction[i] * force[m + i], -friction[i] * force[m + i]
+            force[k] = rub[i, v]
+    change = np.inf
+    for _ in range(_ROUNDS):
+        if not _bounded(w, q, low, high, force):
+            return False
+        change, largest = 0.0, 1e-300
         for i in range(c):
-            press = force[m + i]
-            if state[i] == OPEN:
-                if response[m + i] < -_SMALL:
-                    if not (single and wrong):
-                        state[i] = STICKING if rubbing and friction[i] > 0.0 else SLIDING
-                    wrong += 1
-                continue
-            if press < 0.0:
-                if not (single and wrong):
-                    state[i] = OPEN
-                wrong += 1
-                continue
-            if not rubbing or friction[i] == 0.0:
-                continue
-            k = m + c + 2 * i
-            limit = friction[i] * press
-            if state[i] == STICKING:
-                pull = np.hypot(force[k], force[k + 1])
-                if pull > limit * (1.0 + _ROUNDED) + 1e-15:
-                    if not (single and wrong):
-                        state[i] = SLIDING
-                        direction[i, 0], direction[i, 1] = force[k] / pull, force[k + 1] / pull
-                    wrong += 1
+            limit = friction[i] * force[m + i]
+            for v in range(2):
+                k = m + c + 2 * i + v
+                change, largest = max(change, abs(limit - high[k])), max(largest, limit)
+                high[k], low[k] = limit, -limit
+        change /= largest
+        if change <= _AGREED:
+            break
+    return change <= _NEARLY
+
+
+@njit(cache=True)
+def _bounded(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Minimise f^T w f / 2 + q^T f within bounds low, high (n,); force (n,): a guess, then the result. Returns whether found."""
+    force[:] = np.minimum(np.maximum(force, low), high)
+    start = force.copy()
+    if _switched(w, q, low, high, force):
+        return True
+    force[:] = start
+    return _lowered(w, q, low, high, force)
+
+
+@njit(cache=True)
+def _switched(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Look for the minimum by changing every force that is wrongly at a bound, or beyond one, at once."""
+    n = len(q)
+    index, side = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    for a in range(n):
+        side[a] = -1 if force[a] <= low[a] else (1 if force[a] >= high[a] else 0)
+    for _ in range(_SWITCHES):
+        count = 0
+        for a in range(n):
+            if side[a] == 0 and low[a] < high[a]:
+                index[count] = a
+                count += 1
+                force[a] = 0.0
             else:
-                along = direction[i, 0] * response[k] + direction[i, 1] * response[k + 1]
-                speed = np.hypot(response[k], response[k + 1])
-                if along > _SMALL and not single:
-                    state[i] = STICKING
-                    wrong += 1
-                elif speed > _SMALL:
-                    before_0, before_1 = direction[i, 0], direction[i, 1]
-                    _slide(response[k], response[k + 1], direction[i])
-                    turn_0, turn_1 = direction[i, 0] - before_0, direction[i, 1] - before_1
-                    turning |= np.hypot(turn_0, turn_1) * speed > _STRAIGHT
-                    if attempt > _PATIENCE:  # half of the turn, which damps directions that chase one another
-                        _slide(turn_0 / 2.0 - direction[i, 0], turn_1 / 2.0 - direction[i, 1], direction[i])
-        if not wrong and not turning:
+                force[a] = low[a] if side[a] < 0 or low[a] == high[a] else high[a]
+        _solve_free(w, q, index[:count], force)
+        slope = q + w @ force
+        wrong, rounding = False, 1e-12 * np.abs(force).max()
+        for a in range(n):
+            if low[a] == high[a]:
+                continue
+            following = side[a]
+            if side[a] == 0:
+                following = -1 if force[a] < low[a] - rounding else (1 if force[a] > high[a] + rounding else 0)
+            elif (side[a] < 0 and slope[a] < -_SMALL) or (side[a] > 0 and slope[a] > _SMALL):
+                following = 0
+            wrong |= following != side[a]
+            side[a] = following
+        if not wrong:
             return True
-        if wrong < fewest:
-            fewest, waited = wrong, 0
-        elif wrong:
-            waited += 1
-            single |= waited > _PATIENCE
     return False
 
 
 @njit(cache=True)
-def _slide(along_0: float, along_1: float, direction: np.ndarray) -> None:
-    """Write the direction (2,) of friction against a motion."""
-    speed = np.hypot(along_0, along_1)
-    if speed > 0.0:
-        direction[0], direction[1] = -along_0 / speed, -along_1 / speed
+def _solve_free(w: np.ndarray, q: np.ndarray, index: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces `index` for which their slopes vanish, those of the others given."""
+    count = len(index)
+    if not count:
+        return
+    known = q + w @ force
+    block, right = np.empty((count, count)), np.empty(count)
+    for a in range(count):
+        right[a] = -known[index[a]]
+        for b in range(count):
+            block[a, b] = w[index[a], index[b]]
+    solved = np.linalg.solve(block, right)
+    for a in range(count):
+        force[index[a]] += solved[a]
 
 
 @njit(cache=True)
-def _solve(
-    w: np.ndarray, q: np.ndarray, given: bool, m: int, c: int, friction: np.ndarray, taut: np.ndarray, state: np.ndarray,
-    direction: np.ndarray, force: np.ndarray,
-) -> None:  # fmt: skip
-    """Write the forces for the given states: those that act have no slack, sliding ones are in proportion to their normal."""
-    rubbing = len(friction) > 0
-    index = np.empty(len(q), dtype=np.int64)
-    count = 0
-    if not given:
-        force[:m] = 0.0
-        for a in range(m):
-            if taut[a]:
+def _lowered(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
+    """Look for the minimum by steps that each lower the sum: slower, but they cannot go round in circles."""
+    n = len(q)
+    index = np.empty(n, dtype=np.int64)
+    allowed = _SMALL + 1e-10 * np.abs(q).max()
+    for _ in range(_STEPS):
+        slope = q + w @ force
+        for _ in range(_SWEEPS):
+            for a in range(n):
+                if low[a] < high[a]:
+                    moved = min(max(force[a] - slope[a] / w[a, a], low[a]), high[a]) - force[a]
+                    force[a] = min(max(force[a] + moved, low[a]), high[a])
+                    if moved != 0.0:
+                        for b in range(n):
+                            slope[b] += moved * w[b, a]
+        count = 0
+        for a in range(n):
+            if low[a] < force[a] < high[a]:
                 index[count] = a
                 count += 1
-    force[m:] = 0.0
-    for i in range(c):
-        if state[i] != OPEN:
-            index[count] = m + i
-            count += 1
-            if rubbing and state[i] == STICKING:
-                index[count], index[count + 1] = m + c + 2 * i, m + c + 2 * i + 1
-                count += 2
-    if not count:
-        return
-    block, right = np.empty((count, count)), np.empty(count)
-    for a in range(count):
-        row = index[a]
-        right[a] = -q[row]
-        for b in range(count):
-            column = index[b]
-            block[a, b] = w[row, column]
-            place = column - m
-            if rubbing and 0 <= place < c and state[place] == SLIDING:
-                k = m + c + 2 * place
-                limit = friction[place]
-                block[a, b] += limit * (w[row, k] * direction[place, 0] + w[row, k + 1] * direction[place, 1])
-    solved = np.linalg.solve(block, right)
-    for a in range(count):
-        force[index[a]] = solved[a]
-    if rubbing:
-        for i in range(c):
-            if state[i] == SLIDING:
-                k = m + c + 2 * i
-                force[k] = friction[i] * force[m + i] * direction[i, 0]
-                force[k + 1] = friction[i] * force[m + i] * direction[i, 1]
+        aim, slope = force.copy(), q + w @ force
+        _solve_free(w, q, index[:count], aim)
+        share = 1.0
+        for _ in range(_HALVES):
+            clipped = np.minimum(np.maximum(force + share * (aim - force), low), high)
+            change = clipped - force
+            if slope @ change + 0.5 * (change @ (w @ change)) <= 0.0:
+                force[:] = clipped
+                break
+            share *= 0.5
+        slope, left = q + w @ force, 0.0
+        for a in range(n):
+            if low[a] < high[a]:
+                inward = (force[a] <= low[a] and slope[a] > 0.0) or (force[a] >= high[a] and slope[a] < 0.0)
+                left = max(left, 0.0 if inward else abs(slope[a]))
+        if left <= allowed:
+            return True
+    return False

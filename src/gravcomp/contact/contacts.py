@@ -9,8 +9,9 @@ import numpy as np
 class Contacts:
     """c places where the robot touches, in soft_base.
 
-    obstacle (c,): number in the scene; station (c,): 0 at the base to 1 at the tip; position (c, 3) on the robot's surface in m;
-    normal (c, 3): out of the obstacle; force (c, 3) on the robot in N; gap (c,) in m; sliding (c,): whether it slides or sticks.
+    obstacle (c,): number in the scene; names (c): of the obstacles; station (c,): 0 at the base to 1 at the tip; position (c, 3)
+    on the robot's surface in m; normal (c, 3): out of the obstacle; force (c, 3) on the robot in N; gap (c,) in m; sliding (c,):
+    whether it slides or sticks.
     """
 
     obstacle: np.ndarray
@@ -20,6 +21,7 @@ class Contacts:
     force: np.ndarray
     gap: np.ndarray
     sliding: np.ndarray
+    names: tuple[str, ...] = ()
 
     @staticmethod
     def none() -> "Contacts":
@@ -32,6 +34,17 @@ class Contacts:
     def __len__(self) -> int:
         """Return the number of places."""
         return len(self.obstacle)
+
+    @property
+    def sentence(self) -> str:
+        """The place with the largest force, in words; empty without contact."""
+        if not len(self):
+            return ""
+        force = self.normal_force
+        k = int(np.argmax(force))
+        place = ", ".join(f"{1e3 * x:.1f}" for x in self.position[k])
+        others = f", the largest of {len(self)} places" if len(self) > 1 else ""
+        return f"'{self.names[k]}' at ({place}) mm with {force[k]:.3g} N{others}"
 
     @property
     def normal_force(self) -> np.ndarray:

@@ -25,7 +25,8 @@ class Places(NamedTuple):
     row (c,): of the obstacle in the scene; station (c,): the nearest one; first (c,) and share (c, 3): the first of three
     neighbours, and their weights; own (c, 2): x and y in the section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent
     in the section; along (c, 3): the other tangent; curvature (c,) of the obstacle across the robot in 1/m: change of the
-    normal along `around`, positive beside a ball.
+    normal along `around`, positive beside a ball; tilt (c, 3): weights of the three stations for the slope along the robot, a
+    station; rocking (c,): -1 / g'' a station in 1/m, by which the place moves along the robot when it tilts; 0 where it does not.
     """
 
     row: np.ndarray
@@ -38,6 +39,8 @@ class Places(NamedTuple):
     around: np.ndarray
     along: np.ndarray
     curvature: np.ndarray
+    tilt: np.ndarray
+    rocking: np.ndarray
 
 
 @njit(cache=True)
@@ -95,12 +98,12 @@ def all_gaps(
 
 @njit(cache=True)
 def find_places(
-    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, moved: np.ndarray, margin: float, pressed: np.ndarray
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, moved: np.ndarray, margin: float, last: np.ndarray
 ) -> Places:
     """Return the places that touch, or would touch if nothing held the robot.
 
     sections (s, 3, 3): p, f_1, f_2 of the stations; moved (s, 3): how far p goes in m with the forces of last time; margin:
-    places with a smaller gap in m are returned too; pressed (k, s): whether a place was pressed last.
+    places with a smaller gap in m are returned too; last (k, s, 3): forces of last time.
     """
     rows, stations = len(scene.kind), len(surface.place)
     own, normal = np.zeros((rows, stations, 2)), np.zeros((rows, stations, 3))
@@ -113,12 +116,15 @@ def find_places(
     for k in range(rows):
         for s in range(stations):
             free = gap[k, s] + normal[k, s] @ moved[s]
-            if pressed[k, s] or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
+            # A force moves from station to station as the robot slides or tilts.
+            beside = last[k, max(s - 1, 0)].any() or last[k, s].any() or last[k, min(s + 1, stations - 1)].any()
+            if beside or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
                 chosen[k, s] = True
                 count += 1
     result = Places(
         np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
         np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
+        np.zeros((count, 3)), np.zeros(count),
     )  # fmt: skip
     i = 0
     for k in range(rows):
@@ -160,7 +166,10 @@ def _write_place(
                 curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
                 ahead += beside[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
             moved -= ahead / bend
+        result.rocking[i] = -1.0 / bend
     _section_at(sections, first, place, share, section)
+    tilt = result.tilt[i]
+    tilt[0], tilt[1], tilt[2] = place - 1.5, 2.0 - 2.0 * place, place - 0.5
     result.own[i], result.gap[i], result.normal[i] = here, best, there
     axis = np.cross(section[1], section[2])
     around = np.cross(axis, there)
@@ -207,3 +216,85 @@ def positions(places: Places, sections: np.ndarray) -> np.ndarray:
 @njit(cache=True)
 def _length(vector: np.ndarray) -> float:
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@njit(cache=True)
+def rubbing(
+    scene: SceneArrays, surface: ContactSurface, places: Places, start: np.ndarray, sections: np.ndarray, touched: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the coefficients of friction (c,), and how far the places have slid since the last equilibrium (2 c,) in m.
+
+    start and sections (s, 3, 3): then and now. Only places rub that touched then: whose gap was below `touched` radii. The
+    motions are along the tangents `around` and `along` of each place.
+    """
+    before, now = positions(places, start), positions(places, sections)
+    friction, slid, normal = np.zeros(len(before)), np.empty(2 * len(before)), np.empty(3)
+    for i in range(len(before)):
+        if gap_to(scene, places.row[i], before[i], normal) < touched * surface.radius[places.station[i]]:
+            friction[i] = scene.friction[places.row[i]]
+        slid[2 * i] = places.around[i] @ (now[i] - before[i])
+        slid[2 * i + 1] = places.along[i] @ (now[i] - before[i])
+    return friction, slid
+
+
+@njit(cache=True)
+def yielding(scene: SceneArrays, surface: ContactSurface, places: Places) -> np.ndarray:
+    """Return the compliance (c,) of the walls at the places in m/N; 0 where they are rigid."""
+    result = np.zeros(len(places.row))
+    for i in range(len(result)):
+        if np.isfinite(scene.stiffness[places.row[i]]):
+            result[i] = 1.0 / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
+    return result
+
+
+@njit(cache=True)
+def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray:
+    """Return the forces (c, 3) at the places from those along the normals (c,) and along both tangents (2 c,), or (0,)."""
+    result = np.empty((len(normal), 3))
+    for i in range(len(normal)):
+        for j in range(3):
+            result[i, j] = normal[i] * places.normal[i, j]
+            if len(rub):
+                result[i, j] += rub[2 * i] * places.around[i, j] + rub[2 * i + 1] * places.along[i, j]
+    return result
+
+
+@njit(cache=True)
+def remembered(places: Places, force: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return normal forces (c,), forces along both tangents (c, 2) and states (c,) of last time, by obstacle and station.
+
+    force (k, s, 3) in N and state (k, s): of `remember`.
+    """
+    count = len(places.row)
+    pressed, rub, held = np.empty(count), np.empty((count, 2)), np.empty(count, dtype=np.int64)
+    for i in range(count):
+        last = force[places.row[i], places.station[i]]
+        pressed[i] = max(places.normal[i] @ last, 0.0)
+        rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
+        held[i] = state[places.row[i], places.station[i]]
+    return pressed, rub, held
+
+
+@njit(cache=True)
+def remember(places: Places, forces: np.ndarray, held: np.ndarray, force: np.ndarray, state: np.ndarray) -> None:
+    """Write the forces (c, 3) and states (c,) of the places to force (k, s, 3) and state (k, s); 0 elsewhere."""
+    force[:] = 0.0
+    state[:] = 0
+    for i in range(len(places.row)):
+        force[places.row[i], places.station[i]] = forces[i]
+        state[places.row[i], places.station[i]] = held[i]
+
+
+@njit(cache=True)
+def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the places that rock, and the stiffness D (c + rocking places,) in N/m of the normal forces that turn and move.
+
+    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts.
+    """
+    rocks = np.flatnonzero(places.rocking)
+    bend = np.empty(len(pressed) + len(rocks))
+    for i in range(len(pressed)):
+        bend[i] = pressed[i] * places.curvature[i]
+    for n in range(len(rocks)):
+        bend[len(pressed) + n] = pressed[rocks[n]] * places.rocking[rocks[n]]
+    return rocks, bend

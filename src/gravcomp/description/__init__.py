@@ -12,6 +12,7 @@ from gravcomp.description.cable_line import CableLine
 from gravcomp.description.disks import Disks
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.max_wrench import MaxWrench
 from gravcomp.description.mesh_body import MeshBody, Transform
 from gravcomp.description.outline import Outline
 from gravcomp.description.pieces import Piece
@@ -25,6 +26,7 @@ from gravcomp.description.segment import Segment
 
 __all__ = [
     "BlendedOutline", "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "Fibres", "ImuMount", "Limits", "Lumen",
-    "Material", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot", "RobotFile", "Section",
-    "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments", "shipped_robots",
+    "Material", "MaxWrench", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot",
+    "RobotFile", "Section", "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments",
+    "shipped_robots",
 ]  # fmt: skip

@@ -26,13 +26,21 @@ CABLE_MATERIALS = {
 }
 """Young's modulus in Pa over the full circle of the diameter, by the name of the material."""
 
+ASSUMED_STRETCH = 2e-3
+"""Stretch at the largest tension of a line that nobody describes: of one that is chosen for its load, as wires and braids are."""
+
+ASSUMED_FREE_LENGTH = 2.0
+"""Length between capstan and robot where nobody gives it, over the robot's length."""
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CableLine:
     """What a line is made of and how it comes to the robot. None: not given; `Robot.cable_defaults` fills it, if it can."""
 
     material: str | None = parameter(
-        None, choices=tuple(CABLE_MATERIALS), description="material of the line, with diameter_mm; without stretch when not given"
+        None,
+        choices=tuple(CABLE_MATERIALS),
+        description="material of the line, with diameter_mm; the loop assumes a line when not given",
     )
     diameter: float | None = parameter(None, edge="mm", minimum=0.005, maximum=20.0, description="diameter of the line")
     axial_stiffness: float | None = parameter(
@@ -40,10 +48,14 @@ class CableLine:
         unit="N",
         minimum=1.0,
         maximum=1e9,
-        description="E A of the line, instead of a material; without stretch when not given",
+        description="E A of the line, instead of a material; the loop assumes a line when not given",
     )
     free_length: float | None = parameter(
-        None, edge="mm", minimum=0.0, maximum=20000.0, description="length between capstan and robot; 0 when not given"
+        None,
+        edge="mm",
+        minimum=0.0,
+        maximum=20000.0,
+        description="length between capstan and robot; the loop assumes twice the robot's when not given",
     )
     friction: float | None = parameter(
         None, minimum=0.0, maximum=2.0, description="capstan friction coefficient along sheath and robot; 0 when not given"
@@ -91,6 +103,11 @@ class CableLine:
             found, missing = ("material", "diameter_mm") if self.diameter is None else ("diameter_mm", "material")
             one_of = "" if self.diameter is None else f", one of {', '.join(CABLE_MATERIALS)}"
             raise ValueError(f"{found} is given without {missing}{one_of}; a material and a diameter together give the stiffness")
+
+    def assumed(self, tension_max: float, length: float) -> "Self":
+        """Return the line with what is assumed where nothing is said of it, on a robot of `length` m with `tension_max` N."""
+        line = self if self.stretches else dataclasses.replace(self, axial_stiffness=tension_max / ASSUMED_STRETCH)
+        return line if line.free_length is not None else dataclasses.replace(line, free_length=ASSUMED_FREE_LENGTH * length)
 
     def with_stiffness(self, stiffness: float | None) -> "Self":
         """Return the line with the stiffness E A in N in place of its material; None: without stretch."""

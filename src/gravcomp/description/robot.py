@@ -18,6 +18,7 @@ from gravcomp.description.cable_line import CableLine
 from gravcomp.description.cable_path import CableRun, check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
 from gravcomp.description.limits import Limits
+from gravcomp.description.max_wrench import MaxWrench
 from gravcomp.description.mesh_body import MeshBody
 from gravcomp.description.pieces import Piece, piece_at, pieces_of_segments
 from gravcomp.description.point_load import PointLoad
@@ -40,9 +41,13 @@ class Effectors:
 
 @dataclasses.dataclass(frozen=True)
 class Payload:
-    """A dead weight at the tip."""
+    """A weight that is fixed to the tip, such as a tool."""
 
     mass: float = parameter(0.0, edge="g", minimum=0.0, maximum=1e5, description="mass at the tip")
+    centre: tuple[float, float, float] = parameter(
+        (0.0, 0.0, 0.0), edge="mm", minimum=-1000.0, maximum=1000.0,
+        description="centre of the mass from the tip, in soft_tip: z along the robot",
+    )  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +69,7 @@ class Robot:
     limits: Limits = parameter(default_factory=Limits, description="limits of every cable")
     payload: Payload = parameter(default_factory=Payload, description="weight at the tip")
     loads: tuple[PointLoad, ...] = parameter((), description="weights hung from points of the body")
+    max_wrench: MaxWrench | None = parameter(None, description="largest external load; not given: the robot carries none")
     imu_mount: ImuMount = parameter(default_factory=ImuMount, description="mount of the IMU")
 
     def __post_init__(self) -> None:
@@ -163,6 +169,14 @@ class Robot:
     def cable_compliance(self, cable: Cable) -> float:
         """Return the elongation in m/N of the cable from capstan to end under a tension that is the same along it."""
         return self.line_length(cable) / cable.stiffness
+
+    def with_assumed_lines(self) -> "Robot":
+        """Return the robot as the loop takes it: with the lines of `CableLine.assumed` where nothing is said of a line.
+
+        An unknown line stretches. With its most probable stretch in the model, only the deviation from it remains as an error.
+        """
+        cables = tuple(cable.assumed(self.limits.tension_max, self.length) for cable in self.cables)
+        return self if cables == self.cables else dataclasses.replace(self, cables=cables)
 
     def with_material(self, **changes: Any) -> "Robot":
         """Return the robot with these fields of every segment's (or the body's) material changed; caps keep theirs."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.default_hardware import has_motors, with_motors
+from gravcomp.description.overlay import on_base
 from gravcomp.description.robot import Robot
 from gravcomp.scene import SceneSection
 
@@ -18,6 +19,8 @@ IN_SOFTWARE = ("udp_multicast", "virtual")
 """Interfaces of python-can without hardware."""
 
 SECTIONS = ("robot", "scene", "hardware", "virtual_robot", "nodes")
+_OTHER_KEYS = ("base", "calibration")
+"""Another robot file whose values this one changes; where they are from, which only people read."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +51,11 @@ class RobotFile:
         scene.refuse_other_units(self.robot.length)
         return scene
 
+    @property
+    def has_joints(self) -> bool:
+        """Whether the motors are joints of a ros2_control robot."""
+        return (self.sections.get("hardware") or {}).get("joints") is not None
+
     def require_motors(self, interface: str) -> None:
         """Raise ConfigError for a file without motors on a bus (python-can's `interface`) that can carry real ones."""
         if interface not in IN_SOFTWARE and not has_motors(dict(self.sections.get("hardware") or {})):
@@ -75,20 +83,38 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
     0.1
     """
     path = _resolve(name_or_path)
-    document = load_yaml(path)
-    if not isinstance(document, dict):
-        raise ConfigError(f"{path}: is empty or not a mapping; allowed top-level keys: {', '.join(SECTIONS)}")
-    for key in document:
-        if key not in SECTIONS:
-            raise ConfigError(f"{path}: unknown key '{key}'; allowed: {', '.join(SECTIONS)}")
-    for key, section in document.items():
-        if section is not None and not isinstance(section, dict):
-            raise ConfigError(f"{path}: {key} is {section!r}; a mapping of keys is needed")
+    document = _document(path, ())
     if "robot" not in document:
         raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
     robot = from_mapping(Robot, _with_whole_path(document["robot"], path), source=str(path), key="robot")
     _scene_section(document, str(path))
     return RobotFile(str(path), robot, document)
+
+
+def _document(path: Path, above: tuple[Path, ...]) -> dict:
+    """Return the document of a robot file, on its base where it has one; above: files whose base this one is."""
+    document = load_yaml(path)
+    if not isinstance(document, dict):
+        raise ConfigError(f"{path}: is empty or not a mapping; allowed top-level keys: {', '.join(SECTIONS)}")
+    for key in document:
+        if key not in (*SECTIONS, *_OTHER_KEYS):
+            raise ConfigError(f"{path}: unknown key '{key}'; allowed: {', '.join((*SECTIONS, *_OTHER_KEYS))}")
+    for key, section in document.items():
+        if section is not None and key != "base" and not isinstance(section, dict):
+            raise ConfigError(f"{path}: {key} is {section!r}; a mapping of keys is needed")
+    if "base" not in document:
+        return document
+    name = document["base"]
+    if not isinstance(name, str) or not name:
+        raise ConfigError(f"{path}: base is {name!r}; the path of a robot file or the name of a shipped robot is needed")
+    near = path.resolve().parent / Path(name).expanduser()
+    try:
+        base = (near if near.is_file() else _resolve(name)).resolve()
+    except ConfigError as error:
+        raise ConfigError(f"{path}: base: {error}") from error
+    if base in (*above, path.resolve()):
+        raise ConfigError(f"{path}: base is '{name}', which itself stands on this file; name a file that does not")
+    return on_base(document, _document(base, (*above, path.resolve())), base.parent)
 
 
 def _scene_section(document: dict, source: str) -> SceneSection:

@@ -15,18 +15,18 @@ from gravcomp.firmware import requests
 from gravcomp.firmware.client import BoardClient
 from gravcomp.firmware.settings import FAULTS, STATES
 
-_LISTEN, _HEAT, _ASKED = 5.0, 5.0, 50  # s, s, requests
+_ASKED = 50  # requests
 _HEATER_PERIOD, _HEATER_END = 0.1, 1.5  # s
 _PERIOD = 10.0  # ms between samples
 _JITTER = 0.5  # ms of the board's stamps
 _DELAY = 5.0  # ms: a tick, two frames and a host that is not a real-time one
 
 
-def examine(interface: str, channel: str) -> list[Finding]:
-    """Return the findings of the bench test. Raises nothing: what does not answer is a finding."""
+def examine(interface: str, channel: str, seconds: float = 5.0) -> list[Finding]:
+    """Return the findings of the bench test; `seconds` for the samples and for the heater. What does not answer is a finding."""
     try:
         with BoardClient(CanInterface(interface, channel)) as client:
-            return _version(client) + _samples(client) + _answers(client) + _heater(client) + _state(client)
+            return _version(client) + _samples(client, seconds) + _answers(client) + _heater(client, seconds) + _state(client)
     except ConfigError as error:
         return [Finding("missing", "board", str(error), "see src/doc/firmware.md")]
 
@@ -39,10 +39,10 @@ def _version(client: BoardClient) -> list[Finding]:
     return [Finding("ok", "board", text)]
 
 
-def _samples(client: BoardClient) -> list[Finding]:
+def _samples(client: BoardClient, seconds: float) -> list[Finding]:
     """Rate and jitter of the samples, and the noise of the sensor at rest."""
     arrivals, stamps, force, rate = [], [], [], []
-    for frame in client.listen(_LISTEN):
+    for frame in client.listen(seconds):
         values = _values(frame)
         if values is None:
             continue
@@ -54,14 +54,15 @@ def _samples(client: BoardClient) -> list[Finding]:
             stamps.append(values.time)
             arrivals.append(frame.timestamp)
     if len(stamps) < 10 or not force or not rate:
-        return [Finding("missing", "samples", f"{len(stamps)} samples in {_LISTEN:g} s", "is the BMI088 on its pins?")]
+        return [Finding("missing", "samples", f"{len(stamps)} samples in {seconds:g} s", "is the BMI088 on its pins?")]
     steps = [1e-3 * ((b - a) & 0xFFFFFFFF) for a, b in zip(stamps, stamps[1:])]
     late = [1e3 * (b - a) for a, b in zip(arrivals, arrivals[1:])]
     spread = max(abs(step - statistics.median(steps)) for step in steps)
     good = abs(statistics.median(steps) - _PERIOD) < 0.02 * _PERIOD and spread < _JITTER
     text = (
         f"every {statistics.median(steps):.3f} ms by the board's stamps, at most {spread:.3f} ms off; arrival at most"
-        f" {max(abs(step - _PERIOD) for step in late):.2f} ms off; expected: {_PERIOD:g} ms within 2 %, stamps within {_JITTER:g} ms"
+        f" {max(abs(step - _PERIOD) for step in late):.2f} ms off; expected: {_PERIOD:g} ms within 2 %, stamps"
+        f" within {_JITTER:g} ms"
     )
     noise = [
         ", ".join(f"{statistics.mean(axis):.1f} +- {statistics.pstdev(axis):.1f}" for axis in zip(*counts))
@@ -89,11 +90,11 @@ def _answers(client: BoardClient) -> list[Finding]:
     return [Finding("ok" if median < _DELAY else "missing", "delay of answers", text)]
 
 
-def _heater(client: BoardClient) -> list[Finding]:
+def _heater(client: BoardClient, seconds: float) -> list[Finding]:
     """Half power, then no command: the temperature must rise, and the heater go off by itself."""
     readings: list[float] = []
     duties: list[tuple[float, float]] = []
-    end, due, sequence = time.monotonic() + _HEAT, 0.0, 0
+    end, due, sequence = time.monotonic() + seconds, 0.0, 0
 
     def take(frame: can.Message) -> None:
         values = _values(frame)
@@ -115,8 +116,8 @@ def _heater(client: BoardClient) -> list[Finding]:
     off = next((when - stopped for when, duty in duties if when > stopped and duty == 0.0), None)
     gone = "not off" if off is None else f"off {1e3 * off:.0f} ms after the last command"
     text = (
-        f"duty {on:.2f}, from {readings[0]:.2f} to {max(readings):.2f} degC in {_HEAT:g} s, {gone}; expected: duty 0.50, warmer,"
-        " off after 500 to 700 ms"
+        f"duty {on:.2f}, from {readings[0]:.2f} to {max(readings):.2f} degC in {seconds:g} s, {gone}; expected: duty 0.50,"
+        " warmer, off after 500 to 700 ms"
     )
     good = abs(on - 0.5) < 0.01 and max(readings) > readings[0] and off is not None and off < 0.7
     return [Finding("ok" if good else "missing", "heater", text)]

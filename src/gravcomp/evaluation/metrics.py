@@ -12,6 +12,10 @@ from typing import Generic, TypeVar
 import numpy as np
 
 Value = TypeVar("Value", np.ndarray, float)
+
+CONVERGED = 5e-3
+"""Of the robot's length: a tip has converged when it stays within it."""
+
 _NO_MOTION = 1e-12  # m^2; rounding errors of a course at rest are below it
 
 

@@ -6,7 +6,9 @@ Rectum: 40 mm straight; bend: 70 mm radius towards the front of the patient; lum
 import numpy as np
 
 from gravcomp.experiments.reaching import reaching
+from gravcomp.experiments.steering import add_steering
 from gravcomp.report.result import Result
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
 from gravcomp.trials.lumen import Lumen, Reach
 
@@ -23,4 +25,7 @@ REACHES = tuple(
 def run(context: Context) -> Result:
     """Run the experiment."""
     question = "Does the robot follow the same path through the colon when the patient is turned on the side?"
-    return reaching(context, "colonoscopy", TITLE, question, REACHES)
+    result = reaching(context, "colonoscopy", TITLE, question, REACHES)
+    setup = context.once(calibrate_on_virtual_robot).setup
+    add_steering(result, context, setup, [(reach.name, reach.lumen, reach.inclination, reach.roll) for reach in REACHES])
+    return result

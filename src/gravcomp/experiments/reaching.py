@@ -120,8 +120,9 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
             "Cables only pull: bending the robot also shortens it, by some millimetres at the end of a bend, with compensation"
             " and without. No cable can compensate this; advancing the base can, by the shortening that the model predicts"
             " (base fed). The shortening is part of the tip error, not of the lateral error.",
-            "Contact is not modelled, neither in the model nor in the virtual robot: a negative clearance is the depth of"
-            " penetration into the wall. A real wall would carry that load.",
+            "Bodies in the lumen, clearance and tip errors: the base moves as given, and there is no wall, so that only the"
+            " compensation forms the robot. A negative clearance is the depth by which the robot would enter a wall; none of"
+            " these runs counts as reached. The runs in which a person steers have the wall.",
             "Without compensation: the cables that bend the weightless robot along the lumen are pulled in, the others are"
             " released.",
         ],

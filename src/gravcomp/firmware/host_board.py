@@ -22,14 +22,26 @@ class HostBoard:
     """
 
     def __init__(self, settings: Mapping[str, float] | None = None, unique_id: tuple[int, int, int] = (1, 2, 3)):
-        self._library = load()
-        self._memory = (ctypes.c_uint64 * (self._library.gc_host_size() // 8 + 1))()
-        self._at = ctypes.addressof(self._memory)
         self._unique_id = (ctypes.c_uint32 * 3)(*unique_id)
-        self._frame = Frame()
+        self._allocate()
         self.lose_supply_after(_ALL_WORDS)
         self.restart()
         self.set(settings or {})
+
+    def _allocate(self) -> None:
+        self._library = load()
+        self._memory = (ctypes.c_uint64 * (self._library.gc_host_size() // 8 + 1))()
+        self._at = ctypes.addressof(self._memory)
+        self._frame = Frame()
+
+    def __deepcopy__(self, memo: dict) -> "HostBoard":
+        """Return a board in the same state."""
+        other = HostBoard.__new__(HostBoard)
+        other._unique_id = (ctypes.c_uint32 * 3)(*self._unique_id)
+        other._allocate()
+        ctypes.memmove(other._at, self._at, ctypes.sizeof(self._memory))
+        other._library.gc_host_attach(other._at)
+        return other
 
     def restart(self, cause: int = 0) -> None:
         """Start as after a reset of this cause (core/board.h)."""

@@ -45,6 +45,7 @@ def load() -> ctypes.CDLL:
         ("size", ctypes.c_size_t, ()),
         ("record_size", ctypes.c_size_t, ()),
         ("start", None, (memory, ctypes.POINTER(u32), u8)),
+        ("attach", None, (memory,)),
         ("lose_supply_after", None, (memory, u32)),
         ("set", flag, (memory, u32, u32)),
         ("get", u32, (memory, u32)),
@@ -88,7 +89,7 @@ def host_compiler() -> list[str]:
 def compile_files(
     compiler: Sequence[str], files: Sequence[Path], target: Path, options: Sequence[str], folder: Path | None = None
 ) -> None:
-    """Compile and link `files` into `target`; what the compiler leaves beside it goes into `folder`. Raises SetupError."""
+    """Compile and link `files` into `target`; what else the compiler writes goes into `folder`. Raises SetupError."""
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         command = [*compiler, *WARNINGS, *EXACT, *options, *map(str, files), "-o", str(target)]
         done = subprocess.run(command, capture_output=True, text=True, cwd=folder or scratch)

@@ -74,7 +74,7 @@ def _build(parts: list[str], standalone: bool, path: Path, usage: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as name:
         scratch = Path(name)
         objects, frames = [], []
-        # What Zig leaves in its cache besides the object, the use of the stack, is found in a cache of this build alone.
+        # The report of the use of the stack stays in the cache: this build has one of its own.
         own = dict(environment, ZIG_LOCAL_CACHE_DIR=str(scratch / "cache"))
         for source in sources(*parts):
             target = scratch / f"{'-'.join(source.relative_to(folder).with_suffix('').parts)}.o"

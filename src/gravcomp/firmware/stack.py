@@ -19,7 +19,7 @@ _INTERRUPTS = (
     ("gc_on_tick", "gc_on_data_ready", "gc_on_host_sent", "gc_on_motor_sent"),
     ("gc_on_host_frame", "gc_on_motor_frame", "gc_on_edge"),
 )
-"""Handlers by priority: besides the main loop one of each priority can be on the stack."""
+"""Handlers by priority: on the stack can be the main loop and one of each priority."""
 
 _POINTED = ("erase", "write", "gc_standalone_receive")
 """Functions whose addresses are taken: where a call through a pointer may go."""

@@ -22,6 +22,10 @@ class Creep:
         self.exists = self._elements is not None and self._viscosity.creeps
         self.relax(np.zeros_like(model.mesh.nodes))
 
+    def set_ratio(self, ratio: np.ndarray) -> None:
+        """Give every material that creeps branches of these ratios (b,), stiffness over the long-term one."""
+        self._viscosity.set_ratio(ratio)
+
     def relax(self, u: np.ndarray) -> None:
         """Be relaxed at the displacements u (n, 3): as after a long time there."""
         if self.exists and self._elements is not None:

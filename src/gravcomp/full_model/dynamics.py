@@ -12,7 +12,8 @@ import numpy as np
 from gravcomp.cables.tendons import TendonState
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
-from gravcomp.full_model.motion import Motion
+from gravcomp.full_model.motion import ExternalForce, Motion
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.rayleigh import RayleighDamping
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.viscosity import Viscosity
@@ -87,14 +88,22 @@ class DynamicSolver:
         held = self._relaxed(strain) if held is None or self._viscosity is None else held
         self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, strain, held)
 
-    def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> Motion:
-        """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one."""
+    def step(self, gravity: np.ndarray, cables: CableInput, h: float, external: ExternalForce | None = None) -> Motion:
+        """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one.
+
+        external: force (3 n_free,) in N that acts in addition, of the last displacements (n, 3).
+        """
         model, last = self.model, self.state
         scheme = GeneralizedAlpha.of(h, self.options.spectral_radius)
         if self._rayleigh:
             self._rayleigh.update(last.u)
         viscous = self._viscous(h)
         weight = model.weight(gravity)
+        if external is not None:
+            weight = weight + external(last.u)
+        couple = with_payload(model, gravity, None)
+        if couple is not None:
+            weight = weight + couple.at(last.u)
         u = last.u.copy()
         velocity_0, acceleration_0 = scheme.predict(model.free(last.velocity), model.free(last.acceleration))
         # Newton starts at the displacements of the last step: a straight prediction would stretch a rotating body, and the

@@ -17,6 +17,7 @@ from gravcomp.mechanics.corotational import CorotationalElements
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.mesh import Mesh, body_mesh
 from gravcomp.mesh.elements import constant_strain
+from gravcomp.mesh.sections import section_functionals
 
 
 class MeshedModel:
@@ -53,6 +54,7 @@ class MeshedModel:
         if self.disks is not None:
             self.nodal_weight = self.nodal_weight + self.disks.mass @ self.disks.rows[:, 0]
         self.length = robot.length
+        self._section_rows: dict[float, np.ndarray] = {}
 
     @property
     def mass(self) -> float:
@@ -84,6 +86,15 @@ class MeshedModel:
         a, b = (nodes[index] for index in np.tril_indices(len(nodes)))
         for i in range(3):
             np.add.at(matrix.values, self.pattern.position(3 * a + i, 3 * b + i), mass * weights[a] * weights[b])
+
+    def section_rows(self, station: float) -> np.ndarray:
+        """Return p, f_1 and f_2 (3, n) of the section at `station` (0 at the base to 1 at the tip), as functionals of the nodes.
+
+        Raises MeshError where the body has no section.
+        """
+        if station not in self._section_rows:
+            self._section_rows[station] = section_functionals(self.mesh, np.array([station * self.length]))
+        return self._section_rows[station]
 
     def free(self, field: np.ndarray) -> np.ndarray:
         """Return the unknowns (3 n_free,) of a field on all nodes (n, 3), as a view if the field is contiguous."""

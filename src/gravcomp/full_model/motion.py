@@ -1,10 +1,14 @@
 """State of the full model in motion."""
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
 from gravcomp.cables.tendons import TendonState
+
+ExternalForce = Callable[[np.ndarray], np.ndarray]
+"""Force on the unknowns, of the displacements in which they are given."""
 
 
 @dataclasses.dataclass

@@ -86,6 +86,8 @@ class StaticSolver(StaticTracker):
             part /= 2.0
             if part < least:
                 self.state = kept
+                if self.contact is not None:
+                    self.contact.allowed = 0.0
                 return dataclasses.replace(here, converged=False, load_fraction=done)
         return self.state
 

@@ -23,8 +23,10 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.payload import with_payload
+from gravcomp.full_model.turning_loads import TurningFactor, add_symmetric_part, slopes_of
 from gravcomp.full_model.wrench import PointLoads
-from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
+from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix, NotPositiveDefinite
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 
 # Smallest det F that a step may leave in an element.
@@ -33,8 +35,6 @@ _CRUSHED = 0.1
 _ROUNDING = 1e-3
 # A step below this fraction of the tolerance is the last one: the steps that would follow may add up to ten times its length.
 _SHORT = 0.1
-# The forces of a moment turn with its section. They have settled when they change by less than this fraction of the largest.
-_SETTLED_MOMENT, _UNDAMPED = 1e-6, 8
 # Places of contact are found in some more steps.
 _MORE_IN_CONTACT = 3
 # A factor is used again up to this displacement from where it was made, as a fraction of the length, and as long as each
@@ -69,6 +69,7 @@ class StaticTracker:
 
     def reset(self) -> None:
         """Return to the straight robot without tension."""
+        self._contained: list[np.ndarray] = []  # of the loads that turn, in the last factor
         self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
@@ -102,33 +103,41 @@ class StaticTracker:
         if self.contact is not None:
             self.contact.begin(previous.u, gravity)
             iterations *= _MORE_IN_CONTACT
-        dead = self.model.weight(gravity)
-        weight = dead if loads is None else dead + loads.at(state.u, fraction)
-        if loads is not None and not loads.constant:
-            iterations *= 6
+        loads = with_payload(self.model, gravity / fraction, loads)
+        load = _Load(self.model.weight(gravity), loads, fraction)
+        if load.turns:
+            self._kept = None  # it may be of other loads
         origin: np.ndarray | None = None
         finer = 1e-3 if exact else 1.0
         while not state.converged and state.iterations < iterations:
-            origin = self._newton_step(state, weight, cables, origin, finer * self.tolerance, stable)
-            settled = True
-            if loads is not None and not loads.constant:
-                turned = dead + loads.at(state.u, fraction)
-                settled = bool(np.abs(turned - weight).max() <= _SETTLED_MOMENT * np.abs(turned).max())
-                # Turning couples the two directions across the moment: after some steps half of the change is taken, which
-                # damps that.
-                weight = turned if state.iterations < _UNDAMPED else 0.5 * (weight + turned)
-            self._measure(state, weight)
+            origin = self._newton_step(state, load, cables, origin, finer * self.tolerance, stable)
+            self._measure(state, load)
             if origin is None:
                 break
-            settled &= self.contact is None or self.contact.settled
-            state.converged &= settled and state.residual <= self._allowed_residual(state, weight)
+            settled = self.contact is None or self.contact.settled
+            state.converged &= settled and state.residual <= self._allowed_residual(state, load)
         self.state = state
         return state
+
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present state.
+
+        Raises NotPositiveDefinite where the state is not stable.
+        """
+        model, state = self.model, self.state
+        self._kept = None
+        self._matrix.values[:] = 0.0
+        model.elements.assemble(state.u, self._matrix, self.viscous)
+        if state.tension.any():
+            model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
+        pulls = np.kron(model.section_rows(1.0)[0, : model.n_free, None], np.eye(3))
+        compliance: np.ndarray = pulls.T @ self._matrix.factor().solve(pulls)
+        return compliance
 
     def _newton_step(
         self,
         state: Equilibrium,
-        weight: np.ndarray,
+        load: "_Load",
         cables: CableInput,
         origin: np.ndarray | None,
         tolerance: float,
@@ -147,17 +156,18 @@ class StaticTracker:
             force = model.elements.internal_force(state.u, self.viscous)
         else:
             try:
-                factor, force, exact = self._new_factor(state, origin, stable)
+                factor, force, exact = self._new_factor(state, load, origin, stable)
             except NotPositiveDefinite:
                 return None
             if exact and origin is None:
                 self._kept = factor, state.u.copy()
         jacobian = state.tendons.jacobian
-        out = weight - model.free(force)
+        out = load.at(state.u) - model.free(force)
+        solver = load.turned(factor, state.u, self._contained)
         if self.contact is not None:
-            step, tension = self.contact.respond(state, factor, out, cables)
+            step, tension = self.contact.respond(state, solver, out, cables)
         else:
-            solved = factor.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
+            solved = solver.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
             y, state.answer = solved[:, 0], solved[:, 1:]
             state.compliance = jacobian @ state.answer + np.diag(model.tendons.stretch(state.tendons))
             free = state.tendons.displacement + jacobian @ y
@@ -171,7 +181,7 @@ class StaticTracker:
             return None
         start, undamped = moved
         if exact and undamped:
-            start, size = self._correct(state, factor, weight, cables, jacobian, start, size, tolerance, reused)
+            start, size = self._correct(state, solver, load, cables, jacobian, start, size, tolerance, reused)
             # The tangent of corotational elements is not exact: steps shrink slowly. This one is short enough.
             state.converged |= size < _SHORT * tolerance
         return start
@@ -203,8 +213,8 @@ class StaticTracker:
     def _correct(
         self,
         state: Equilibrium,
-        factor: BlockCholesky,
-        weight: np.ndarray,
+        factor: "BlockCholesky | TurningFactor",
+        load: "_Load",
         cables: CableInput,
         jacobian: np.ndarray,
         start: np.ndarray,
@@ -222,7 +232,7 @@ class StaticTracker:
         model = self.model
         corrected = False
         while size < self.near:
-            correction, tension = self._correction(state, factor, weight, cables, jacobian)
+            correction, tension = self._correction(state, factor, load, cables, jacobian)
             length = float(np.abs(correction).max())
             if max(length, size) < _ROUNDING * tolerance:  # already at rest
                 state.converged = True
@@ -243,14 +253,19 @@ class StaticTracker:
         return start, size
 
     def _correction(
-        self, state: Equilibrium, factor: BlockCholesky, weight: np.ndarray, cables: CableInput, jacobian: np.ndarray
+        self,
+        state: Equilibrium,
+        factor: "BlockCholesky | TurningFactor",
+        load: "_Load",
+        cables: CableInput,
+        jacobian: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the change (3 n_free,) of the unknowns and the tensions (m,) from the factor of a nearby shape."""
         model = self.model
         force = model.elements.internal_force(state.u, self.viscous)
         if self.contact is not None:
-            return self.contact.respond(state, factor, weight - model.free(force), cables)
-        out = weight - model.free(force) + state.tension @ state.tendons.force_jacobian
+            return self.contact.respond(state, factor, load.at(state.u) - model.free(force), cables)
+        out = load.at(state.u) - model.free(force) + state.tension @ state.tendons.force_jacobian
         y = factor.solve(out)
         free = state.tendons.displacement + jacobian @ y
         body = jacobian @ state.answer
@@ -267,7 +282,9 @@ class StaticTracker:
         factor, u = self._kept
         return factor if np.abs(state.u - u).max() < _FACTOR_REACH * self.model.length else None
 
-    def _new_factor(self, state: Equilibrium, origin: np.ndarray | None, stable: bool) -> tuple[BlockCholesky, np.ndarray, bool]:
+    def _new_factor(
+        self, state: Equilibrium, load: "_Load", origin: np.ndarray | None, stable: bool
+    ) -> tuple[BlockCholesky, np.ndarray, bool]:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
         If the tangent is not positive definite, a multiple of the identity is added: the step still goes downhill, but its
@@ -281,6 +298,7 @@ class StaticTracker:
             force = self.model.elements.assemble(state.u, self._matrix, self.viscous, origin)
             if state.tension.any():
                 self.model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
+            self._contained = load.add_to_tangent(self._matrix, state.u)
             if shift:
                 self._matrix.add_diagonal(shift)
             try:
@@ -289,21 +307,52 @@ class StaticTracker:
                 continue
         raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
 
-    def _allowed_residual(self, state: Equilibrium, weight: np.ndarray) -> float:
+    def _allowed_residual(self, state: Equilibrium, load: "_Load") -> float:
         """Return the force out of balance in N below which a state counts as balanced.
 
         Short steps alone prove nothing: the corrections of a factor that is too stiff are short as well.
         """
         pull = self._pull(state)
-        return 1e-2 * max(np.abs(weight).max(), np.abs(pull).max(initial=0.0)) + 1e-12 * self._stiffness * self.model.length
+        largest = max(np.abs(load.at(state.u)).max(), np.abs(pull).max(initial=0.0))
+        return 1e-2 * largest + 1e-12 * self._stiffness * self.model.length
 
     def _pull(self, state: Equilibrium) -> np.ndarray:
         """Return the forces (3 n_free,) of cables and contact on the unknowns."""
         pull = state.tension @ state.tendons.force_jacobian
         return pull if self.contact is None else pull + self.contact.pull
 
-    def _measure(self, state: Equilibrium, weight: np.ndarray) -> None:
+    def _measure(self, state: Equilibrium, load: "_Load") -> None:
         """Set the residual of `state`."""
         force = self.model.free(self.model.elements.internal_force(state.u, self.viscous))
-        out = weight - force + self._pull(state)
+        out = load.at(state.u) - force + self._pull(state)
         state.residual = float(np.abs(out).max())
+
+
+class _Load:
+    """The weight of a model and, in addition, loads that may turn with their sections."""
+
+    def __init__(self, weight: np.ndarray, loads: PointLoads | None, fraction: float):
+        """weight (3 n_free,) in N; loads: act by `fraction` of their value."""
+        self._loads, self._fraction = loads, fraction
+        self._weight = weight
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """Return the forces (3 n_free,) at the displacements u (n, 3)."""
+        return self._weight if self._loads is None else self._weight + self._loads.at(u, self._fraction)
+
+    @property
+    def turns(self) -> bool:
+        """Whether a part of the load turns with its section."""
+        return self._loads is not None and bool(self._loads.turning)
+
+    def add_to_tangent(self, matrix: BlockMatrix, u: np.ndarray) -> list[np.ndarray]:
+        """Add to the stiffness what is symmetric of the loads that turn, at u (n, 3), and return it."""
+        if self._loads is None or not self._loads.turning:
+            return []
+        return add_symmetric_part(matrix, self._loads, slopes_of(self._loads, u, self._fraction))
+
+    def turned(self, factor: BlockCholesky, u: np.ndarray, contained: list[np.ndarray]) -> BlockCholesky | TurningFactor:
+        """Return the factor with the rest of what loads that turn add to the tangent at u (n, 3); contained: in the factor."""
+        if self._loads is None or not self._loads.turning:
+            return factor
+        return TurningFactor(factor, self._loads, slopes_of(self._loads, u, self._fraction), contained)

@@ -39,6 +39,11 @@ class Viscosity:
         self._damping_time = damping[mesh.region][:, None, None]
         self._ratio, self._time = (branches[mesh.region, :, i].T[:, :, None, None] for i in range(2))
         self.creeps = count > 0
+        self._creeping = self._ratio > 0.0
+
+    def set_ratio(self, ratio: np.ndarray) -> None:
+        """Give every material that has branches the ratios (b,) in place of its own."""
+        self._ratio = np.where(self._creeping, ratio[:, None, None, None], 0.0)
 
     def step(self, strain: np.ndarray, strain_before: np.ndarray | None, held: np.ndarray, h: float) -> ViscousStrain:
         """Return the viscous strain at the end of a step of h s from `strain` (k, p, 6) and `held`, in motion.

@@ -85,6 +85,10 @@ NODES = (
         subscribes=(
             Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link"),
             Port("imu/temperature", "sensor_msgs/msg/Temperature", "temperature of the IMU in degC"),
+            Port(
+                "arm/acceleration", "geometry_msgs/msg/Vector3Stamped", "of the IMU, m/s^2 in soft_base (arm_acceleration)",
+                optional=True,
+            ),
         ),
         publishes=(
             Port("imu/data", "sensor_msgs/msg/Imu", "with orientation and covariances, bias removed (REP-145)", 100.0),
@@ -106,14 +110,20 @@ NODES = (
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2, in soft_base"),
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
+            Port("external/wrench", "geometry_msgs/msg/WrenchStamped", "known force (N) and moment (N m); the frame says where"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m (load.kind)"),
+            Port("measured/tension", "sensor_msgs/msg/JointState", "tensions of the cables in effort, N (load.kind)"),
         ),
         publishes=(
             Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "shape, cables and compliance", 100.0),
             Port("robot/tip", "geometry_msgs/msg/PoseStamped", "pose of the tip in soft_base, m", 100.0),
             Port("robot/markers", "visualization_msgs/msg/MarkerArray", "markers for RViz, up to 10 Hz"),
+            Port("estimated/wrench", "gravcomp_msgs/msg/WrenchEstimate", "unknown load at the tip, with covariance (load.kind)"),
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of tip and backbone, where tf2_msgs is installed", optional=True),
+            Port("joint_states", "sensor_msgs/msg/JointState", "shape as joints of the URDF (shape_joints)", optional=True),
             _DIAGNOSTICS,
         ),
+        services=(Port("~/zero_load", "std_srvs/srv/Trigger", "learn the errors of model and sensors without load"),),
     ),
     Node(
         "gravcomp_fem", "inverse_controller", "computes the cable displacements that bring the model to its target",
@@ -146,6 +156,7 @@ NODES = (
             Port("truth/backbone", "geometry_msgs/msg/PoseArray", "backbone in soft_base, m; only for evaluation"),
             Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in soft_base, m/s^2; only for evaluation"),
             Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip as a tracker measures it, m", optional=True),
+            Port("measured/tension", "sensor_msgs/msg/JointState", "tensions as load cells measure them, N", optional=True),
             _DIAGNOSTICS,
         ),
     ),
@@ -183,10 +194,15 @@ NODES = (
             Port("/tf", "tf2_msgs/msg/TFMessage", "frames of the arm (source: tf)", optional=True),
             Port("/tf_static", "tf2_msgs/msg/TFMessage", "fixed frames of the arm (source: tf)", optional=True),
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the IMU (use: check)", optional=True),
+            Port("gravity/imu", "geometry_msgs/msg/Vector3Stamped", "gravity from the IMU (use: fuse)", optional=True),
         ),
         publishes=(
             Port("gravity/arm", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: check)", optional=True),
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity from the arm, m/s^2 (use: publish)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity of the arm, m/s^2 (use: publish, fuse)", optional=True),
+            Port(
+                "arm/acceleration", "geometry_msgs/msg/Vector3Stamped", "of the IMU, m/s^2 in soft_base (feed_acceleration)",
+                optional=True,
+            ),
             _DIAGNOSTICS,
         ),
     ),
@@ -214,6 +230,20 @@ NODES = (
         f"{_PARAMETERS}.recorder:RecorderParameters",
         subscribes=(Port("*", "any", "every topic of the namespace and every global topic, or those in `topics`"),),
         publishes=(_DIAGNOSTICS,),
+        tool=True,
+    ),
+    Node(
+        "gravcomp_fem", "calibrator", "leads through a calibration pose by pose: pulls the cables and writes the measured tips",
+        f"{_PARAMETERS}.calibrator:CalibratorParameters",
+        subscribes=(
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2: when the base is turned as planned"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "displacements from which the cables are moved"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; another topic by `tip_topic`"),
+        ),
+        publishes=(
+            Port("cable/command", "gravcomp_msgs/msg/CableCommand", "planned displacements of the cables in m"),
+            _DIAGNOSTICS,
+        ),
         tool=True,
     ),
     Node(

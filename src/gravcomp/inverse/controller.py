@@ -74,6 +74,7 @@ class InverseController:
         tension: np.ndarray | None = None,
         interval: float = 0.01,
         followed: bool = True,
+        contact: str = "",
     ) -> Command:
         """Return the command that brings the modelled robot nearest to the target.
 
@@ -93,6 +94,8 @@ class InverseController:
             Time since the last step in s.
         followed
             Whether the model's shape is its equilibrium under the last command; False: it found none and kept its last shape.
+        contact
+            What the modelled robot leans on, in words; a target that it then misses has the code CONTACT.
 
         """
         started = time.perf_counter()
@@ -168,6 +171,7 @@ class InverseController:
             names=self._names,
             tolerance=options.tolerance_of(self.robot.length),
             tilt_tolerance=options.tilt_tolerance,
+            contact=contact,
         )
         self._displacement, self._tension, self._change = displacement, result.tension, result.change
         return Command(

@@ -39,7 +39,8 @@ class InverseOptions:
         edge="mm",
         minimum=0.01,
         maximum=1000.0,
-        description="largest distance from a reached target, including the shortening by the cables; none: 4 % of the robot's length",
+        description="largest distance from a reached target, including the shortening by the cables;"
+        " none: 4 % of the robot's length",
     )
     tilt_tolerance: float = parameter(
         5.0,

@@ -17,9 +17,9 @@ The part of the errors of tip and backbone along the robot counts less, because 
 shortening. At the tip this is the part along the target's direction; the reduction of its weight fades as the tip points away
 from that direction.
 
-The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both responses are
-those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the tip's lateral position and the
-length of the backbone, and
+The tip's direction counts as far as cables can turn it without moving the tip across. With W the diagonal of W_aa, both
+responses are those to the tensions of equal work, J = W_ea W^(-1/2); N projects on the tensions that leave the tip's lateral
+position and the length of the backbone, and
 
     D = G (G + delta g I)^-1,   G = J_direction N J_direction^T,   g: largest eigenvalue of J_direction J_direction^T
 
@@ -98,8 +98,8 @@ def build_programme(
 
 # delta of the module's text: cables that turn the tip in place by less than a thirtieth of what they turn it do not count.
 _SEPARATE = 1e-3
-# Of the square of the tip's motion. Cables that shorten a slender robot do so by more; what bending changes of the length, measured
-# from point to point, is less.
+# Of the square of the tip's motion. Cables that shorten a slender robot do so by more; what bending changes of the length,
+# measured from point to point, is less.
 _LEAST_SHORTENING = 1e-5
 
 

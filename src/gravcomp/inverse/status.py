@@ -18,6 +18,7 @@ class ControllerCode(IntEnum):
     REFUSED = 5
     SOLVER_FAILED = 6
     RELAXING = 7
+    CONTACT = 8
 
 
 class Holdable(IntEnum):
@@ -37,28 +38,30 @@ def evaluate(
     names: tuple[str, ...],
     tolerance: float,
     tilt_tolerance: float,
+    contact: str = "",
 ) -> tuple[ControllerCode, str]:
     """Return code and message for a step.
 
     points_missed: largest predicted distance of a weighted point in m; tilt in rad; met (3, m): of `limits.limits_met`, None if
-    no limit is reached; names (m,) of the cables; tolerance (m) and tilt_tolerance (rad): up to which a target is reached.
+    no limit is reached; names (m,) of the cables; tolerance (m) and tilt_tolerance (rad): up to which a target is reached;
+    contact: what the robot leans on, in words.
     """
     moving, at_tension, at_travel = (_listed(names, which) for which in met) if met is not None else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
     if moving and not held:
         return ControllerCode.AT_LIMIT, f"moving as fast as allowed: displacement rate of {moving}"
     reason = f"; at the limit: {', '.join(held)}" if held else ""
+    missed = ControllerCode.CONTACT if contact else ControllerCode.UNREACHABLE
+    reason += f"; the robot leans on {contact}" if contact else ""
     if points_missed > tolerance:
         return (
-            ControllerCode.UNREACHABLE,
-            f"the nearest shape is {1e3 * points_missed:.1f} mm from the target"
-            f" (tolerance {1e3 * tolerance:g} mm){reason}",
+            missed,
+            f"the nearest shape is {1e3 * points_missed:.1f} mm from the target (tolerance {1e3 * tolerance:g} mm){reason}",
         )
     if target.tip_direction_weight > 0.0 and tilt > tilt_tolerance:
         return (
-            ControllerCode.UNREACHABLE,
-            f"the nearest shape is tilted by {np.degrees(tilt):.1f} deg"
-            f" (tolerance {np.degrees(tilt_tolerance):g} deg){reason}",
+            missed,
+            f"the nearest shape is tilted by {np.degrees(tilt):.1f} deg (tolerance {np.degrees(tilt_tolerance):g} deg){reason}",
         )
     if held:
         return ControllerCode.AT_LIMIT, f"the nearest shape is kept{reason}"

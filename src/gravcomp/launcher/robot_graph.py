@@ -41,8 +41,10 @@ class RobotGraph:
 
         virtual: for the virtual robot, which joints need a node more for.
         """
+        from gravcomp.description import load_robot_file
+
         nodes: tuple[tuple[str, str], ...] = LOOP
-        if has_joints(self.robot):
+        if load_robot_file(self.robot).has_joints:
             nodes = (JOINT_BRIDGE, *LOOP[1:]) + ((JOINT_ROBOT,) if virtual else ())
         return [self.node(package, executable) for package, executable in nodes]
 
@@ -56,13 +58,6 @@ class RobotGraph:
         given.update(self.parameters.get(executable, {}))
         given.update(parameters)
         return NodeSpec(package, executable, given, self.namespace)
-
-
-def has_joints(robot: str) -> bool:
-    """Return whether the motors of a robot are joints of a ros2_control robot. Raises ConfigError."""
-    from gravcomp.description import load_robot_file
-
-    return (load_robot_file(robot).sections.get("hardware") or {}).get("joints") is not None
 
 
 def private_channels(robot: str) -> str:

@@ -29,8 +29,9 @@ class JointDriver:
     """Runs a JointBridge in a thread.
 
     `send` takes what the controller is sent (rad or N m), `on_snapshot` the state; both are called from the thread, `send` also
-    from the thread of a command. `controller` returns None while the controller is there, else why it is not. Attributes: bridge;
-    overruns (control periods that were late by more than one period); delay (s, from IMU sample to command, of the last one).
+    from the thread of a command. `controller` returns None while the controller is there, else why it is not. `beat` is called
+    every period and returns whether there is a guard. Attributes: bridge; overruns (control periods that were late by more than
+    one period); delay (s, from IMU sample to command, of the last one).
     """
 
     def __init__(
@@ -40,10 +41,12 @@ class JointDriver:
         send: Callable[[Sequence[float]], None],
         on_snapshot: Callable[[CableSnapshot], None],
         controller: Callable[[], str | None] = lambda: None,
+        beat: Callable[[], bool] = lambda: True,
     ):
         self.bridge = JointBridge(hardware, require_imu=options.require_imu)
         self.overruns, self.delay = 0, 0.0
         self._options, self._send, self._on_snapshot, self._controller = options, send, on_snapshot, controller
+        self._beat = beat
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -122,13 +125,15 @@ class JointDriver:
         next_tick = next_state = time.monotonic()
         reported: State | None = None
         while not self._ending.wait(max(0.0, next_tick - time.monotonic())):
-            missing = self._controller()
+            missing, guarded = self._controller(), self._beat()
             with self._lock:
                 now = time.monotonic()
                 self.overruns += now > next_tick + period
                 next_tick = max(next_tick + period, now)
                 try:
                     self.bridge.controller(missing)
+                    if not guarded:
+                        self.bridge.stop("the guard is gone")
                     self._tick(now)
                 except Exception as error:  # without the thread the joints would follow the last command for ever
                     self.bridge.stop(f"error in the bridge: {error!r}")

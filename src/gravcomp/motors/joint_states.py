@@ -12,7 +12,7 @@ from gravcomp.description.hardware import Drive, Watchdog
 from gravcomp.description.joint_motors import JointMotor
 from gravcomp.motors.joint_scale import JointScale
 
-_JUMPS = 3  # messages in a row at the other side of a jump, after which the joint is believed to be there
+_JUMPS = 3  # messages in a row at the other side of a jump, after which the joint counts as being there
 _NAMES_SHOWN = 8
 
 

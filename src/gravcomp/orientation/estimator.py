@@ -100,16 +100,20 @@ class GravityEstimator:
         if math.isfinite(temperature):
             self._temperatures.append((stamp_ns, float(temperature)))
 
-    def update(self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float]) -> GravityEstimate | Problem:
+    def update(
+        self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float], known: Sequence[float] = (0.0, 0.0, 0.0)
+    ) -> GravityEstimate | Problem:
         """Take a raw sample and return the estimate, or only the Problem when the sample cannot be used.
 
-        stamp_ns: ns; gyro (3,) rad/s and accel (3,) m/s^2 in the IMU's frame.
+        stamp_ns: ns; gyro (3,) rad/s and accel (3,) m/s^2 in the IMU's frame. known (3,) m/s^2 in soft_base: the acceleration of
+        the IMU that somebody else knows, such as the arm that carries it; the filter takes the specific force without it.
         """
         self._follow_temperature(stamp_ns)
         compensation, offset, scale = self._compensation, self._offset, self._scale
         force = (scale[0] * (accel[0] - offset[0]), scale[1] * (accel[1] - offset[1]), scale[2] * (accel[2] - offset[2]))
         rate = (gyro[0] - compensation[0], gyro[1] - compensation[1], gyro[2] - compensation[2])
-        estimate = self.filter.update(stamp_ns, rate, force)
+        kx, ky, kz = quat.rotate(quat.conjugate(self._mount), known)
+        estimate = self.filter.update(stamp_ns, rate, (force[0] - kx, force[1] - ky, force[2] - kz))
         if isinstance(estimate, Problem):
             return estimate
         if estimate.problem is Problem.CLOCK_RESTARTED:

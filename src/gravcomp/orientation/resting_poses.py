@@ -1,7 +1,7 @@
 """Poses at rest in a recording: mean specific force and mean rate of each rest, rests in the same direction joined."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,11 +20,15 @@ class RestingPose:
     accel: np.ndarray  # (3,) m/s^2
     gyro: np.ndarray  # (3,) rad/s
     count: int
+    alongside: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (n,) of what was given with the samples
 
 
-def resting_poses(recording: Recording, options: FilterOptions | None = None) -> list[RestingPose]:
+def resting_poses(
+    recording: Recording, options: FilterOptions | None = None, alongside: np.ndarray | None = None
+) -> list[RestingPose]:
     """Return the rests of the recording in their order; rests in about the same direction are joined.
 
+    alongside (samples, n): values of the samples that are averaged over the rests as well; rests are then not joined.
     Raises CalibrationError where the sensor never rests.
     """
     options = options or FilterOptions()
@@ -54,11 +58,14 @@ def resting_poses(recording: Recording, options: FilterOptions | None = None) ->
             f"{recording.source}: the sensor never rests for {options.rest.minimum_time:g} s;"
             " lay it down in several poses, each for 5 s"
         )
-    return _joined([_pose(recording, indices) for indices in rests])
+    values = np.zeros((len(recording), 0)) if alongside is None else alongside
+    poses = [_pose(recording, values, indices) for indices in rests]
+    return _joined(poses) if alongside is None else poses
 
 
-def _pose(recording: Recording, indices: list[int]) -> RestingPose:
-    return RestingPose(recording.accel[indices].mean(axis=0), recording.gyro[indices].mean(axis=0), len(indices))
+def _pose(recording: Recording, values: np.ndarray, indices: list[int]) -> RestingPose:
+    accel, gyro, others = (part[indices].mean(axis=0) for part in (recording.accel, recording.gyro, values))
+    return RestingPose(accel, gyro, len(indices), others)
 
 
 def _joined(poses: list[RestingPose]) -> list[RestingPose]:
@@ -72,6 +79,7 @@ def _joined(poses: list[RestingPose]) -> list[RestingPose]:
                     (pose.accel * pose.count + other.accel * other.count) / count,
                     (pose.gyro * pose.count + other.gyro * other.count) / count,
                     count,
+                    pose.alongside,
                 )
                 break
         else:

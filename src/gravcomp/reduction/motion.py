@@ -13,6 +13,7 @@ import numpy as np
 
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.generalized_alpha import DynamicsOptions, GeneralizedAlpha
+from gravcomp.full_model.motion import ExternalForce
 from gravcomp.reduction.body import Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.motion_step import motion_step
@@ -107,8 +108,11 @@ class ReducedDynamicSolver:
         memory = memory or Memory.of(self._branches, q, point.strain)
         self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, memory)
 
-    def step(self, gravity: np.ndarray, cables: CableInput, h: float) -> ReducedMotion:
-        """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one."""
+    def step(self, gravity: np.ndarray, cables: CableInput, h: float, external: ExternalForce | None = None) -> ReducedMotion:
+        """Take one step of h seconds. If Newton's method does not converge, `converged` is False and the state is the old one.
+
+        external: force (r,) in N that acts in addition, of the last q (r,).
+        """
         model, last = self.model, self.state
         scheme = GeneralizedAlpha.of(h, self.options.spectral_radius)
         now, before = 1.0 - scheme.alpha_f, scheme.alpha_f
@@ -123,8 +127,11 @@ class ReducedDynamicSolver:
         rest = self._mass @ ((1.0 - scheme.alpha_m) * acceleration_0 + scheme.alpha_m * last.acceleration) + before * last.force
         rest += drag @ (now * velocity_0 + before * last.velocity)
         inertia = ((1.0 - scheme.alpha_m) * scheme.acceleration_rate) * self._mass + (now * scheme.velocity_rate) * drag
+        weight = model.weight @ gravity
+        if external is not None:
+            weight = weight + external(last.q)
         converged, q, tension, point, force, residual = motion_step(
-            self._body, last.point, last.q, last.tension, rest, inertia, model.weight @ gravity,
+            self._body, last.point, last.q, last.tension, rest, inertia, weight,
             *cables.arrays(last.tension.size), now, scale, offset, self._kept, self._tolerance,
         )  # fmt: skip
         if not converged:

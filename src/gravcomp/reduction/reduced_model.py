@@ -105,12 +105,12 @@ def project(
 ) -> ReducedModel:
     """Return the model on a basis (3 n_free, r). reach: largest |q| to use it for; error: known tip error in m."""
     r = basis.shape[1]
-    fields = _fields(model, basis)
+    modes = fields(model, basis)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     weighted = matrix.multiply(basis)
     pieces = [(cable, *piece) for cable, route in enumerate(route_cables(model.robot, model.mesh)) for piece in pieces_of(route)]
-    change = np.array([np.einsum("n,ani->ia", w, fields[:, nodes]) for _, nodes, w in pieces]).reshape(-1, r)
+    change = np.array([np.einsum("n,ani->ia", w, modes[:, nodes]) for _, nodes, w in pieces]).reshape(-1, r)
     coordinates_of = np.linalg.solve(basis.T @ weighted, weighted.T)
     return ReducedModel(
         basis=basis,
@@ -118,7 +118,7 @@ def project(
         force_norm=coordinates_of @ coordinates_of.T,
         elasticity=elasticity,
         deviation=cubature.deviation(model.elements, basis),
-        weight=np.einsum("anj,n->aj", fields, model.nodal_weight),
+        weight=np.einsum("anj,n->aj", modes, model.nodal_weight),
         cables=ReducedCables(
             rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
             change=np.ascontiguousarray(change),
@@ -138,11 +138,11 @@ def project(
 
 def section_changes(model: RobotModel, basis: np.ndarray) -> np.ndarray:
     """Return changes (n + 1, 3, 3, r) of the sections of `Effectors.sections` by the coordinates of a basis (3 n_free, r)."""
-    return np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in _fields(model, basis)], axis=-1))
+    return np.ascontiguousarray(np.stack([model.effectors.sections(field) for field in fields(model, basis)], axis=-1))
 
 
-def _fields(model: RobotModel, basis: np.ndarray) -> np.ndarray:
+def fields(model: RobotModel, basis: np.ndarray) -> np.ndarray:
     """Return the modes (r, n, 3) of a basis (3 n_free, r) on all nodes."""
-    fields = np.zeros((basis.shape[1], len(model.mesh.nodes), 3))
-    fields[:, : model.n_free] = basis.T.reshape(-1, model.n_free, 3)
-    return fields
+    modes = np.zeros((basis.shape[1], len(model.mesh.nodes), 3))
+    modes[:, : model.n_free] = basis.T.reshape(-1, model.n_free, 3)
+    return modes

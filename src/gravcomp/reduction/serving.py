@@ -12,16 +12,21 @@ import time
 
 import numpy as np
 
+from gravcomp.contact.contacts import Contacts
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.law_range import beyond_range
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.total_lagrangian import SolidElements
+from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.memory import Memory
-from gravcomp.reduction.reduced_model import ReducedModel
+from gravcomp.reduction.reduced_loads import ReducedLoads
+from gravcomp.reduction.reduced_model import ReducedModel, fields
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 
 # Largest tip error of the reduced model as a fraction of the length; below half of it, the reduced model is used again.
@@ -51,6 +56,9 @@ class ReducedServing:
         self._memory = Memory.of(branches.pop() if self._uniform else (), *at_rest)
         self._tolerance = _TOLERANCE * model.length
         self._tracker = ReducedTracker(reduced, model.length)
+        self._loads = ReducedLoads(model, reduced.basis)
+        if full.contact is not None:
+            self._tracker.contact = ReducedContact(full.contact, full.contact.changes(fields(model, reduced.basis)))
         self.reset()
 
     def reset(self) -> None:
@@ -88,10 +96,16 @@ class ReducedServing:
         self._model.free(u)[:] = self.reduced.basis @ self._tracker.state.q
         return u
 
-    def step(self, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> Shape | None:
+    def tip_compliance(self) -> np.ndarray:
+        """As `ReducedTracker.tip_compliance`."""
+        return self._tracker.tip_compliance()
+
+    def step(
+        self, gravity: np.ndarray, cables: CableInput, h: float | None = None, loads: PointLoads | None = None
+    ) -> Shape | None:
         """Return the shape under gravity (3,) and the cables' input, tracked from the last one; None: use the full model.
 
-        h: s in which the body has crept since the last shape; None: it has relaxed.
+        h: s in which the body has crept since the last shape; None: it has relaxed. loads: act in addition.
         """
         if not self.trusted:
             return None
@@ -99,7 +113,7 @@ class ReducedServing:
         if h is not None and not self._uniform:
             self._leave(_DIFFERENT_CREEP, wait=_RETURN_AFTER)
             return None
-        state = self._tracker.track(gravity, cables, iterations=10, creep=None if h is None else self._memory.stress(h))
+        state = self._tracked(gravity, cables, h, loads)
         if not state.converged:
             self._leave("the reduced model did not converge", wait=0)
             return None
@@ -111,22 +125,36 @@ class ReducedServing:
         far = moved @ moved > (_CHECK_MOVED * self.reduced.reach) ** 2 and self._since_check >= _CHECK_AT_LEAST
         if far or self._since_check >= _CHECK_EVERY:
             self._since_check, self._checked_at = 0, state.q
-            self._error = self._measured_error(gravity, cables, h)
+            self._error = self._measured_error(gravity, cables, h, loads)
             if not self._error < self._tolerance:
                 self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
                 return None
         self._remember(state.q, self._tracker.strain, h)
         return self._shape(state, gravity, started)
 
-    def take_over(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> None:
+    def take_over(
+        self,
+        state: Equilibrium,
+        gravity: np.ndarray,
+        cables: CableInput,
+        h: float | None = None,
+        loads: PointLoads | None = None,
+    ) -> None:
         """After a step of the full model, of h s: use the reduced model again if both agree. Compared every few steps only."""
         self._until_return -= 1
         if self._until_return <= 0:
-            self.follow(state, gravity, cables, h)
+            self.follow(state, gravity, cables, h, loads)
         elif self._creep is not None and state.converged:
             self._remember(*self._projected(state), h)
 
-    def follow(self, state: Equilibrium, gravity: np.ndarray, cables: CableInput, h: float | None = None) -> None:
+    def follow(
+        self,
+        state: Equilibrium,
+        gravity: np.ndarray,
+        cables: CableInput,
+        h: float | None = None,
+        loads: PointLoads | None = None,
+    ) -> None:
         """Go to a shape of the full model, in h s; use the reduced model from there if both agree on it."""
         self.reason = self.reason or _UNTRAINED
         self._until_return = _RETURN_AFTER
@@ -134,7 +162,7 @@ class ReducedServing:
             return
         q, strain = self._projected(state)
         self._tracker.place(q, state.tension, self._full.sliding)
-        own = self._tracker.track(gravity, cables, iterations=10, creep=None if h is None else self._memory.stress(h))
+        own = self._tracked(gravity, cables, h, loads)
         self._remember(q, strain, h)
         if h is not None and not self._uniform:
             self.reason = _DIFFERENT_CREEP
@@ -142,6 +170,13 @@ class ReducedServing:
         error = float(np.linalg.norm(self.reduced.tip(own.q) - self._tip(state.u)))
         if own.converged and self.reduced.outside(own.q) <= 1.0 and error < 0.5 * self._tolerance:
             self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
+
+    def _tracked(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> ReducedState:
+        """Track the reduced model; the forces of loads that turn with their sections are those of the last shape."""
+        creep = None if h is None else self._memory.stress(h)
+        loads = with_payload(self._model, gravity, loads)
+        force = None if loads is None else self._loads.at(loads, self._tracker.state.q)
+        return self._tracker.track(gravity, cables, iterations=10, creep=creep, force=force)
 
     def _projected(self, state: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
         """Return the coordinates (r,) of a shape of the full model and their strain (m,)."""
@@ -173,13 +208,13 @@ class ReducedServing:
             tendons=self._model.tendons.state(self._model.mesh.nodes + u, sliding.direction),
         )
 
-    def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None) -> float:
+    def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> float:
         """Return the tip error of the reduced model in m, after a step of h s."""
         self._hand_over()
         self._full.viscous = None if h is None or self._creep is None else self._creep.step(h)
         before = self._tip(self._full.state.u)
         self._beyond_range = beyond_range(self._model, self._full.state.u)
-        return float(np.linalg.norm(self._tip(self._full.track(gravity, cables, iterations=1).u) - before))
+        return float(np.linalg.norm(self._tip(self._full.track(gravity, cables, iterations=1, loads=loads).u) - before))
 
     def _tip(self, u: np.ndarray) -> np.ndarray:
         return self._model.effectors.sections(self._model.mesh.nodes + u)[-1, 0]
@@ -207,4 +242,5 @@ class ReducedServing:
             model="reduced",
             status=ShapeStatus.OK,
             message=self._beyond_range,
+            contacts=Contacts.none() if self._tracker.contact is None else self._tracker.contact.contacts(state.q),
         )

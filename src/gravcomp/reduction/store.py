@@ -86,7 +86,8 @@ def path_of(model: RobotModel) -> Path:
         mesh.region,
         materials,
         cables,
-        robot.payload,
+        *_payload(robot),
+        *(["max_wrench", dataclasses.asdict(robot.max_wrench)] if robot.max_wrench else []),
         *_loads(robot),
         *_disks(robot),
         *(["mean volume"] if model.elements.averaged.any() else []),
@@ -105,6 +106,12 @@ def _path_of_cable(cable: Cable) -> dict:
 def _loads(robot: Robot) -> list:
     """Return the weights hung from the body; empty without any, so that such robots keep their keys."""
     return [[dataclasses.asdict(load) for load in robot.loads]] if robot.loads else []
+
+
+def _payload(robot: Robot) -> list:
+    """Return the payload; its centre only where it is not at the tip, so that such robots keep their keys."""
+    mass, centre = {"mass": robot.payload.mass}, robot.payload.centre
+    return [mass, centre] if any(centre) else [mass]
 
 
 def _disks(robot: Robot) -> list:

@@ -16,8 +16,10 @@ from numba import njit
 from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.contact import ReducedContact, tracked_touching
 from gravcomp.reduction.law_deviation import KeptStiffness
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -60,12 +62,17 @@ class ReducedTracker:
         self._no_offset = np.zeros(model.elasticity.linear.shape[1])
         self.place(np.zeros(model.size), np.zeros(len(model.cables.rest_length)))
 
+    contact: ReducedContact | None = None
+    """With the obstacles of a scene; None: nothing is in the way."""
+
     def place(self, q: np.ndarray, tension: np.ndarray, sliding: Sliding | None = None) -> None:
         """Start from the coordinates q (r,) under the tensions (m,). sliding: of the cables, default none."""
         m = len(tension)
         self.sliding = sliding or Sliding.none(m)
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
         self._point = point_at(self._body, q, self.sliding.direction)
+        if self.contact is not None:
+            self.contact.forget()
 
     @property
     def strain(self) -> np.ndarray:
@@ -73,11 +80,16 @@ class ReducedTracker:
         return self._point.strain
 
     def track(
-        self, gravity: np.ndarray, cables: CableInput, iterations: int = 4, creep: tuple[float, np.ndarray] | None = None
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        iterations: int = 4,
+        creep: tuple[float, np.ndarray] | None = None,
+        force: np.ndarray | None = None,
     ) -> ReducedState:
         """Return the state under gravity (3,) and the cables' input, tracked from the present one; see its `converged`.
 
-        creep: of `Memory.stress`; None: the branches have relaxed.
+        creep: of `Memory.stress`; None: the branches have relaxed. force (r,): acts in addition to the weight.
         """
         stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
@@ -85,6 +97,10 @@ class ReducedTracker:
             self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
         wound, given = cables.arrays(state.tension.size)
         weight = self.model.weight @ gravity
+        if force is not None:
+            weight = weight + force
+        if self.contact is not None:
+            return self._touching(gravity, weight, wound, given, 1.0 + stiffer, offset, iterations)
         converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
             self._point,
@@ -102,6 +118,40 @@ class ReducedTracker:
         )
         if not converged:
             return replace(state, residual=np.inf, converged=False)
+        self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
+        return self.state
+
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present state.
+
+        Raises NotPositiveDefinite where the state is not stable.
+        """
+        body, point, state = self._body, self._point, self.state
+        matrix = elastic_stiffness(body, point, state.q, point.strain, 1.0, self._kept)
+        add_stiffness(body.cables, point.tendons, state.tension, matrix)
+        definite, factor = factorise(matrix)
+        if not definite:
+            raise NotPositiveDefinite("the reduced stiffness is not positive definite")
+        columns = body.tip.T.copy()
+        solve(factor, columns)
+        compliance: np.ndarray = body.tip @ columns
+        return compliance
+
+    def _touching(
+        self, gravity: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray, scale: float, offset: np.ndarray,
+        iterations: int,
+    ) -> ReducedState:  # fmt: skip
+        """Return the state as `track` does, with contact."""
+        assert self.contact is not None
+        state, (longest, _, tolerance) = self.state, self._limits
+        touching = self.contact.touching(state.q, gravity)
+        converged, self._point, q, tension, displacement, compliance, answer, residual, places, forces = tracked_touching(
+            self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
+            self._kept, iterations, min(longest, touching.surface.radius.min()), tolerance, touching,
+        )  # fmt: skip
+        if not converged:
+            return replace(state, residual=np.inf, converged=False)
+        self.contact.keep(touching, places, forces)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 

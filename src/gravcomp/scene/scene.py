@@ -21,7 +21,8 @@ class Scene:
     """Obstacles around a robot.
 
     Attributes: names and walls of the obstacles; arrays: `SceneArrays` in soft_base, for compiled functions (`distance.nearest`,
-    `distance.gap_to`); notes: sentences on what was repaired in files.
+    `distance.gap_to`); in_world (k,): whether a row of them is in the world; source: the file in errors; notes: sentences on
+    what was repaired in files.
     """
 
     def __init__(self, section: SceneSection, source: str = "scene"):
@@ -32,7 +33,7 @@ class Scene:
         self.walls: tuple[Wall, ...] = section.walls
         self.names = tuple(_name(section, wall) for wall in self.walls)
         self.notes: list[str] = []
-        self._source = source
+        self.source = source
         self._rows: list[_Row] = []
         self._pieces: list[np.ndarray] = []
         self._surface = SurfaceArrays.none()
@@ -79,7 +80,7 @@ class Scene:
             for unit in (1.0, 1e-3):
                 if not _SIZES[0] < share < _SIZES[1] and _SIZES[0] < share * unit / wall.file_unit < _SIZES[1]:
                     raise ConfigError(
-                        f"{self._source}: scene.meshes ('{name}').file_unit_mm is {1e3 * wall.file_unit:g}: the surface is"
+                        f"{self.source}: scene.meshes ('{name}').file_unit_mm is {1e3 * wall.file_unit:g}: the surface is"
                         f" {1e3 * size:.3g} mm large beside a robot of {1e3 * length:g} mm; with file_unit_mm: {1e3 * unit:g}"
                         f" it is {1e3 * size * unit / wall.file_unit:.4g} mm large"
                     )
@@ -99,7 +100,7 @@ class Scene:
             ]
         assert isinstance(wall, MeshWall)
         root = len(self._surface.child)
-        nodes, faces, notes = _read_surface(wall, self._source, f"scene.meshes ('{self.names[number]}')")
+        nodes, faces, notes = _read_surface(wall, self.source, f"scene.meshes ('{self.names[number]}')")
         self.notes += [f"{self.names[number]}: {note}" for note in notes]
         self._surface_sizes[self.names[number]] = float(np.ptp(nodes, axis=0).max())
         self._surface = self._surface.joined(surface_arrays(nodes, faces))

@@ -11,15 +11,18 @@ from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.dynamics import DynamicSolver
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
-from gravcomp.full_model.motion import Motion
+from gravcomp.full_model.motion import ExternalForce, Motion
 from gravcomp.full_model.observation import observe
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
+from gravcomp.full_model.wrench import PointLoads, Wrench
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation.simulator import Simulator
 
 if TYPE_CHECKING:
     from gravcomp.reduction.motion import ReducedDynamicSolver, ReducedMotion
+    from gravcomp.reduction.reduced_loads import ReducedLoads
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.reduction.serving import ReducedServing
 
@@ -64,6 +67,7 @@ class DynamicSimulator:
         self.solver = DynamicSolver(self.model, self.options)
         self._reduced, self._momentum = self._reduced_solver(self.statics.reduced_model)
         self._in_reduced, self._wait = False, 0
+        self._loads: tuple[ReducedDynamicSolver, ReducedLoads] | None = None  # projected on this solver's basis
         # Of the reduced model, while the full one computes the motion; None: not known.
         self._memory = self._reduced.state.memory if self._reduced else None
 
@@ -88,6 +92,10 @@ class DynamicSimulator:
         """The reduced model's solver while it computes the motion; None while the full model does."""
         return self._reduced if self._in_reduced else None
 
+    def tip_compliance(self) -> np.ndarray:
+        """As `Simulator.tip_compliance`, of the equilibrium toward which the robot moves."""
+        return self.statics.tip_compliance()
+
     def reset(self) -> None:
         """Return to the straight robot at rest, without gravity."""
         self.statics.reset()
@@ -110,17 +118,18 @@ class DynamicSimulator:
         displacement: np.ndarray | None = None,
         tension: np.ndarray | None = None,
         duration: float | None = None,
+        wrench: Wrench | tuple[Wrench, ...] | None = None,
     ) -> Shape:
         """Move on by `duration` s (default: one time step), in equal steps that are not longer than the options' time step.
 
         The other arguments are those of `Simulator.step`.
         """
         started = time.perf_counter()
-        equilibrium = self.statics.step(gravity, displacement, tension)
+        equilibrium = self.statics.step(gravity, displacement, tension, wrench=wrench)
         gravity, cables = self.statics.checked(gravity, displacement, tension)
         duration = self.options.time_step if duration is None else duration
         count = max(1, math.ceil(duration / self.options.time_step - 1e-6))
-        motion = self._move(gravity, cables, duration / count, count)
+        motion = self._move(gravity, cables, duration / count, count, PointLoads.of(self.model, wrench))
         model = self.model
         reduced = self._active_reduced
         if reduced is not None:
@@ -146,13 +155,17 @@ class DynamicSimulator:
             message=equilibrium.message if ok else "a time step did not converge; the last shape is kept",
         )
 
-    def _move(self, gravity: np.ndarray, cables: CableInput, h: float, count: int) -> "Motion | ReducedMotion":
+    def _move(
+        self, gravity: np.ndarray, cables: CableInput, h: float, count: int, loads: PointLoads | None
+    ) -> "Motion | ReducedMotion":
         """Return the motion after `count` steps of h seconds, computed with the reduced model if possible."""
         self._wait -= 1
         reduced = self._usable_reduced()
         if reduced is not None:
             before = reduced.state
-            motion = _advanced(reduced, gravity, cables, h, count)
+            motion = _advanced(
+                reduced, gravity, cables, h, count, external=self._external(with_payload(self.model, gravity, loads), reduced)
+            )
             if motion.converged and reduced.model.outside(reduced.state.q) <= 1.0:
                 return motion
             reduced.state, self._wait = before, _RETURN_AFTER
@@ -167,10 +180,21 @@ class DynamicSimulator:
                 held = left.state.memory.at_points(self.model.elements, left.model.basis)[1]
             self.solver.take_over(q, velocity, acceleration, left.state.tension, held)
             self._in_reduced, self._memory = False, left.state.memory
-        motion = _advanced(self.solver, gravity, cables, h, count)
+        motion = _advanced(self.solver, gravity, cables, h, count, external=None if loads is None else loads.at)
         if self._memory is not None and self._reduced is not None and self._memory.ratio.size:
             self._memory = self._memory.after(*self._reduced.model.projected(self.model.free(self.solver.state.u)), count * h)
         return motion
+
+    def _external(self, loads: PointLoads | None, reduced: "ReducedDynamicSolver") -> ExternalForce | None:
+        """Return the force of the loads on the reduced coordinates."""
+        if loads is None:
+            return None
+        from gravcomp.reduction.reduced_loads import ReducedLoads
+
+        if self._loads is None or self._loads[0] is not reduced:
+            self._loads = reduced, ReducedLoads(self.model, reduced.model.basis)
+        projected = self._loads[1]
+        return lambda q: projected.at(loads, q)
 
     def _usable_reduced(self) -> "ReducedDynamicSolver | None":
         """Return the reduced model's solver if it may be used; if the full model was used before, at the full model's state."""
@@ -225,12 +249,13 @@ def _advanced(
     h: float,
     count: int = 1,
     halvings: int = _HALVINGS,
+    external: ExternalForce | None = None,
 ) -> "Motion | ReducedMotion":
     """Take `count` steps of h seconds, halved if Newton's method does not converge; return the last motion."""
     for _ in range(count):
-        motion = solver.step(gravity, cables, h)
+        motion = solver.step(gravity, cables, h, external)
         if not motion.converged and halvings > 0:
-            motion = _advanced(solver, gravity, cables, h / 2.0, 2, halvings - 1)
+            motion = _advanced(solver, gravity, cables, h / 2.0, 2, halvings - 1, external)
         if not motion.converged:
             break
     return motion

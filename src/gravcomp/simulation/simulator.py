@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gravcomp.contact.contacts import Contacts
+from gravcomp.contact.start import refuse_start
 from gravcomp.description import Robot
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.contact import FullContact
@@ -18,7 +19,7 @@ from gravcomp.full_model.linear_response import observed
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
-from gravcomp.full_model.wrench import Wrench
+from gravcomp.full_model.wrench import PointLoads, Wrench
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -45,17 +46,19 @@ class Simulator:
     def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None):
         """reduced: use the reduced model if one is built; scene: what the robot touches.
 
-        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact.
+        Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact, ConfigError for a
+        scene in which the robot cannot be.
         """
         self.model = robot if isinstance(robot, RobotModel) else RobotModel(robot)
         self.robot = self.model.robot
         self.solver = StaticSolver(self.model)
         self.scene = scene
         if scene:
+            refuse_start(scene, self.robot)
             self.solver.contact = FullContact(self.model, scene)
         self._creep = Creep(self.model)
         self._pace = SearchPace(self.model.length)
-        self._serving = self.load_reduced() if reduced and not scene else None
+        self._serving = self.load_reduced() if reduced else None
 
     def load_reduced(self) -> "ReducedServing | None":
         """Return the reduced model of this robot, ready to use; None if none is stored. May run in its own thread."""
@@ -100,6 +103,7 @@ class Simulator:
         displacement: np.ndarray | None = None,
         tension: np.ndarray | None = None,
         duration: float | None = None,
+        wrench: Wrench | tuple[Wrench, ...] | None = None,
     ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
@@ -109,30 +113,31 @@ class Simulator:
 
         gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
         cables are released. duration: s since the last step, in which a body with creep has crept (`full_model.creep`); None:
-        the body has relaxed, as after a long time. Raises ValueError for wrong lengths, numbers that are not finite, negative
-        tensions, and a duration that is not positive.
+        the body has relaxed, as after a long time. wrench: external forces and moments on cross-sections. Raises ValueError for
+        wrong lengths, numbers that are not finite, negative tensions, and a duration that is not positive.
         """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
         if duration is not None and not 0.0 < duration < math.inf:
             raise ValueError(f"duration is {duration} s; a positive number is needed")
         h = duration if self._creep.exists else None
-        shape = self._serving.step(gravity, cables, h) if self._serving else None
+        loads = PointLoads.of(self.model, wrench)
+        shape = self._serving.step(gravity, cables, h, loads) if self._serving else None
         if shape is not None:
             self._pace.found(gravity, cables)
             return shape
         before = self.solver.state
         self.solver.viscous = None if h is None else self._creep.step(h)
-        state = self.solver.track(gravity, cables)
+        state = self.solver.track(gravity, cables, loads=loads)
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
-            state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True)
+            state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True, loads=loads)
         if not state.converged and self._pace.may_search(gravity, cables):
             last, self.solver.state = self._pace.last_gravity, before
-            if last is not None:
+            if last is not None and loads is None:
                 state = self.solver.approach(last, gravity, cables)
             if not state.converged:
-                state = self.solver.solve(gravity, cables)
+                state = self.solver.solve(gravity, cables, wrench=wrench)
         elif not state.converged:
             state = dataclasses.replace(before, residual=state.residual, converged=False, load_fraction=1.0)
         if state.converged:
@@ -144,10 +149,17 @@ class Simulator:
         if not self._serving:
             return shape
         reason = self._serving.reason
-        self._serving.take_over(state, gravity, cables, h)
+        self._serving.take_over(state, gravity, cables, h, loads)
         if shape.status != ShapeStatus.OK:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
+
+    def tip_compliance(self) -> np.ndarray:
+        """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present shape.
+
+        Raises NotPositiveDefinite where the shape is not stable.
+        """
+        return self._serving.tip_compliance() if self._serving and self._serving.trusted else self.solver.tip_compliance()
 
     def solve(
         self,
@@ -158,7 +170,7 @@ class Simulator:
     ) -> Shape:
         """Return the equilibrium found from the straight robot, independent of all earlier shapes.
 
-        wrench: forces and moments on cross-sections, constant in soft_base; the other arguments as in `step`.
+        The arguments are those of `step`.
         """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
@@ -170,7 +182,7 @@ class Simulator:
         if state.converged:
             self._pace.found(gravity, cables)
         if self._serving:
-            self._serving.follow(state, gravity, cables)
+            self._serving.follow(state, gravity, cables, loads=PointLoads.of(self.model, wrench))
         return self._shape(state, gravity, started)
 
     def checked(

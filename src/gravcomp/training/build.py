@@ -12,18 +12,21 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.cache import content_key
 from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.full_model.wrench import PointLoads
 from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError
 from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cubature import Cubature, choose
+from gravcomp.reduction.reduced_loads import ReducedLoads
 from gravcomp.reduction.reduced_model import section_changes
 from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
-from gravcomp.training.samples import Sample, TrainingOptions, samples
+from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
@@ -33,12 +36,14 @@ _MARGIN = 1.3
 class BuildOptions:
     """Size of a reduction and of its training.
 
-    modes: r; strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to
+    modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
+    to those of the modes; decomposed: largest number of snapshots to
     decompose; integrated: number of shapes to choose the cubature of the law's deviation with, and cubature its tolerance;
     training and test: motions to train and to test with.
     """
 
     modes: int = 44
+    loaded_modes: int = 12
     strains: int = 36
     decomposed: int = 1100
     integrated: int = 150
@@ -62,16 +67,17 @@ def build(
         raise MeshError(reason)
     kept = path_of(model).with_suffix(".training") / content_key(options.training)
     trained = samples(model, options.training, lambda share: progress("training", share), kept)
-    if len(trained) < options.modes:
+    modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
+    if len(trained) < modes:
         raise MeshError(
-            f"only {len(trained)} equilibria were found for the training, at least {options.modes} are needed;"
+            f"only {len(trained)} equilibria were found for the training, at least {modes} are needed;"
             " the robot may be too soft for its weight"
         )
     progress("decomposing", 0.0)
     shapes = evenly(np.array([sample.unknowns for sample in trained]), options.decomposed)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
-    basis = energy_basis(shapes, matrix.multiply, options.modes)
+    basis = energy_basis(shapes, matrix.multiply, modes)
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
     low, high = options.training.modulus_range
@@ -129,6 +135,7 @@ def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) ->
     """
     reduced = reduction.reduced_model(model)
     tracker = ReducedTracker(reduced, model.length)
+    projected = ReducedLoads(model, reduced.basis)
     u = np.zeros_like(model.mesh.nodes)
     errors = []
     for sample in unseen:
@@ -137,7 +144,10 @@ def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) ->
             sample.tension,
             Sliding(sample.pulling, np.full_like(sample.pulling, np.nan)),
         )
-        state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10)
+        q = tracker.state.q
+        loads = with_payload(model, sample.gravity, PointLoads.of(model, wrench_of(sample.load)))
+        force = None if loads is None else projected.at(loads, q)
+        state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10, force=force)
         if state.converged:
             model.free(u)[:] = sample.unknowns
             tip = model.effectors.sections(model.mesh.nodes + u)[-1, 0]

@@ -3,7 +3,9 @@
 Young's moduli that are all `s` times as large are equivalent to gravity and tensions that are `s` times smaller, so the range
 of moduli is covered by the magnitude of gravity. Each path turns gravity in random directions. On most paths the inverse
 controller keeps the robot straight or bent in a random plane, with and without a weight on the tip's direction, so that the
-tensions are those of the closed loop, including its transients. On the other paths the cables are released.
+tensions are those of the closed loop, including its transients. On the other paths the cables are released. A robot that carries
+external loads has one on most paths: a force and a moment in a random direction on a random section, mostly the tip's, that grow
+and fall along the path up to its `max_wrench`.
 """
 
 import json
@@ -17,6 +19,7 @@ import numpy as np
 
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import ShapeStatus
+from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import InverseController, bend_target, direction_weight
 from gravcomp.simulation.simulator import Simulator
 
@@ -27,6 +30,8 @@ _INTERVAL = 0.05
 _STEPS_A_TURN = 15
 # Fraction of paths with released cables, and of those that keep the robot straight.
 _RELEASED, _STRAIGHT = 0.15, 0.3
+# Fraction of paths with an external load, where the robot carries any; and of these, with the load at the tip.
+_LOADED, _AT_TIP = 0.7, 0.6
 
 
 @dataclass(frozen=True)
@@ -40,20 +45,22 @@ class TrainingOptions:
     seed: int = 1
 
 
-_ARRAYS = ("unknowns", "gravity", "tension", "pulling")
+_ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
 
 
 @dataclass(frozen=True)
 class Sample:
     """An equilibrium of the full model.
 
-    unknowns (3 n_free,) in m; gravity (3,) in m/s^2; tension (m,) in N; pulling (m,): sliding direction of each cable.
+    unknowns (3 n_free,) in m; gravity (3,) in m/s^2; tension (m,) in N; pulling (m,): sliding direction of each cable;
+    load (7,): external force in N and moment in N m in soft_base, and their station.
     """
 
     unknowns: np.ndarray
     gravity: np.ndarray
     tension: np.ndarray
     pulling: np.ndarray
+    load: np.ndarray
 
 
 def samples(
@@ -112,11 +119,13 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
         target = bend_target(model.length, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
     gravity, displacement = size * _direction(rng), None
+    largest = _largest_load(model, rng)
     for step in range(options.steps):
-        shape = simulator.step(gravity, displacement)
+        load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / options.steps)), 1.0)
+        shape = simulator.step(gravity, displacement, wrench=wrench_of(load))
         if shape.status == ShapeStatus.OK:
             unknowns = model.free(simulator.displacements).copy()
-            yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction)
+            yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction, load)
         if step % _STEPS_A_TURN == 0:
             axis = _direction(rng)
         gravity = _rotated(gravity, axis, _TURN)
@@ -128,6 +137,20 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
                 tension=shape.cable_tension,
                 interval=_INTERVAL,
             ).displacement
+
+
+def wrench_of(load: np.ndarray) -> Wrench | None:
+    """Return a sample's external load (7,); None for none."""
+    return Wrench(load[:3], load[3:6], float(load[6])) if load[:6].any() else None
+
+
+def _largest_load(model: RobotModel, rng: np.random.Generator) -> np.ndarray:
+    """Return the largest external load (7,) of a path. A robot without external loads needs no random numbers for it."""
+    largest = model.robot.max_wrench
+    if largest is None or rng.random() >= _LOADED:
+        return np.append(np.zeros(6), 1.0)
+    force, moment = rng.uniform(0.0, largest.force) * _direction(rng), rng.uniform(0.0, largest.moment) * _direction(rng)
+    return np.concatenate([force, moment, [1.0 if rng.random() < _AT_TIP else rng.uniform(0.3, 1.0)]])
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:

@@ -1,34 +1,43 @@
 """A calibration run on the virtual robot: the measurement that a user makes on the real robot with a camera.
 
-The base is at rest in several poses. In each pose the cables are released first; then the uncalibrated controller straightens
-and bends the robot, so that every cable is taut in some pose. Recorded are the estimated gravity, the commanded displacements,
-and the true tip with a tracker's noise (`tracker.Tracker`).
+The base turns from pose to pose of a plan (`calibration.plan`), and the bridge pulls the cables by the planned displacements;
+model and controller take no part. Recorded are the estimated gravity, the commanded displacements, and the true tip with a
+tracker's noise (`tracker.Tracker`). The robot is weighed on a balance.
 """
 
 import dataclasses
 from dataclasses import dataclass
 
+import can
 import numpy as np
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
-from gravcomp.calibration.fit import StaticFit, fit_statics
+from gravcomp.calibration.data import WINDOWS
+from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
+from gravcomp.calibration.plan import Plan, PlanOptions, creep_times, make_plan
 from gravcomp.calibration.standstill import Standstill
-from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuStream
 from gravcomp.closed_loop.setup import Setup
-from gravcomp.closed_loop.trace import Trace
-from gravcomp.config import parameter
+from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
-from gravcomp.inverse import bend_target, straight_target
+from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.inverse.limits import within_limits
 from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.motors.bridge import Bridge
+from gravcomp.motors.state import DRIVING
+from gravcomp.orientation import GravityEstimator, Problem
+from gravcomp.orientation import quaternion as quat
 from gravcomp.trials.context import Context
 from gravcomp.trials.tracker import Tracker
-from gravcomp.virtual.motion import StaticMotion, base_orientation
+from gravcomp.virtual.motion import WaypointMotion, base_orientation
+from gravcomp.virtual.robot import VirtualRobot
 
-_DECIMATION = 5  # 20 Hz, the rate of a slow camera
-
-CALIBRATION_POSES = ((0.0, 0.0), (0.0, 60.0), (0.0, 120.0), (0.0, 180.0), (0.0, 240.0), (0.0, 300.0))
-"""Inclination and roll in degrees; the rolls make each cable support the robot in turn."""
+_BUS_STEP, _SAMPLE_PERIOD = 0.002, 0.010  # s
+_CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
+_DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
+_LONGEST_START = 5.0  # s
+_BRIEF = 0.35  # of the budget
 
 
 @dataclass(frozen=True)
@@ -44,89 +53,57 @@ class Calibration:
     setup: Setup
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """Times of a calibration run: multiples of the robot's first period, within a budget of robot time."""
-
-    budget: float = parameter(180.0, unit="s", minimum=10.0, maximum=3600.0, description="robot time of all poses together")
-    periods: float = parameter(
-        14.0, minimum=2.0, maximum=200.0, description="first periods that a released robot is given to come to rest"
-    )
-    held: float = parameter(0.6, minimum=0.1, maximum=5.0, description="time of each held state over that of the released one")
-    least: float = parameter(
-        0.3, minimum=0.0, maximum=1.0, description="least part of the budget that is used, because materials creep at any size"
-    )
-
-    def released(self, period: float, poses: int) -> float:
-        """Return the time in s for which the robot is released in each pose; period: its first, in s."""
-        share = self.budget / poses / (1.0 + 2.0 * self.held)
-        return float(np.clip(self.periods * period, self.least * share, share))
+def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
+    """Return the plan for the context's robot; a brief context has a shorter one. Raises ConfigError, MeshError."""
+    options, setup = options or PlanOptions(), context.setup
+    if context.brief:
+        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(3, int(_BRIEF * options.fewest)))
+    return make_plan(setup.robot, first_period(setup.robot), setup.hardware.transmission, options, progress=context.progress)
 
 
-def measure(context: Context, schedule: Schedule | None = None) -> Measured:
-    """Return the measurements of the calibration run in all poses. Raises MeshError."""
-    schedule = schedule or Schedule()
-    poses = CALIBRATION_POSES[:: 3 if context.brief else 1]
-    duration = schedule.released(first_period(context.setup.robot), len(CALIBRATION_POSES)) / (1.6 if context.brief else 1.0)
-    jobs = [(context.setup, pose, trial, duration, schedule.held) for trial, pose in enumerate(poses)]
-    total = len(poses) * duration * (1.0 + 2.0 * schedule.held)
-    return joined(context.map(calibration_trial, jobs, f"measuring the virtual robot for calibration, {total:.0f} s of its time"))
+def measure(context: Context, plan: Plan) -> Measured:
+    """Return the measurements in all poses of the plan. Raises RuntimeError where the bridge does not start."""
+    stage = f"measuring the virtual robot for calibration, {plan.duration:.0f} s of its time"
+    return context.map(run_plan, [(context.setup, plan)], stage)[0]
+
+
+def weighed(setup: Setup, noise: TipNoise | None = None) -> float:
+    """Return the mass in kg of the virtual robot's body and payload, as a balance shows it."""
+    noise = noise or TipNoise()
+    true = RobotModel(with_coarse_elements(_with_true_densities(setup))).mass
+    return true * float(1.0 + noise.balance * np.random.default_rng([setup.seed, 1]).standard_normal())
 
 
 def calibrate_on_virtual_robot(context: Context) -> Calibration:
-    """Measure, and fit the controller's model to the measurements."""
-    setup, measured = context.setup, measure(context)
+    """Plan, measure, and fit the controller's model to the measurements."""
+    setup, plan = context.setup, plan_of(context)
+    measured = measure(context, plan)
     still = Standstill.of(setup.robot, first_period(setup.robot))
     fit = fit_statics(
-        setup.robot, still_windows(measured, still), progress=lambda stage: context.progress(f"calibrating: {stage}")
+        setup.robot,
+        still_windows(measured, still, WINDOWS),
+        mass=weighed(setup),
+        creep_times=creep_times(plan.rest),
+        progress=lambda stage: context.progress(f"calibrating: {stage}"),
     )
     calibrated = setup.with_model(
-        calibrated_robot(setup.robot, fit.parameters), calibrated_hardware(setup.hardware, fit.parameters)
+        calibrated_robot(setup.robot, fit.parameters, creep_times=fit.creep_times),
+        calibrated_hardware(setup.hardware, fit.parameters),
     )
     return Calibration(measured, fit, calibrated)
 
 
-def calibration_trial(job: tuple[Setup, tuple[float, float], int, float, float]) -> Measured:
-    """Run one pose.
-
-    job: (setup, (inclination, roll) in deg, number of the trial, time in s released, time of each held state over that).
-    """
-    setup, (inclination, roll), trial, duration, held = job
-    # The controller only has to bring the robot into different states: a coarse mesh does, and needs no reduced model.
-    setup = setup.with_model(with_coarse_elements(setup.robot))
-    # Without pretension: with all cables taut, a common offset cannot be distinguished from a change of modulus and elasticity.
-    inverse = dataclasses.replace(setup.controller.inverse, pretension=0.0)
-    setup = dataclasses.replace(setup, controller=dataclasses.replace(setup.controller, inverse=inverse))
-    loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(inclination), np.radians(roll))))
-    loop.release()
-    loop.run(duration)
-    loop.hold(straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight))
-    loop.run(held * duration)
-    loop.hold(
-        bend_target(
-            setup.robot.length,
-            np.radians(30.0),
-            np.radians(60.0 * trial),
-            tip_direction_weight=setup.direction_weight,
-        )
-    )
-    loop.run(held * duration)
-    return as_measured(loop.trace, trial, setup.nominal.length, np.random.default_rng([setup.seed, trial]))
-
-
-def as_measured(trace: Trace, trial: int, length: float, random: np.random.Generator) -> Measured:
-    """Return what a tracker and the topics of the graph would record of the run of a robot of `length` m."""
-    rows = slice(0, len(trace.time), _DECIMATION)
-    tip, direction = Tracker().seen(length, trace.tip_position[rows], trace.tip_direction[rows], random)
-    return Measured(
-        source="virtual robot",
-        trial=np.full(len(tip), trial),
-        time=trace.time[rows],
-        gravity=trace.estimated_gravity[rows],
-        displacement=trace.command[rows],
-        tip_position=tip,
-        tip_direction=direction,
-    )
+def run_plan(job: tuple[Setup, Plan]) -> Measured:
+    """Run the plan on the virtual robot. A function of the module, so that it can be sent to another process."""
+    setup, plan = job
+    rig = _Rig(setup, WaypointMotion(*_stops(plan)))
+    rig.start()
+    for pose, end in zip(plan.poses, _ends(plan)):
+        rig.pull(pose.displacement, pose.tension, end)
+    rows = slice(0, len(rig.rows), _DECIMATION)
+    time, gravity, displacement, tip, direction = (np.array(column)[rows] for column in zip(*rig.rows))
+    tip, direction = Tracker().seen(setup.nominal.length, tip, direction, np.random.default_rng([setup.seed, 0]))
+    return Measured("virtual robot", np.zeros(len(time), int), time, gravity, displacement, tip, direction)
 
 
 def joined(trials: list[Measured]) -> Measured:
@@ -136,3 +113,99 @@ def joined(trials: list[Measured]) -> Measured:
         for name in ("trial", "time", "gravity", "displacement", "tip_position", "tip_direction")
     }
     return Measured(source=trials[0].source, **columns)
+
+
+def _stops(plan: Plan) -> tuple[list[tuple[np.ndarray, float]], float]:
+    """Return orientation and time in s at each station of the plan, and the rate of the turns between them."""
+    stops: list[tuple[np.ndarray, float]] = []
+    for pose, held in zip(plan.poses, plan.times):
+        orientation = base_orientation(pose.inclination, pose.roll)
+        if stops and np.array_equal(stops[-1][0], orientation):
+            stops[-1] = orientation, stops[-1][1] + held
+        else:
+            stops.append((orientation, held))
+    return stops, plan.rate
+
+
+def _ends(plan: Plan) -> list[float]:
+    """Return the times in s at which the poses end."""
+    rests = WaypointMotion(*_stops(plan)).rests
+    ends: list[float] = []
+    station = -1
+    for k, (pose, held) in enumerate(zip(plan.poses, plan.times)):
+        turned = k == 0 or pose.station != plan.poses[k - 1].station
+        station += turned
+        ends.append((rests[station][0] if turned else ends[-1]) + held)
+    return ends
+
+
+class _Rig:
+    """The virtual robot, the bridge and the estimator, without model and controller. rows: one for each sample of the IMU."""
+
+    def __init__(self, setup: Setup, motion: WaypointMotion):
+        self._virtual = VirtualRobot(setup.truth, setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion)
+        self._bridge = Bridge(setup.hardware, require_imu=False)
+        self._stream, self._limits = ImuStream(), setup.robot.limits
+        self._estimator = GravityEstimator(setup.estimator.estimator, quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy))
+        self._transmission = setup.hardware.transmission
+        self._sent = np.zeros(len(setup.robot.cables))
+        self._outgoing: list[can.Message] = []
+        self._steps, self._gravity = 0, np.zeros(3)
+        self.rows: list[tuple] = []
+
+    def start(self) -> None:
+        """Advance until the bridge drives. Raises RuntimeError where it does not."""
+        self._bridge.configure()
+        self._bridge.activate(0.0)
+        while self._bridge.state not in DRIVING or not self._gravity.any():
+            self._step(None, None)
+            if self._virtual.time > _LONGEST_START:
+                raise RuntimeError(f"the virtual robot's bridge does not start: {self._bridge.message}")
+
+    def pull(self, displacement: np.ndarray, tension: np.ndarray, end: float) -> None:
+        """Move the cables to `displacement` (m,) m within their limits and keep them there until `end` s; record."""
+        while self._virtual.time < end - 1e-9:
+            self._step(displacement, tension)
+
+    def _step(self, displacement: np.ndarray | None, tension: np.ndarray | None) -> None:
+        frames, self._outgoing = self._virtual.step(_BUS_STEP, self._outgoing), []
+        now = self._virtual.time
+        for frame in frames:
+            if frame.arbitration_id not in IMU_FRAMES:
+                self._bridge.on_frame(frame, now)
+                continue
+            sample = self._stream.on_frame(frame, now)
+            if sample is None:
+                continue
+            estimate = self._estimator.update(round(1e9 * sample.stamp), sample.angular_rate, sample.specific_force)
+            if not isinstance(estimate, Problem):
+                self._gravity = np.array(estimate.gravity)
+            if displacement is not None and tension is not None:
+                self._command(displacement, tension, now)
+        self._steps += 1
+        if self._steps % _CONTROL_STEPS == 0:
+            self._outgoing += self._bridge.tick(now)
+
+    def _command(self, displacement: np.ndarray, tension: np.ndarray, now: float) -> None:
+        moved = within_limits(displacement, self._sent, self._limits, _SAMPLE_PERIOD)
+        self._sent = self._transmission.possible(moved, tension)
+        refused = self._bridge.command(self._sent.tolist(), tension.tolist(), now)
+        if refused:
+            raise RuntimeError(f"the bridge refused a command at {now:.2f} s: {refused}")
+        truth = self._virtual.truth
+        orientation = quat_axis(truth.tip_orientation)
+        self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, orientation))
+
+
+def quat_axis(orientation: np.ndarray) -> np.ndarray:
+    """Return the z axis (3,) of an orientation x y z w."""
+    x, y, z, w = orientation
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+
+
+def _with_true_densities(setup: Setup) -> Robot:
+    """Return the described robot with the densities of the virtual one."""
+    true = setup.true_robot.robot.materials
+    return setup.nominal.with_materials(
+        [dataclasses.replace(material, density=other.density) for material, other in zip(setup.nominal.materials, true)]
+    )

@@ -13,8 +13,9 @@ from gravcomp.inverse import Target, bend_target
 from gravcomp.inverse.target import arc_points
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-SETTLED = 0.5  # s at the end of a phase over which errors are averaged
-BAND = 0.5e-3  # m: converged when the tip stays within it
+# In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
+_RELEASED, _HELD, _SETTLED = 12.0, 14.0, 1.8
+_SHORTEST = 1.5  # s of a phase: filter, controller and winches need as long on the fastest robot
 GROUND = (
     "The whole loop runs in the core, faster than real time, against the virtual robot: CAN frames, bridge, position loops,"
     " IMU noise, orientation filter, model and inverse problem are those of the running graph. 'Measured' means the true shape of"
@@ -30,8 +31,6 @@ class Case:
     roll: float = 0.0
     bend: float = 0.0
     plane: float = 0.0
-    released: float = 3.0  # s
-    held: float = 4.0  # s
     options: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -45,11 +44,13 @@ class Case:
 class Outcome:
     """Outcome of a case, in SI units.
 
-    `without` and `held`: tip errors at the end of the released and of the compensated phase; backbones (b, 3) in soft_base.
+    `without` and `held`: tip errors in the last `settled` s of the released and of the compensated phase; backbones (b, 3) in
+    soft_base.
     """
 
     case: Case
     trace: Trace
+    settled: float
     recovery: float
     without: metrics.TipErrors
     held: metrics.TipErrors
@@ -69,30 +70,33 @@ def target_of(setup: Setup, case: Case) -> Target:
 
 
 def run_case(job: tuple[Setup, Case]) -> Outcome:
-    """Run one case: release, compensate, evaluate."""
+    """Run one case: release, compensate, evaluate. The phases last as long as the robot's first period demands."""
     setup, case = job
+    period = setup.first_period
+    settled = _SETTLED * period
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(case.inclination), np.radians(case.roll))))
     target = target_of(setup, case)
     loop.release()
-    loop.run(case.released)
+    loop.run(max(_SHORTEST, _RELEASED * period))
     start = loop.time
     loop.hold(target)
-    loop.run(case.held)
+    loop.run(max(_SHORTEST, _HELD * period))
     trace = loop.trace
-    before, after = trace.between(start - SETTLED, start), trace.between(loop.time - SETTLED)
+    before, after = trace.between(start - settled, start), trace.between(loop.time - settled)
     station = setup.robot.effectors.backbone_station
     wanted = arc_points(setup.robot.length, np.radians(case.bend), np.radians(case.plane), station)
-    change = trace.between(start - SETTLED)
+    change = trace.between(start - settled)
     distance = np.linalg.norm(change.tip_position - target.tip_position, axis=1)
     return Outcome(
         case=case,
         trace=trace,
+        settled=settled,
         recovery=metrics.recovery_rate(change.tip_position, change.model_tip_position),
         without=mean_errors(before, target),
         held=mean_errors(after, target),
         sag_without=float(metrics.mid_body_sag(before.backbone, wanted).mean()),
         sag_held=float(metrics.mid_body_sag(after.backbone, wanted).mean()),
-        converged=metrics.settling_time(change.time, distance, start=start, band=BAND),
+        converged=metrics.settling_time(change.time, distance, start=start, band=metrics.CONVERGED * setup.robot.length),
         target=target,
         target_backbone=wanted,
         shape_without=before.backbone.mean(axis=0),
@@ -114,13 +118,13 @@ def mean_errors(trace: Trace, target: Target) -> metrics.TipErrors:
 def pooled_recovery(outcomes: list[Outcome], *, at_rest: bool = True) -> float:
     """Return the recovery rate r over all cases together.
 
-    at_rest: of the settled parts of both phases; otherwise of everything from `SETTLED` s before the target is set.
+    at_rest: of the settled parts of both phases; otherwise of everything from `settled` s before the target is set.
     """
     parts = []
     for o in outcomes:
         start = o.trace.time[o.trace.compensating][0]
-        settled = [o.trace.between(start - SETTLED, start), o.trace.between(o.trace.time[-1] - SETTLED)]
-        parts += settled if at_rest else [o.trace.between(start - SETTLED)]
+        settled = [o.trace.between(start - o.settled, start), o.trace.between(o.trace.time[-1] - o.settled)]
+        parts += settled if at_rest else [o.trace.between(start - o.settled)]
     return metrics.recovery_rate(
         np.concatenate([p.tip_position for p in parts]), np.concatenate([p.model_tip_position for p in parts])
     )

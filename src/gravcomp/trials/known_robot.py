@@ -23,6 +23,7 @@ OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
 # m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (0.6e-3, 1.8e-3)
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
+_FITTED = {"offsets", "compliance", "winding"}
 _IMAGES = 10  # that are averaged
 
 
@@ -106,9 +107,10 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
             tips, directions = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
             tip, direction = Tracker().seen(setup.nominal.length, tips, directions, random)
             rows.append((gravity, command, tip.mean(axis=0), direction.mean(axis=0)))
-    return StillWindows(*(np.array(column) for column in zip(*rows)))
+    gravity, displacement, tip, direction = (np.array(column) for column in zip(*rows))
+    return StillWindows(gravity, displacement, tip, direction)
 
 
 def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...]]) -> StaticFit:
     setup, modulus, poses = job
-    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses))
+    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses), groups=_FITTED)

@@ -6,8 +6,7 @@ shape is the part of the centreline from d - L to d; before the mouth of the inl
 
 Cables that bend the robot also shorten it. The base can be advanced by this shortening as the model predicts it: `Feed`.
 
-Contact is not modelled, neither in the model nor in the virtual robot: a negative clearance is the depth of penetration into
-the wall.
+These runs have no wall: a negative clearance is the depth by which the robot would enter it. `steered` has the wall.
 """
 
 from dataclasses import dataclass

@@ -14,9 +14,7 @@ class Tracker:
     position_share: float = parameter(
         1e-3, minimum=0.0, maximum=0.1, description="deviation of a coordinate of the tip, over the robot's length"
     )
-    direction: float = parameter(
-        float(np.radians(0.5)), edge="deg", minimum=0.0, maximum=45.0, description="deviation of the tip's direction"
-    )
+    direction: float = parameter(0.5, edge="deg", minimum=0.0, maximum=45.0, description="deviation of the tip's direction")
 
     def seen(
         self, length: float, tip: np.ndarray, direction: np.ndarray, random: np.random.Generator

@@ -1,11 +1,15 @@
 """The loop held straight while its base turns from orientation to orientation and rests at each: errors at rest and in motion.
 
+The base turns from one direction of gravity to the next by the smallest angle, about a horizontal axis, and takes the random ones
+in the order of the nearest: a turn about the vertical changes nothing for the robot and would only take time.
+
 The share of a residual is of what the robot sags without compensation: the lateral distance of the released virtual robot's tip
 from the target, from its statics, as the root of the mean square over all orientations of the run. One orientation would not do:
 a hanging robot does not sag at all.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,17 +19,17 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
-from gravcomp.virtual.body import build_rod, first_frequency
+from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import NoEquilibrium, equilibrium
-from gravcomp.virtual.motion import WaypointMotion, base_orientation
+from gravcomp.virtual.motion import WaypointMotion, base_orientation, turned
 
 INCLINATIONS = (135.0, 90.0, 45.0, 0.0, -45.0)
 """Degrees: the article's five poses."""
 
 RATE = math.radians(30.0)  # rad/s, mean of each turn
-_PERIODS = 10  # of the first bending motion, after which it has died away
-_REACTION = 1.0  # s for filter and controller to settle
-_COUNTED = 0.5  # s at the end of each rest
+_PERIODS = 4  # of the first bending motion, which the turns hardly excite
+_REACTION = 0.6  # s for filter and controller to settle
+_COUNTED = 0.3  # s at the end of each rest
 
 
 @dataclass(frozen=True)
@@ -45,26 +49,57 @@ class Residuals:
 
 
 def orientations(count: int, seed: int) -> list[np.ndarray]:
-    """Return the rotations (3, 3), world from soft_base, of the five poses and of `count` random ones, uniform on the sphere."""
-    random = np.random.default_rng(seed)
-    inclination, roll = np.arcsin(random.uniform(-1.0, 1.0, count)), random.uniform(-np.pi, np.pi, count)
+    """Return the rotations (3, 3), world from soft_base, of the five poses and of `count` random ones, in the order of the run.
+
+    The directions of gravity of the random ones are uniform on the sphere.
+    """
     five = [base_orientation(math.radians(angle)) for angle in INCLINATIONS]
-    return five + [base_orientation(*angles) for angles in zip(inclination, roll)]
+    found = [five[0]]
+    for pose in five[1:]:
+        found.append(_turned_upright(found[-1], pose[2]))
+    left = np.random.default_rng(seed).standard_normal((count, 3))
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    while len(left):
+        nearest = int(np.argmax(left @ found[-1][2]))
+        found.append(_turned_upright(found[-1], left[nearest]))
+        left = np.delete(left, nearest, axis=0)
+    return found
 
 
-def residuals(setup: Setup, count: int = 20, orientation_seed: int = 1, board: str = "virtual") -> Residuals:
-    """Run the loop through the five poses and `count` random ones, with this board of the virtual robot.
+def _turned_upright(orientation: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Return the orientation (3, 3), by the smallest turn from the given one, at which `up` (3,) in soft_base points upward."""
+    axis = np.cross(up, orientation[2])
+    sine = float(np.linalg.norm(axis))
+    angle = math.atan2(sine, float(up @ orientation[2]))
+    if sine < 1e-9:  # the same direction, or the opposite one by any axis across
+        axis, sine = np.cross(orientation[2], orientation[0] + 2.0 * orientation[1]), 1.0
+        axis /= np.linalg.norm(axis)
+    return orientation @ turned(angle / sine * axis)
 
-    Raises ConfigError, NoEquilibrium, RuntimeError.
+
+def residuals(
+    setup: Setup,
+    count: int = 20,
+    orientation_seed: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    board: str = "virtual",
+) -> Residuals:
+    """Run the loop through the five poses and `count` random ones.
+
+    progress receives the number of orientations that are done, and that of all; board: of the virtual robot. Raises ConfigError,
+    NoEquilibrium, RuntimeError.
     """
     wanted = orientations(count, orientation_seed)
-    rest = _REACTION + _PERIODS * 2.0 * math.pi / first_frequency(build_rod(setup.true_robot)) + _COUNTED
+    rest = _REACTION + _PERIODS * setup.first_period + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
     loop = ClosedLoop(setup, motion, board=board)
     loop.hold(target_of(setup, Case(0.0)))
     start = loop.time
     legs = motion.rests
-    loop.run(legs[-1][1] - start)
+    for done, (_, end) in enumerate(legs):
+        loop.run(end - loop.time)
+        if progress is not None:
+            progress(done + 1, len(legs))
     trace = loop.trace
     held = [_lateral(trace.between(end - _COUNTED, end)) for _, end in legs]
     turns = [_lateral(trace.between(end, begin)) for (_, end), (begin, _) in zip(legs, legs[1:])]

@@ -35,7 +35,7 @@ class InjectFault:
 
 @dataclasses.dataclass(frozen=True)
 class BridgeService:
-    """Call a service of can_bridge: 'home', 'stop' or 'release'."""
+    """Call a service of the bridge: 'home', 'stop' or 'release'."""
 
     name: str
 

@@ -14,6 +14,7 @@ from gravcomp.description import PointLoad, Robot
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.rest_axis import RestAxis
+from gravcomp.virtual.law_curve import curve_of_law, filaments
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel
 from gravcomp.virtual.stretches import Stretch, stretches_of
@@ -38,12 +39,14 @@ def build_rod(true: TrueRobot) -> RodModel:
     ends = _element_ends(true, axis, stretches, [s for _, s, _ in loads])
     length, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
     n = len(length)
+    filament, curve = np.empty((n, 9, 3)), np.empty((n, 3))
     stiffness, rest_strain = np.empty((n, 6, 6)), np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (n, 1))
     mass, moment, inertia = np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
     for e, z in enumerate(middle):
         stretch = _at(stretches, z)
         section, material = stretch.section(z), stretch.material
         stiffness[e] = section.stiffness(material.youngs_modulus, material.poissons_ratio, stretch.axial_modulus)
+        filament[e], curve[e] = filaments(stiffness[e][2:5, 2:5]), curve_of_law(material)
         rest_strain[e, 3:5] = _curvature(axis, z)
         half = material.density * section.area * length[e] / 2
         across = np.diag([1.0, 1.0, 0.0]) * half * length[e] ** 2 / 12
@@ -61,12 +64,15 @@ def build_rod(true: TrueRobot) -> RodModel:
         mass[k] += load.mass
         moment[k] += load.mass * offset
         inertia[k] += load.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    mass[-1] += robot.payload.mass
+    payload, at = robot.payload, np.array(robot.payload.centre)
+    mass[-1] += payload.mass
+    moment[-1] += payload.mass * at
+    inertia[-1] += payload.mass * (at @ at * np.eye(3) - np.outer(at, at))
     centre = moment / np.maximum(mass, 1e-300)[:, None]
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
     spring = lines.axial_stiffness / (lines.free_length + inside)
-    return RodModel(length, stiffness, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring)
+    return RodModel(length, stiffness, filament, curve, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring)
 
 
 def build_material(model: RodModel, true: TrueRobot) -> RodMaterial:

@@ -24,6 +24,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Material, Robot
+from gravcomp.description.cable_line import ASSUMED_FREE_LENGTH, ASSUMED_STRETCH
 from gravcomp.description.hardware import Hardware
 from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.virtual.material_classes import class_of
@@ -32,8 +33,8 @@ from gravcomp.virtual.true_robot import TrueCables, TrueMaterial, TrueMotors, Tr
 
 _MODULUS_SPREAD, _DENSITY_SPREAD = 0.08, 0.02
 _RADIUS_SPREAD, _ANGLE_SPREAD = 0.01, math.radians(1.0)
-_LINE_SPREAD, _LINE_STRETCH = 0.1, (1e-3, 3e-3)
-_FREE_LENGTH, _FREE_SPREAD = 2.0, 0.1
+_LINE_SPREAD, _LINE_STRETCH = 0.1, (0.5 * ASSUMED_STRETCH, 1.5 * ASSUMED_STRETCH)
+_FREE_SPREAD = 0.1
 _FRICTION_SPREAD, _FRICTION, _GUIDE_ANGLE = 0.2, (0.05, 0.11), (math.radians(15.0), math.radians(25.0))
 _PRESLIDING = 5e-4  # of the robot's length
 _MATERIAL_SPREAD = 0.3
@@ -172,7 +173,7 @@ def _lines(
     tendons, count = given.tendons, len(robot.cables)
     spread, friction_spread = random.uniform(-1.0, 1.0, (2, count))
     stretch, friction = random.uniform(*_LINE_STRETCH), random.uniform(*_FRICTION)
-    free = _FREE_LENGTH * robot.length * (1.0 + random.uniform(-_FREE_SPREAD, _FREE_SPREAD))
+    free = ASSUMED_FREE_LENGTH * robot.length * (1.0 + random.uniform(-_FREE_SPREAD, _FREE_SPREAD))
     guide = random.uniform(*_GUIDE_ANGLE)
 
     def each(name: str, value: float | None, described: Callable[[Cable, int], float | None], otherwise: float) -> np.ndarray:

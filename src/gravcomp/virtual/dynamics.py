@@ -3,23 +3,37 @@
 import numpy as np
 
 from gravcomp.virtual.backbone import backbone_poses
+from gravcomp.virtual.contact import find_contacts, slots
+from gravcomp.virtual.contact_force import touching_of
 from gravcomp.virtual.equilibrium import RodShape
 from gravcomp.virtual.forces import half_bandwidth
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel, strains
 from gravcomp.virtual.routing import tendon_lengths
+from gravcomp.virtual.se3 import rotation_exp, rotation_log
+from gravcomp.virtual.surroundings import RodSurroundings, Touches, touches_of
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
-from gravcomp.virtual.time_step import MOST_ITERATIONS, time_step
+from gravcomp.virtual.time_step import time_step
+
+_PARTS = 4  # of a step that does not converge at once
 
 
 class MovingRod:
     """State of the moving rod. The arrays are changed in place by each step."""
 
-    def __init__(self, model: RodModel, material: RodMaterial, friction: TendonFriction):
-        """Start unloaded and at rest, the base at the origin, the tendons slack."""
+    def __init__(
+        self, model: RodModel, material: RodMaterial, friction: TendonFriction, surroundings: RodSurroundings | None = None
+    ):
+        """Start unloaded and at rest, the base at the origin, the tendons slack. Without `surroundings` nothing is around it."""
         self.model, self.material, self.friction = model, material, friction
+        self._around = around = surroundings or RodSurroundings.none(model)
+        self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
+        self._rim = np.zeros((len(around.walls.moving), 3))
+        self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
         n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
         self.orientation, self.position = model.unloaded()
+        self.mass, self.centre, self.inertia = model.mass, model.centre, model.inertia  # with what is attached
+        self.load = np.zeros((n + 1, 3))  # N, in the fixed frame, at the centre of mass of each cross-section
         self.velocity = np.zeros((n + 1, 6))
         self._acceleration, self._velocity_rate = np.zeros((n + 1, 6)), np.zeros((n + 1, 6))
         self._branch_strain = np.tile(model.rest_strain, (k, 1, 1))
@@ -57,6 +71,26 @@ class MovingRod:
         return np.where(taut, self._wound - self.tension / np.where(taut, spring, 1.0), self.shortened)
 
     @property
+    def touches(self) -> Touches:
+        """The places where the rod touches walls at present."""
+        return touches_of(self._touching, self._around.walls, self.orientation, self.position)
+
+    def place_free_of_walls(self, shape: RodShape, base_orientation: np.ndarray, base_position: np.ndarray) -> tuple[float, int]:
+        """Set the rod to `shape` as `rest` does; return by how much (m) it is then in a wall, and that obstacle's number."""
+        self.rest(shape, base_orientation, base_position)
+        around = self._around
+        if not len(around.walls.moving):
+            return 0.0, -1
+        find_contacts(
+            around.walls, around.surface, self.model.length, around.rigid, 0.0, self.orientation, self.position,
+            self.orientation, self.position, self._held, self._rim, self._checked,
+        )  # fmt: skip
+        gaps = self._checked.gap[: self._checked.count[0]]
+        if not len(gaps):
+            return 0.0, -1
+        return max(0.0, -float(gaps.min())), int(around.walls.scene.obstacle[self._checked.row[int(gaps.argmin())]])
+
+    @property
     def tension_share(self) -> np.ndarray:
         """Share (m, n) of the tension at the capstan that arrives in each element."""
         friction = self.friction
@@ -82,6 +116,8 @@ class MovingRod:
         self._slip_strain[:] = self.strain[:, 3:5]
         self.tension = shape.tension.copy()
         self._compliance[:] = 0.0
+        self._held[:] = 0.0
+        self._touching.count[0] = 0
         taut = (self.tension > 0.0) & (self.tendon_stiffness > 0.0)
         self._wound[taut] = self.shortened[taut] + self.tension[taut] / self.tendon_stiffness[taut]
 
@@ -92,14 +128,51 @@ class MovingRod:
 
         The base is at base_orientation (3, 3) and base_position (3,) m at the end of the step, and the displacement wound (m,) m
         is pulled in then; gravity (3,) m/s^2 is in the fixed frame. If the state at the end is not possible, the rod moves
-        rigidly with the base and is at rest.
+        rigidly with the base and is at rest. A step at a wall that does not converge is taken again in parts.
         """
+        if not len(self._around.walls.moving):
+            return self._step(dt, base_orientation, base_position, gravity, wound)
+        state, pose = self._state(), (self.orientation[0].copy(), self.position[0].copy())
+        if self._step(dt, base_orientation, base_position, gravity, wound):
+            return True
+        self._take_back(state)
+        turn, before = np.empty(3), self._wound.copy()
+        rotation_log(np.ascontiguousarray(pose[0].T @ base_orientation), turn)
+        converged = True
+        for part in range(1, _PARTS + 1):
+            share, rotation = part / _PARTS, np.empty((3, 3))
+            rotation_exp(share * turn, rotation)
+            place = pose[1] + share * (base_position - pose[1])
+            last = part == _PARTS
+            orientation = base_orientation if last else pose[0] @ rotation
+            converged &= self._step(dt / _PARTS, orientation, place, gravity, before + share * (wound - before))
+        return converged
+
+    def _state(self) -> list[np.ndarray]:
+        """Copies of all that a step changes."""
+        return [array.copy() for array in self._changing()]
+
+    def _take_back(self, state: list[np.ndarray]) -> None:
+        for array, before in zip(self._changing(), state):
+            array[:] = before
+
+    def _changing(self) -> list[np.ndarray]:
+        return [
+            self.orientation, self.position, self.velocity, self._acceleration, self._velocity_rate, self.strain,
+            self._branch_strain, self._slip_strain, self._sliding, self._path, self._wound, self.tension, self.shortened,
+            self._compliance, self._held, self._rim, *self._touching,
+        ]  # fmt: skip
+
+    def _step(
+        self, dt: float, base_orientation: np.ndarray, base_position: np.ndarray, gravity: np.ndarray, wound: np.ndarray
+    ) -> bool:
         model, material, friction = self.model, self.material, self.friction
-        possible, iterations = time_step(
+        possible, converged = time_step(
             dt,
             base_orientation,
             base_position,
             gravity,
+            self.load,
             wound,
             self._wound,
             self.orientation,
@@ -117,10 +190,12 @@ class MovingRod:
             self._compliance,
             model.length,
             model.stiffness,
+            model.filament,
+            model.curve,
             model.rest_strain,
-            model.mass,
-            model.centre,
-            model.inertia,
+            self.mass,
+            self.centre,
+            self.inertia,
             model.routing,
             model.tendon_length,
             self.tendon_stiffness,
@@ -136,12 +211,28 @@ class MovingRod:
             self._direction,
             self._chord,
             self._band,
+            self._around.walls,
+            self._around.surface,
+            self._around.rigid,
+            self._around.depth,
+            self._held,
+            self._rim,
+            self._touching,
+            self._checked,
         )
         self._wound[:] = wound
         if not possible:
             self._rest_as_it_was(base_orientation, base_position)
             return False
-        return iterations < MOST_ITERATIONS
+        return converged
+
+    def attach(self, mass: float, centre: np.ndarray) -> None:
+        """Fix a mass in kg to the tip, in place of what was attached before; centre (3,) m: in the axes of the tip's section."""
+        model = self.model
+        self.mass, self.centre, self.inertia = model.mass.copy(), model.centre.copy(), model.inertia.copy()
+        before, self.mass[-1] = model.mass[-1], model.mass[-1] + mass
+        self.centre[-1] = (before * model.centre[-1] + mass * centre) / max(self.mass[-1], 1e-300)
+        self.inertia[-1] += mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
 
     def carry(self, base_orientation: np.ndarray, base_position: np.ndarray) -> None:
         """Move the rod rigidly with its base to the given pose; shape, strains and body velocities do not change."""
@@ -163,5 +254,7 @@ class MovingRod:
         for rates in (self.velocity, self._acceleration, self._velocity_rate):
             rates[:] = 0.0
         self._sliding[:] = 0.0
+        self._held[:] = 0.0
+        self._touching.count[0] = 0
         self.tension[:] = 0.0
         self._measure()

@@ -4,8 +4,8 @@ It is the minimum of the potential energy of rod, tendons and weight, with the l
 iteration runs on the residual of `assemble` of forces.py. Each increment is changed until it is a direction of descent, and
 shortened until the energy falls, because cables change between taut and slack and a straight rod under strong cables is unstable:
 
-    U = sum_e L/2 (epsilon - epsilon_0)^T K (epsilon - epsilon_0) + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2)
-        - sum_k m_k g (p_k + R_k c_k)
+    U = sum_e L (1/2 (epsilon - epsilon_0)^T K (epsilon - epsilon_0) + E int (c e^3/3 + d e^4/4) dA)
+        + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2) - sum_k m_k g (p_k + R_k c_k)
 """
 
 from dataclasses import dataclass
@@ -91,6 +91,8 @@ def _settled(
         position,
         model.length,
         model.stiffness,
+        model.filament,
+        model.curve,
         model.rest_strain,
         model.mass,
         model.centre,
@@ -120,6 +122,8 @@ def _settle(
     position: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    filament: np.ndarray,
+    curve: np.ndarray,
     rest_strain: np.ndarray,
     mass: np.ndarray,
     centre: np.ndarray,
@@ -152,7 +156,21 @@ def _settle(
     strains(orientation, position, length, strain)
     tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
     energy = _energy(
-        orientation, position, strain, length, stiffness, rest_strain, path, tendon_rest, spring, wound, preload, force, centre
+        orientation,
+        position,
+        strain,
+        length,
+        stiffness,
+        filament,
+        curve,
+        rest_strain,
+        path,
+        tendon_rest,
+        spring,
+        wound,
+        preload,
+        force,
+        centre,
     )
     for iteration in range(_MOST_ITERATIONS):
         for c in range(m):
@@ -167,6 +185,8 @@ def _settle(
             rest_strain,
             stiffness,
             constant,
+            filament,
+            curve,
             none,
             none,
             no_slip,
@@ -219,6 +239,8 @@ def _settle(
                 strain,
                 length,
                 stiffness,
+                filament,
+                curve,
                 rest_strain,
                 path,
                 tendon_rest,
@@ -241,6 +263,8 @@ def _energy(
     strain: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    filament: np.ndarray,
+    curve: np.ndarray,
     rest_strain: np.ndarray,
     path: np.ndarray,
     tendon_rest: np.ndarray,
@@ -258,12 +282,23 @@ def _energy(
                 energy += (
                     0.5 * length[e] * stiffness[e, i, j] * (strain[e, i] - rest_strain[e, i]) * (strain[e, j] - rest_strain[e, j])
                 )
+        z, x, y = strain[e, 2] - rest_strain[e, 2], strain[e, 3] - rest_strain[e, 3], strain[e, 4] - rest_strain[e, 4]
+        for f in range(filament.shape[1]):
+            own = z + x * filament[e, f, 0] + y * filament[e, f, 1]
+            bent = max(own, curve[e, 2])
+            beyond = own - bent
+            density = bent**3 * (curve[e, 0] / 3.0 + curve[e, 1] * bent / 4.0)
+            density += beyond * bent**2 * (curve[e, 0] + curve[e, 1] * bent)
+            density += 0.5 * beyond**2 * bent * (2.0 * curve[e, 0] + 3.0 * curve[e, 1] * bent)
+            energy += length[e] * filament[e, f, 2] * density
     for c in range(path.shape[0]):
         total = np.sum(path[c])
         stretch = max(0.0, wound[c] + total - tendon_rest[c])
         energy += preload[c] * total + 0.5 * spring[c] * stretch * stretch
     for k in range(position.shape[0]):
         for i in range(3):
-            place = position[k, i] + orientation[k, i, 0] * centre[k, 0] + orientation[k, i, 1] * centre[k, 1]
+            place = position[k, i]
+            for j in range(3):
+                place += orientation[k, i, j] * centre[k, j]
             energy -= force[k, i] * place
     return energy

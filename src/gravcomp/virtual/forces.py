@@ -2,7 +2,8 @@
 
 With the strain epsilon = theta / L of an element between the cross-sections A and B (see rod.py):
 
-    sigma = K (epsilon - epsilon_0) + ...                            Cosserat law; the history of the material adds to it
+    sigma = K (epsilon - epsilon_0) + ...                            Cosserat law; the history of the material adds to it, and
+                                                                     `law_curve` what the law adds to a linear one
     delta theta = J_r^-1(theta) eta_B - J_l^-1(theta) eta_A          eta: body-frame variations of the two cross-sections
 
 A tendon at the offset d with the tension T pulls in the element with T (t, d x t), t the unit vector along v + w x d + d' (D. C.
@@ -33,6 +34,8 @@ def assemble(
     rest_strain: np.ndarray,
     linear: np.ndarray,
     constant: np.ndarray,
+    filament: np.ndarray,
+    curve: np.ndarray,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
     slip_strain: np.ndarray,
@@ -59,7 +62,9 @@ def assemble(
     strain, rest_strain : (n, 6)
         Of the elements; epsilon_0 is that of the unloaded rod.
     linear, constant : (n, 6, 6), (n, 6)
-        Of the material's law: sigma = linear (epsilon - epsilon_0) + constant + friction + tendons.
+        Of the material's law: sigma = linear (epsilon - epsilon_0) + constant + curve + friction + tendons.
+    filament, curve : (n, 9, 3), (n, 3)
+        Of the law's curve, see law_curve.py.
     slip_stiffness, slip_moment, slip_strain : (n,) N m^2, (n,) N m, (n, 2) 1/m
         Of the material's friction, see material.py.
     routing : Routing
@@ -97,6 +102,7 @@ def assemble(
         _material(
             strain[e], rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], sigma, tangent
         )
+        _add_curve(strain[e], rest_strain[e], filament[e], curve[e], sigma, tangent)
         for c in range(m):
             if not routing.inside[c, e]:
                 continue
@@ -152,6 +158,30 @@ def _material(
     sigma[4] += factor * k1
     tangent[3, 3] += factor * slip_stiffness
     tangent[4, 4] += factor * slip_stiffness
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_curve(
+    strain: np.ndarray, rest_strain: np.ndarray, filament: np.ndarray, curve: np.ndarray, sigma: np.ndarray, tangent: np.ndarray
+) -> None:
+    """Add stress (6,) and tangent (6, 6) of E (c e^2 + d e^3) in the filaments of a section, see law_curve.py."""
+    stretch, x, y = strain[2] - rest_strain[2], strain[3] - rest_strain[3], strain[4] - rest_strain[4]
+    for f in range(filament.shape[0]):
+        b, a = filament[f], filament[f, 2]
+        own = stretch + x * b[0] + y * b[1]
+        bent = max(own, curve[2])
+        rise = a * bent * (2.0 * curve[0] + 3.0 * curve[1] * bent)
+        force = a * bent * bent * (curve[0] + curve[1] * bent) + rise * (own - bent)
+        sigma[2] += force
+        sigma[3] += force * b[0]
+        sigma[4] += force * b[1]
+        tangent[2, 2] += rise
+        tangent[2, 3] += rise * b[0]
+        tangent[2, 4] += rise * b[1]
+        tangent[3, 3] += rise * b[0] * b[0]
+        tangent[3, 4] += rise * b[0] * b[1]
+        tangent[4, 4] += rise * b[1] * b[1]
+    tangent[3, 2], tangent[4, 2], tangent[4, 3] = tangent[2, 3], tangent[2, 4], tangent[3, 4]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -261,15 +291,15 @@ def _add_load(orientation: np.ndarray, force: np.ndarray, centre: np.ndarray, re
     middle = band.shape[1] // 2
     for k in range(orientation.shape[0]):
         r = orientation[k]
-        c0, c1 = centre[k, 0], centre[k, 1]
+        c0, c1, c2 = centre[k, 0], centre[k, 1], centre[k, 2]
         f0 = r[0, 0] * force[k, 0] + r[1, 0] * force[k, 1] + r[2, 0] * force[k, 2]
         f1 = r[0, 1] * force[k, 0] + r[1, 1] * force[k, 1] + r[2, 1] * force[k, 2]
         f2 = r[0, 2] * force[k, 0] + r[1, 2] * force[k, 1] + r[2, 2] * force[k, 2]
         residual[k, 0] -= f0
         residual[k, 1] -= f1
         residual[k, 2] -= f2
-        residual[k, 3] -= c1 * f2
-        residual[k, 4] += c0 * f2
+        residual[k, 3] -= c1 * f2 - c2 * f1
+        residual[k, 4] -= c2 * f0 - c0 * f2
         residual[k, 5] -= c0 * f1 - c1 * f0
         if k > 0:
             row = 6 * (k - 1)
@@ -280,10 +310,12 @@ def _add_load(orientation: np.ndarray, force: np.ndarray, centre: np.ndarray, re
             band[row + 2, middle + 1] += f1
             band[row + 2, middle + 2] -= f0
             # Rows of the moment c x f: the columns are those of the rotation.
-            band[row + 3, middle] += c1 * f1
+            band[row + 3, middle] += c1 * f1 + c2 * f2
             band[row + 3, middle + 1] -= c1 * f0
+            band[row + 3, middle + 2] -= c2 * f0
             band[row + 4, middle - 1] -= c0 * f1
-            band[row + 4, middle] += c0 * f0
+            band[row + 4, middle] += c0 * f0 + c2 * f2
+            band[row + 4, middle + 1] -= c2 * f1
             band[row + 5, middle - 2] -= c0 * f2
             band[row + 5, middle - 1] -= c1 * f2
             band[row + 5, middle] += c0 * f0 + c1 * f1

@@ -102,13 +102,16 @@ class TremorMotion(SyntheticMotion):
     Amplitudes: R. N. Stiles, "Frequency and displacement amplitude relations for normal hand tremor", J. Appl. Physiol. 40, 1976.
     """
 
-    def __init__(self, orientation: np.ndarray, seed: int):
+    def __init__(self, orientation: np.ndarray, seed: int, drift: bool = True):
+        """Begin at `orientation` (3, 3), world from soft_base; drift: with the slow part."""
         random = np.random.default_rng(seed)
         self._orientation = orientation
         self._frequency = np.concatenate([random.uniform(0.1, 0.6, (3, 3)), random.uniform(8.0, 12.0, (3, 3))], axis=1)
         self._phase = random.uniform(0.0, 2 * math.pi, (3, 6))
         self._turn = np.radians([1.5, 1.0, 0.7, 0.10, 0.08, 0.06])
         self._shift = np.array([3.0, 2.0, 1.0, 0.10, 0.08, 0.06]) * 1e-3
+        if not drift:
+            self._turn[:3] = self._shift[:3] = 0.0
 
     def pose(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return rotation (3, 3), world from soft_base, and position (3,) m at `time` s."""

@@ -38,7 +38,9 @@ class MotorBank:
         self._start_count = random.integers(0, COUNTS_PER_TURN, k)
         self._matrix = np.ascontiguousarray(hardware.transmission.matrix)
         self._longer = slack - hardware.transmission.preload  # m, by which each cable is longer than its path at the start
-        self._rotor, self._speed, self._capstan = np.zeros(k), np.zeros(k), np.zeros(k)
+        # On the flank that winds in, where homing, which ends at a taut cable, leaves the zero. Of antagonists none is the one.
+        self._rotor = 0.5 * true.backlash * self._ratio * hardware.transmission.pays_out
+        self._speed, self._capstan = np.zeros(k), np.zeros(k)
         self._current = np.zeros(k)
         self.commanded = np.zeros(k)  # A, as last received, positive as the motor counts
         self.stalled = np.zeros(k, dtype=bool)  # rotors that are blocked

@@ -19,6 +19,7 @@ from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
+from gravcomp.scene.scene import Scene
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
@@ -34,6 +35,7 @@ from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 from gravcomp.virtual.motion import BaseMotion, StaticMotion, base_orientation, quaternion
 from gravcomp.virtual.motors import TICK, MotorBank
 from gravcomp.virtual.parameters import VirtualRobotParameters
+from gravcomp.virtual.surroundings import RodSurroundings
 from gravcomp.virtual.truth import Truth
 
 _ROD_TICKS = 4  # 2 ms
@@ -54,13 +56,15 @@ class VirtualRobot:
         seed: int | None = None,
         motion: BaseMotion | None = None,
         board: str = "virtual",
+        scene: Scene | None = None,
     ):
         """Start in the static equilibrium.
 
         `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
-        the robot horizontal; `board`: 'virtual', Python code, or 'emulated', the
-        firmware's. Raises ConfigError where the motors do not match the cables, where the parameters describe no robot,
-        and where the rod cannot represent it.
+        the robot horizontal; `board`: 'virtual', Python code, or 'emulated', the firmware's; `scene`: walls around the robot,
+        whose world begins where the base is at first. Where the robot in equilibrium would lie in a wall it starts unloaded.
+        Raises ConfigError where the motors do not match the cables, where the parameters describe no robot, where the rod cannot
+        represent it, and where the unloaded robot is in a wall.
         """
         if hardware.cables != robot.cable_names:
             raise ConfigError(f"motors for the cables {', '.join(hardware.cables)}; the robot has {', '.join(robot.cable_names)}")
@@ -70,7 +74,8 @@ class VirtualRobot:
         motors, imu, faults = (np.random.default_rng(stream) for stream in streams[1:])
         self._robot, self._hardware = robot, hardware
         self._model = build_rod(true)
-        self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true))
+        around = None if scene is None or not scene else RodSurroundings.of(self._model, true, scene)
+        self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true), around)
         self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
         self._board: VirtualBoard | EmulatedBoard = (
             EmulatedBoard(true.board, imu, hardware) if board == "emulated" else VirtualBoard(true.board, imu)
@@ -83,6 +88,7 @@ class VirtualRobot:
             _ROD_TICKS * TICK,
             _SAMPLE_TICKS // _ROD_TICKS,
         )
+        self._pushes: dict[int, np.ndarray] = {}  # N in soft_base, by the cross-section
         self._outward, self._inward = FrameFaults(faults), FrameFaults(faults)
         self._faults = ActiveFaults(hardware)
         self._tick = 0
@@ -96,7 +102,14 @@ class VirtualRobot:
         self.unresolved = 0  # steps of the rod that did not converge
         orientation, position = self._base.pose
         shape = equilibrium(self._model, orientation.T @ _GRAVITY, displacement=self._motors.wound)
-        self._rod.rest(shape, orientation, position)
+        depth, _ = self._rod.place_free_of_walls(shape, orientation, position)
+        if depth > 0.0:
+            depth, obstacle = self._rod.place_free_of_walls(equilibrium(self._model, np.zeros(3)), orientation, position)
+            if scene is not None and depth > 0.0:
+                raise ConfigError(
+                    f"the virtual robot starts {1e3 * depth:.3g} mm inside '{scene.names[obstacle]}' of the scene; move"
+                    " the wall, or start elsewhere"
+                )
 
     @property
     def time(self) -> float:
@@ -116,6 +129,15 @@ class VirtualRobot:
     def turn_base(self, orientation: np.ndarray) -> None:
         """Turn the base to `orientation` (3, 3), world from soft_base, and keep it there; this ends the motion that it had."""
         self._base.turn(orientation, self.time)
+
+    def push(self, force: np.ndarray, station: float = 1.0) -> None:
+        """Let a force (3,) in N, constant in soft_base, act at the cross-section nearest to `station`, from now on; 0: none."""
+        section = int(np.argmin(np.abs(self._model.station - station)))
+        self._pushes[section] = np.asarray(force, dtype=float)
+
+    def attach(self, mass: float, centre: np.ndarray | None = None) -> None:
+        """Fix a payload of `mass` kg to the tip, in addition to the described one; centre (3,) m: in the axes of the tip."""
+        self._rod.attach(mass, np.zeros(3) if centre is None else np.asarray(centre, dtype=float))
 
     def inject(self, fault: Fault) -> None:
         """Begin `fault`. Raises ConfigError for an unknown cable."""
@@ -178,6 +200,7 @@ class VirtualRobot:
         base = self._rod.orientation[0]
         position, orientation = self._rod.along(self._robot.effectors.backbone_station)
         tip_position, tip_orientation = self._rod.along(_TIP)
+        touches = self._rod.touches
         return Truth(
             time=self.time,
             tip_position=tip_position[0],
@@ -192,6 +215,10 @@ class VirtualRobot:
             current=self._motors.commanded.copy(),
             temperature=self._board.temperature,
             recorded=self._base.recorded,
+            base_position=self._rod.position[0].copy(),
+            contact_position=(touches.place - self._rod.position[0]) @ base,
+            contact_force=touches.force @ base,
+            contact_depth=touches.depth,
         )
 
     def _receive(self, frame: can.Message) -> None:
@@ -220,6 +247,8 @@ class VirtualRobot:
         sent: list[can.Message] = []
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
+            for section, force in self._pushes.items():
+                self._rod.load[section] = orientation @ force
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
         behind: list[can.Message] = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:

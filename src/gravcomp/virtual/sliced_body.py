@@ -19,13 +19,30 @@ _DIVISIONS = 4  # of the edges of a curved face
 
 def slice_of(body: MeshBody, part: float) -> CrossSection:
     """Return the section constants at `part` of the length. Raises ConfigError for a body without a section there."""
-    triangles, length = _surface(dataclasses.replace(body, material=Material()))
-    height = length * min(max(part, 10 * _OFF_NODES), 1.0 - 10 * _OFF_NODES) + _OFF_NODES * length
-    segments = _cut(triangles, height)
+    segments, height = _slice(body, part)
     section = sliced_section(segments) if len(segments) > 2 else None
     if section is None or section.area <= 0.0:
-        raise ConfigError(f"{body.file}: no cross-section at {1e3 * height:g} mm; the virtual robot needs one everywhere")
+        raise _missing(body, height)
     return section
+
+
+def slice_boundary(body: MeshBody, part: float) -> np.ndarray:
+    """Return points (k, 2) in m of the boundary at `part` of the length. Raises ConfigError where there is no section."""
+    segments, height = _slice(body, part)
+    if len(segments) < 3:
+        raise _missing(body, height)
+    return segments.reshape(-1, 2)
+
+
+def _slice(body: MeshBody, part: float) -> tuple[np.ndarray, float]:
+    """Boundary (k, 2, 2) and height, in m, of the section at `part` of the length."""
+    triangles, length = _surface(dataclasses.replace(body, material=Material()))
+    height = length * min(max(part, 10 * _OFF_NODES), 1.0 - 10 * _OFF_NODES) + _OFF_NODES * length
+    return _cut(triangles, height), height
+
+
+def _missing(body: MeshBody, height: float) -> ConfigError:
+    return ConfigError(f"{body.file}: no cross-section at {1e3 * height:g} mm; the virtual robot needs one everywhere")
 
 
 @functools.lru_cache(maxsize=4)

@@ -12,17 +12,24 @@ The tension T of each tendon is an unknown of Newton's method in addition to the
 and the geometric stiffness belongs to T, not to k s. With a stiff line k s is far from the tension until the shape is exact, and
 its geometric stiffness would mislead every step (mixed iteration; D. Magisano, L. Leonetti, G. Garcea, "How to improve efficiency
 and robustness of the Newton method in geometrically non-linear structural problem", Comput. Methods Appl. Mech. Eng. 313, 2017).
+
+While the rod touches a wall (contact.py, contact_force.py), and in the step after, velocity and acceleration are the backward
+differences of the pose (J. J. Moreau's time stepping with theta = 1, V. Acary, B. Brogliato, "Numerical Methods for Nonsmooth
+Dynamical Systems", 2008, chapter 10): a point that meets a wall stays on it, and no acceleration of an impact is carried on.
 """
 
 import numpy as np
 from numba import njit
 
 from gravcomp.virtual.band_solver import newton_step
+from gravcomp.virtual.contact import Walls, find_contacts, keep_friction
+from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, forget_friction, take_over
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
 from gravcomp.virtual.rod import strains
 from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
+from gravcomp.virtual.surface import RodSurface
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
 
 _SPECTRAL_RADIUS = 0.5  # numerical damping of frequencies that the time step cannot resolve; 1: none
@@ -30,10 +37,13 @@ _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
 _ALPHA_F = _SPECTRAL_RADIUS / (_SPECTRAL_RADIUS + 1)
 _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
-MOST_ITERATIONS = 12
+_MOST_ITERATIONS, _MOST_AT_WALLS = 12, 40
+_WITH_FRICTION = 25  # iterations at walls; the others start again, and take the step without friction
 _LARGEST_TURN = 1.5  # rad in one element
 _LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _LOOSER = 10.0  # than the static equilibrium, in force and moment
+_SEARCHES = 4  # for contacts in one step
+_NEAR = 0.05  # of the half width of the rod: so near to a wall a point takes part, and farther by twice its way in the step
 
 
 @njit(cache=True, error_model="numpy")
@@ -42,6 +52,7 @@ def time_step(
     base_orientation: np.ndarray,
     base_position: np.ndarray,
     gravity: np.ndarray,
+    load: np.ndarray,
     wound: np.ndarray,
     wound_before: np.ndarray,
     orientation: np.ndarray,
@@ -59,6 +70,8 @@ def time_step(
     compliance: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
+    filament: np.ndarray,
+    curve: np.ndarray,
     rest_strain: np.ndarray,
     mass: np.ndarray,
     centre: np.ndarray,
@@ -78,40 +91,70 @@ def time_step(
     direction: np.ndarray,
     chord: np.ndarray,
     band: np.ndarray,
-) -> tuple[bool, int]:
-    """Advance the rod by dt s in place; return whether the state at the end is possible, and the number of iterations.
+    walls: Walls,
+    surface: RodSurface,
+    rigid: float,
+    depth: float,
+    held: np.ndarray,
+    rim: np.ndarray,
+    touching: Touching,
+    checked: Touching,
+) -> tuple[bool, bool]:
+    """Advance the rod by dt s in place; return whether the state at the end is possible, and whether the iteration converged.
 
-    The parameters are those of `MovingRod`; wound_before and wound (m,) m are the displacements at the beginning and at the end
-    of the step; compliance (m,) receives that of each tendon's path in one step, m/N; direction, chord and band are scratch.
-    MOST_ITERATIONS iterations mean that the iteration did not converge. If the state is not possible, pose and
-    material keep their values from before the step, and the caller sets the rest of the state.
+    The parameters are those of `MovingRod`; load (n + 1, 3) N acts in addition to the weights; wound_before and wound (m,) m are
+    the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one
+    step, m/N; direction, chord and band are scratch. rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how
+    much the planes of the contacts may differ from the walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`;
+    checked is scratch. If the state is not possible, pose and material keep their values from before the step, and the caller
+    sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
-    beta = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F))
-    gamma = _GAMMA / (dt * _BETA)
     linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
     force = np.empty((n + 1, 3))
     for k in range(n + 1):
         for i in range(3):
-            force[k, i] = mass[k] * gravity[i]
+            force[k, i] = mass[k] * gravity[i] + load[k, i]
     share = tension_shares(strain, length, sliding, routing.start, routing.end, mu, guide_angle)
 
-    total_increment = _predict(dt, velocity, acceleration, velocity_rate)
     start_orientation, start_position = orientation.copy(), position.copy()
     copy_pose(base_orientation, base_position, orientation[0], position[0])
+    turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    obstacles = walls.moving.shape[0]
+    reach = 0.0
+    if obstacles > 0:
+        way = _way(dt, velocity, start_orientation, start_position, orientation, position)
+        reach = _NEAR * float(surface.size[n]) + 2.0 * way
+    meets = touching.count[0] > 0 and np.any(touching.force[: touching.count[0]] != 0.0)
+    start_velocity = velocity.copy()
+    total_increment = _predict_free(dt, velocity, acceleration, velocity_rate)
+    _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
+    if obstacles > 0:
+        find_contacts(
+            walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+            touching,
+        )  # fmt: skip
+        meets = meets or np.any(touching.gap[: touching.count[0]] < 0.0)
+    beta, gamma = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F)), _GAMMA / (dt * _BETA)
+    if meets:
+        beta, gamma = 1.0 / (dt * dt), 1.0 / dt
+        for k in range(1, n + 1):
+            for i in range(6):
+                velocity[k, i], velocity_rate[k, i], total_increment[k, i] = start_velocity[k, i], 0.0, dt * start_velocity[k, i]
+    searches = 1
 
     path_before = path.copy()
     pulled, law = tension.copy(), np.empty(m)  # T, and k s where the tendon is taut
-    active, work, middle = np.empty(m), np.empty((3, 3)), band.shape[1] // 2
+    active, middle = np.empty(m), band.shape[1] // 2
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     new_strain = np.empty((n, 6))
-    turn, shift = np.empty((3, 3)), np.empty(3)
-    iterations = MOST_ITERATIONS
-    for iteration in range(MOST_ITERATIONS):
-        for k in range(1, n + 1):
-            motion_exp(total_increment[k], turn, shift)
-            copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-            advance(orientation[k], position[k], turn, shift, work)
+    converged, slides = False, False
+    for iteration in range(_MOST_AT_WALLS if obstacles > 0 else _MOST_ITERATIONS):
+        if iteration == _WITH_FRICTION:
+            slides = True
+            forget_friction(touching)
+            _restart(gamma, beta, total_increment, velocity, velocity_rate)
+        _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
         strains(orientation, position, length, new_strain)
         tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
         slack = 0.0  # largest stretch of a taut tendon that has become too short
@@ -129,6 +172,8 @@ def time_step(
             rest_strain,
             linear,
             constant,
+            filament,
+            curve,
             slip_stiffness,
             slip_moment,
             slip_strain,
@@ -144,6 +189,7 @@ def time_step(
             pull,
             band,
         )
+        admissible = add_contacts(touching, orientation, position, _LOOSER * tolerances[0], residual, band)
         worst = 0.0
         for k in range(1, n + 1):
             for i in range(6):
@@ -153,10 +199,22 @@ def time_step(
             _add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
             for i in range(6):
                 worst = max(worst, abs(residual[k, i]) / tolerances[i // 3])
-        if worst < _LOOSER and slack < _LOOSER * tolerances[0]:
-            iterations = iteration
-            break
+        if admissible and worst < _LOOSER and slack < _LOOSER * tolerances[0]:
+            if obstacles > 0 and searches < _SEARCHES:
+                find_contacts(
+                    walls, surface, length, rigid, reach, orientation, position, start_orientation, start_position, held, rim,
+                    checked,
+                )  # fmt: skip
+                searches += 1
+                if slides:
+                    forget_friction(checked)
+            if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth:
+                converged = True
+                break
+            take_over(checked, touching)
+            continue
         increment = newton_step(band, residual, gradient, pull, active, compliance)
+        expect(touching, orientation, position, increment)
         for k in range(1, n + 1):
             for i in range(6):
                 change = increment[6 * (k - 1) + i]
@@ -172,12 +230,17 @@ def time_step(
     for k in range(1, n + 1):
         _orthonormalise(orientation[k], work)
         for i in range(6):
-            acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
+            if meets:
+                acceleration[k, i] = velocity_rate[k, i]
+            else:
+                acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
 
     if not _is_possible(orientation, position, new_strain, velocity, length):
         for k in range(n + 1):
             copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
-        return False, iterations
+        return False, False
+    if obstacles > 0:
+        keep_friction(walls, orientation, touching, held)
     update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
     update_sliding(sliding, path_before, path, wound_before, wound, presliding)
     for c in range(m):
@@ -185,11 +248,71 @@ def time_step(
     for e in range(n):
         for i in range(6):
             strain[e, i] = new_strain[e, i]
-    return True, iterations
+    return True, converged
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(dt: float, velocity: np.ndarray, acceleration: np.ndarray, velocity_rate: np.ndarray) -> np.ndarray:
+def _move(
+    increment: np.ndarray,
+    start_orientation: np.ndarray,
+    start_position: np.ndarray,
+    orientation: np.ndarray,
+    position: np.ndarray,
+    turn: np.ndarray,
+    shift: np.ndarray,
+    work: np.ndarray,
+) -> None:
+    """Set the free cross-sections to their start, moved by increment (n + 1, 6); turn, shift and work are scratch."""
+    for k in range(1, increment.shape[0]):
+        motion_exp(increment[k], turn, shift)
+        copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
+        advance(orientation[k], position[k], turn, shift, work)
+
+
+@njit(cache=True, error_model="numpy")
+def _way(
+    dt: float,
+    velocity: np.ndarray,
+    start_orientation: np.ndarray,
+    start_position: np.ndarray,
+    orientation: np.ndarray,
+    position: np.ndarray,
+) -> float:
+    """Return how far (m) a cross-section moves in dt s: the fastest at its velocity, or the tip that turns with the base."""
+    fastest = 0.0
+    for k in range(velocity.shape[0]):
+        v = velocity[k]
+        fastest = max(fastest, v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    moved, n = 0.0, position.shape[0] - 1
+    for i in range(3):
+        tip = position[0, i] - start_position[n, i]
+        for j in range(3):
+            along = 0.0
+            for k in range(3):
+                along += start_orientation[0, k, j] * (start_position[n, k] - start_position[0, k])
+            tip += orientation[0, i, j] * along
+        moved += tip * tip
+    return dt * np.sqrt(fastest) + np.sqrt(moved)
+
+
+@njit(cache=True, error_model="numpy")
+def _restart(
+    gamma: float,
+    beta: float,
+    total_increment: np.ndarray,
+    velocity: np.ndarray,
+    velocity_rate: np.ndarray,
+) -> None:
+    """Put the sections back to where they were at the beginning of the step, with the velocities and rates that this implies."""
+    for k in range(1, velocity.shape[0]):
+        for i in range(6):
+            velocity[k, i] -= gamma * total_increment[k, i]
+            velocity_rate[k, i] -= beta * total_increment[k, i]
+            total_increment[k, i] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _predict_free(dt: float, velocity: np.ndarray, acceleration: np.ndarray, velocity_rate: np.ndarray) -> np.ndarray:
     """Return the first increment (n + 1, 6) of the cross-sections; set velocity, acceleration and rate to match."""
     total_increment = np.zeros(velocity.shape)
     for k in range(1, velocity.shape[0]):
@@ -246,20 +369,20 @@ def _add_inertia(
 ) -> None:
     """Add M rate - ad_v^T M v of one cross-section to residual (6,).
 
-    mass in kg, its centre (3,) m in the plane of the section, inertia (3, 3) kg m^2 about the axis. With the momenta
+    mass in kg, its centre (3,) m, inertia (3, 3) kg m^2 about the axis. With the momenta
     P = m (v + w x c) and L = m c x v + J w the force is M rate + (w x P, w x L + v x P).
     """
     v0, v1, v2, w0, w1, w2 = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
-    c0, c1 = centre[0], centre[1]
-    p0, p1, p2 = mass * (v0 - w2 * c1), mass * (v1 + w2 * c0), mass * (v2 + w0 * c1 - w1 * c0)
-    q0 = mass * c1 * v2 + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
-    q1 = -mass * c0 * v2 + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
+    c0, c1, c2 = centre[0], centre[1], centre[2]
+    p0, p1, p2 = mass * (v0 + w1 * c2 - w2 * c1), mass * (v1 + w2 * c0 - w0 * c2), mass * (v2 + w0 * c1 - w1 * c0)
+    q0 = mass * (c1 * v2 - c2 * v1) + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
+    q1 = mass * (c2 * v0 - c0 * v2) + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
     q2 = mass * (c0 * v1 - c1 * v0) + inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
-    residual[0] += mass * (rate[0] - rate[5] * c1) + w1 * p2 - w2 * p1
-    residual[1] += mass * (rate[1] + rate[5] * c0) + w2 * p0 - w0 * p2
+    residual[0] += mass * (rate[0] + rate[4] * c2 - rate[5] * c1) + w1 * p2 - w2 * p1
+    residual[1] += mass * (rate[1] + rate[5] * c0 - rate[3] * c2) + w2 * p0 - w0 * p2
     residual[2] += mass * (rate[2] + rate[3] * c1 - rate[4] * c0) + w0 * p1 - w1 * p0
-    residual[3] += mass * c1 * rate[2] + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
-    residual[4] += -mass * c0 * rate[2] + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
+    residual[3] += mass * (c1 * rate[2] - c2 * rate[1]) + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
+    residual[4] += mass * (c2 * rate[0] - c0 * rate[2]) + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
     residual[5] += mass * (c0 * rate[1] - c1 * rate[0]) + w0 * q1 - w1 * q0 + v0 * p1 - v1 * p0
     for i in range(3):
         for j in range(3):
@@ -271,17 +394,21 @@ def _add_inertia_to_band(
     row: int, beta: float, mass: float, centre: np.ndarray, inertia: np.ndarray, middle: int, band: np.ndarray
 ) -> None:
     """Add beta M of one cross-section, whose first row is `row`, to the band."""
-    m, x, y = beta * mass, beta * mass * centre[0], beta * mass * centre[1]
+    m, x, y, z = beta * mass, beta * mass * centre[0], beta * mass * centre[1], beta * mass * centre[2]
     for i in range(3):
         band[row + i, middle] += m
         for j in range(3):
             band[row + 3 + i, middle + j - i] += beta * inertia[i, j]
     # The upper right block is -m c^, the lower left one its transpose.
+    band[row, middle + 4] += z
     band[row, middle + 5] -= y
+    band[row + 1, middle + 2] -= z
     band[row + 1, middle + 4] += x
     band[row + 2, middle + 1] += y
     band[row + 2, middle + 2] -= x
     band[row + 5, middle - 5] -= y
     band[row + 5, middle - 4] += x
+    band[row + 3, middle - 2] -= z
     band[row + 3, middle - 1] += y
+    band[row + 4, middle - 4] += z
     band[row + 4, middle - 2] -= x

@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Truth:
-    """True state of the virtual robot. In soft_base, SI; b backbone points, m cables."""
+    """True state of the virtual robot. In soft_base, SI; b backbone points, m cables, t contacts."""
 
     time: float  # s since the start
     tip_position: np.ndarray  # (3,)
@@ -22,3 +22,7 @@ class Truth:
     current: np.ndarray  # (m,) A, as last commanded
     temperature: float  # degC, of the chip
     recorded: bool  # whether the last IMU sample came from a recording
+    base_position: np.ndarray  # (3,) m in the world
+    contact_position: np.ndarray  # (t, 3) m, where walls touch the robot
+    contact_force: np.ndarray  # (t, 3) N, of the walls on the robot
+    contact_depth: np.ndarray  # (t,) m, in the wall

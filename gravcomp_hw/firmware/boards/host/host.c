@@ -32,13 +32,17 @@ static bool write(void *context, uint32_t place, const uint32_t *words, uint32_t
   return true;
 }
 
-void gc_host_start(gc_host *host, const uint32_t *unique_id, uint8_t reset_cause) {
-  gc_zero(&host->board, sizeof host->board);
+void gc_host_attach(gc_host *host) {
   host->board.storage.places[0] = &host->places[0];
   host->board.storage.places[1] = &host->places[1];
   host->board.storage.erase = erase;
   host->board.storage.write = write;
   host->board.storage.context = host;
+}
+
+void gc_host_start(gc_host *host, const uint32_t *unique_id, uint8_t reset_cause) {
+  gc_zero(&host->board, sizeof host->board);
+  gc_host_attach(host);
   host->board.reset_cause = reset_cause;
   gc_copy(host->board.unique_id, unique_id, sizeof host->board.unique_id);
   gc_board_start(&host->board);

@@ -13,6 +13,9 @@ typedef struct {
 size_t gc_host_size(void);
 size_t gc_host_record_size(void);
 
+// Let a board that was copied to another place in memory use its own stored places.
+void gc_host_attach(gc_host *host);
+
 // Start as after a reset; the stored places keep what they have.
 void gc_host_start(gc_host *host, const uint32_t *unique_id, uint8_t reset_cause);
 

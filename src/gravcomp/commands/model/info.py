@@ -82,6 +82,8 @@ def _cables(model: "RobotModel") -> dict[str, dict[str, float | None]]:
 
 def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
     """Return the sentences about the cables' lines, one for each kind of line."""
+    from gravcomp.description.cable_line import ASSUMED_FREE_LENGTH, ASSUMED_STRETCH
+
     kinds: dict[tuple, list[str]] = {}
     for name, cable in cables.items():
         values = tuple(None if value is None else round(value, 3) for value in list(cable.values())[1:])
@@ -89,7 +91,10 @@ def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
     sentences = []
     for (free, stiffness, stretch), names in kinds.items():
         if stiffness is None:
-            sentences.append(f"  lines of {', '.join(names)}: not described, without stretch")
+            sentences.append(
+                f"  lines of {', '.join(names)}: not described, without stretch; the loop assumes {100 * ASSUMED_STRETCH:g} %"
+                f" at the largest tension, along the robot and {ASSUMED_FREE_LENGTH:g} times its length before it"
+            )
         else:
             sentences.append(
                 f"  lines of {', '.join(names)}: E A {stiffness:.0f} N, {free:g} mm from capstan to robot,"

@@ -3,9 +3,12 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from gravcomp.commands.model.wrenches import add_wrench_arguments, wrenches_of
+
 if TYPE_CHECKING:
     import numpy as np
 
+    from gravcomp.full_model.wrench import Wrench
     from gravcomp.inverse import Command
     from gravcomp.simulation import Shape, Simulator
 
@@ -32,6 +35,7 @@ def add_load_arguments(parser: argparse.ArgumentParser) -> None:
         "--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to reach with the cables, mm"
     )
     parser.add_argument("--direction", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip direction to reach, with --target")
+    add_wrench_arguments(parser)
     parser.add_argument("--full", action="store_true", help="use the full model even when a reduced model exists")
 
 
@@ -47,22 +51,27 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
 
     if args.direction is not None and args.target is None:
         raise ValueError("--direction needs --target, which is not given")
+    wrenches = wrenches_of(args)
     file = load_robot_file(args.robot)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
     if args.target is not None:
-        shape, command = _reached(simulator, gravity, args.target, args.direction)
+        shape, command = _reached(simulator, gravity, args.target, args.direction, wrenches)
         return simulator, shape, command
     displacement = None if args.displacement is None else 1e-3 * np.array(args.displacement)
-    shape = simulator.solve(gravity, displacement, args.tension)
+    shape = simulator.solve(gravity, displacement, args.tension, wrench=wrenches)
     if not args.full and not shape.status:
         # Where a reduced model exists it gives the shape, starting from the full model's solution.
-        shape = simulator.step(gravity, displacement, args.tension)
+        shape = simulator.step(gravity, displacement, args.tension, wrench=wrenches)
     return simulator, shape, None
 
 
 def _reached(
-    simulator: "Simulator", gravity: "np.ndarray", target: list[float], direction: list[float] | None
+    simulator: "Simulator",
+    gravity: "np.ndarray",
+    target: list[float],
+    direction: list[float] | None,
+    wrenches: "tuple[Wrench, ...]",
 ) -> "tuple[Shape, Command]":
     """Run the closed loop of model and inverse problem until the tip is at rest. `target` in mm."""
     import numpy as np
@@ -73,7 +82,7 @@ def _reached(
     towards = None if direction is None else np.array(direction)
     wanted = Target(1e-3 * np.array(target), tip_direction=towards, tip_direction_weight=weight)
     controller = InverseController(simulator.robot)
-    shape = simulator.solve(gravity)
+    shape = simulator.solve(gravity, wrench=wrenches)
     before = shape.tip_position
     for _ in range(2000):
         command = controller.step(
@@ -83,8 +92,9 @@ def _reached(
             tension=shape.cable_tension,
             interval=0.02,
             followed=shape.is_equilibrium,
+            contact=shape.contacts.sentence,
         )
-        shape = simulator.step(gravity, command.displacement)
+        shape = simulator.step(gravity, command.displacement, wrench=wrenches)
         if shape.is_equilibrium and np.linalg.norm(shape.tip_position - before) < 1e-8:
             break
         before = shape.tip_position

@@ -1,10 +1,14 @@
 """`gravcomp model solve ROBOT`: one equilibrium, with its shape and cables."""
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
+from gravcomp.commands.model.wrenches import wrenches_of
+
+if TYPE_CHECKING:
+    from gravcomp.full_model.wrench import Wrench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
         "status": shape.status.name.lower(),
         "message": shape.message,
         "gravity": shape.gravity.tolist(),
+        "wrenches": [_described(wrench) for wrench in wrenches_of(args)],
         "tip_position_mm": (1e3 * shape.tip_position).tolist(),
         "tip_orientation_xyzw": shape.tip_orientation.tolist(),
         "tip_direction": shape.tip_direction.tolist(),
@@ -39,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         contacts = shape.contacts
         figures["contacts"] = [
             {
-                "obstacle": simulator.scene.names[contacts.obstacle[i]],
+                "obstacle": contacts.names[i],
                 "station": contacts.station[i],
                 "position_mm": (1e3 * contacts.position[i]).tolist(),
                 "gap_mm": 1e3 * contacts.gap[i],
@@ -61,6 +66,15 @@ def run(args: argparse.Namespace) -> int:
     return 1 if figures["status"] in ("not_converged", "failed") else 0
 
 
+def _described(wrench: "Wrench") -> dict[str, Any]:
+    return {
+        "force_n": wrench.force.tolist(),
+        "moment_nm": wrench.moment.tolist(),
+        "station": wrench.station,
+        "frame": "follower" if wrench.follower else "fixed",
+    }
+
+
 def _text(figures: dict[str, Any]) -> str:
     def row(values: list, digits: int = 3) -> str:
         return ", ".join(f"{value:.{digits}f}" for value in values)
@@ -69,6 +83,12 @@ def _text(figures: dict[str, Any]) -> str:
         f"{figures['robot']}, {figures['model']} model: {figures['status']} {figures['message']}".rstrip(),
         f"  tip {row(figures['tip_position_mm'])} mm, direction {row(figures['tip_direction'], 4)}",
     ]
+    for wrench in figures["wrenches"]:
+        axes = "its section" if wrench["frame"] == "follower" else "soft_base"
+        lines.append(
+            f"  wrench at {wrench['station']:.2f} in the axes of {axes}:"
+            f" {row(wrench['force_n'], 4)} N, {row(wrench['moment_nm'], 5)} N m"
+        )
     if "target_mm" in figures:
         message = figures["controller_message"]
         lines.append(

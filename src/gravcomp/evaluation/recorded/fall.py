@@ -8,28 +8,31 @@ from gravcomp.config import ConfigError
 from gravcomp.evaluation.metrics import angle_between, inclination_deg
 from gravcomp.evaluation.recorded.falls import FALLEN, PAID_OUT, WITHIN, as_measured, falls
 from gravcomp.evaluation.recorded.run import RecordedRun
+from gravcomp.full_model.modes import first_period
 from gravcomp.report.drawing import MODEL, REAL, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 
-_REST = 1.0  # s at the end of a fall that count as rest
+_REST = 3.6  # first periods at the end of a fall that count as rest
 
 
 def run(recorded: RecordedRun) -> Result:
     """Return the evaluation. Raises ConfigError when no fall is found."""
     course, robot = recorded.course, recorded.setup.robot
+    period = first_period(robot)
     measured = [
-        as_measured(course.rows(rows), str(recorded.bag), robot.length, len(robot.cables)) for rows in falls(course, robot.length)
+        as_measured(course.rows(rows), str(recorded.bag), robot.length, len(robot.cables))
+        for rows in falls(course, robot.length, period)
     ]
     if not measured:
         raise ConfigError(
-            f"{recorded.bag}: contains no fall. A fall: cables paid out (~/relax) for {PAID_OUT:g} s, the tip held within"
-            f" {1e3 * STRAIGHT * robot.length:g} mm of straight, let go, and {1e3 * FALLEN:g} mm away from there within"
-            f" {WITHIN:g} s"
+            f"{recorded.bag}: contains no fall. A fall: cables paid out (~/relax) for {PAID_OUT * period:.2g} s, the tip held"
+            f" within {1e3 * STRAIGHT * robot.length:g} mm of straight, let go, and {1e3 * FALLEN * robot.length:g} mm away from"
+            f" there within {WITHIN * period:.2g} s"
         )
     models = [predict_course(robot, fall) for fall in measured]
     position = [np.linalg.norm(tip - fall.tip_position, axis=1) for fall, (tip, _) in zip(measured, models)]
     direction = [_angles(towards, fall) for fall, (_, towards) in zip(measured, models)]
-    rests = [fall.time >= fall.time[-1] - _REST for fall in measured]
+    rests = [fall.time >= fall.time[-1] - _REST * period for fall in measured]
 
     def worst(errors: list[np.ndarray], at_rest: bool) -> float:
         return max(float(e[rest].max() if at_rest else e.max()) for e, rest in zip(errors, rests))
@@ -67,7 +70,7 @@ def run(recorded: RecordedRun) -> Result:
                     )
                     for i, p, d, rest in zip(inclinations, position, direction, rests)
                 ],
-                f"At rest: the last {_REST:g} s.",
+                f"At rest: the last {_REST * period:.2g} s.",
             ),
         ],
         parameters={"bag": str(recorded.bag), "falls": len(measured)},

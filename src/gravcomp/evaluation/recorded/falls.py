@@ -10,33 +10,33 @@ from gravcomp.calibration.course import STRAIGHT
 from gravcomp.calibration.measured import Measured
 from gravcomp.evaluation.recorded.course import RELEASED, Course
 
-FALLEN, WITHIN = 8e-3, 0.5
-"""A fall: the tip is more than FALLEN m from the straight robot's within WITHIN s."""
-PAID_OUT = 1.0
-"""s for which the cables must have been paid out before: a robot that its cables let down does not fall."""
-_BEGINNING = (1e-3, 10e-3)  # m, distances of the samples from which the moment of letting go is computed
-_LONGEST = 4.0  # s of a fall
-_SHORTEST = 1.0  # s
+FALLEN, WITHIN = 0.08, 1.8
+"""A fall: the tip is more than FALLEN lengths from the straight robot's within WITHIN first periods."""
+PAID_OUT = 3.6
+"""First periods for which the cables must have been paid out before: a robot that its cables let down does not fall."""
+_BEGINNING = (0.01, 0.1)  # lengths: distances of the samples from which the moment of letting go is computed
+_LONGEST = 14.0  # first periods of a fall
+_SHORTEST = 3.6
 
 
-def falls(course: Course, length: float) -> list[np.ndarray]:
-    """Return the rows of each fall of a robot of `length` m, from the last sample near straight on."""
+def falls(course: Course, length: float, period: float) -> list[np.ndarray]:
+    """Return the rows of each fall, from the last sample near straight on; length in m and first period in s of the robot."""
     distance, near = np.linalg.norm(course.tip_position - [0.0, 0.0, length], axis=1), STRAIGHT * length
     released = course.phase == RELEASED
     found: list[np.ndarray] = []
     last = -1
     for start in np.flatnonzero((distance[:-1] <= near) & (distance[1:] > near) & released[:-1]).tolist():
         begin = course.time[start]
-        soon = (course.time > begin) & (course.time <= begin + WITHIN)
-        before = (course.time >= begin - PAID_OUT) & (course.time <= begin)
-        paid_out = begin - course.time[0] >= PAID_OUT and released[before].all()
-        if start <= last or not paid_out or not (distance[soon] > FALLEN).any():
+        soon = (course.time > begin) & (course.time <= begin + WITHIN * period)
+        before = (course.time >= begin - PAID_OUT * period) & (course.time <= begin)
+        paid_out = begin - course.time[0] >= PAID_OUT * period and released[before].all()
+        if start <= last or not paid_out or not (distance[soon] > FALLEN * length).any():
             continue
-        end = int(np.searchsorted(course.time, begin + _LONGEST, side="right"))
+        end = int(np.searchsorted(course.time, begin + _LONGEST * period, side="right"))
         # A fall ends where the cables are pulled again or the next fall begins.
         over = np.flatnonzero(~released[start:end] | ((distance[start:end] <= near) & (np.arange(end - start) > 0)))
         end = start + int(over[0]) if len(over) else end
-        if course.time[end - 1] - begin >= _SHORTEST:
+        if course.time[end - 1] - begin >= _SHORTEST * period:
             found.append(np.arange(start, end))
             last = end
     return found
@@ -45,7 +45,7 @@ def falls(course: Course, length: float) -> list[np.ndarray]:
 def as_measured(course: Course, source: str, length: float, cables: int) -> Measured:
     """Return the fall as a course that begins straight at the moment of letting go."""
     straight = np.array([0.0, 0.0, length])
-    let_go = _let_go(course.time, np.linalg.norm(course.tip_position - straight, axis=1))
+    let_go = _let_go(course.time, np.linalg.norm(course.tip_position - straight, axis=1) / length)
     course = course.rows(course.time > let_go)
     count = len(course.time) + 1
     return Measured(
@@ -60,7 +60,7 @@ def as_measured(course: Course, source: str, length: float, cables: int) -> Meas
 
 
 def _let_go(time: np.ndarray, distance: np.ndarray) -> float:
-    """Return the time (s) at which the line through sqrt(distance) of the first samples begins.
+    """Return the time (s) at which the line through sqrt(distance) of the first samples begins; distance in lengths.
 
     With fewer than two such samples it is the time of the first sample.
     """

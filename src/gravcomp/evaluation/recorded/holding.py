@@ -2,16 +2,17 @@
 
 import numpy as np
 
+from gravcomp.calibration.standstill import Standstill
 from gravcomp.config import ConfigError
 from gravcomp.evaluation import metrics
 from gravcomp.evaluation.recorded.course import BETWEEN, HELD, RELEASED, Course
-from gravcomp.evaluation.recorded.rests import STILL_GRAVITY, STILL_TIME, STILL_TIP, Rest, errors_of, rests
+from gravcomp.evaluation.recorded.rests import Rest, errors_of, rests
 from gravcomp.evaluation.recorded.run import RecordedRun
+from gravcomp.full_model.modes import first_period
 from gravcomp.report.drawing import MODEL, REAL, TARGET, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 
 _SAME_POSE = np.radians(10.0)  # largest difference of two directions of gravity that count as one pose
-_BAND = 0.5e-3  # m: converged when the tip stays within it
 
 
 def run(recorded: RecordedRun) -> Result:
@@ -21,7 +22,9 @@ def run(recorded: RecordedRun) -> Result:
     if not held.any():
         raise ConfigError(f"{recorded.bag}: the controller never keeps a target in it; record while it does")
     errors = errors_of(course)
-    found = rests(course)
+    robot = recorded.setup.robot
+    still = Standstill.of(robot, first_period(robot))
+    found = rests(course, still)
     at_rest = np.concatenate([rest.rows for rest in found]) if found else np.zeros(0, int)
     kept = [rest.errors for rest in found if rest.phase == HELD]
     with_, without = _rms(errors.distance[held]), _rms(errors.distance[released])
@@ -42,7 +45,7 @@ def run(recorded: RecordedRun) -> Result:
             Figure("tip error smaller than released by the factor", without / with_, "", limit=5.0, at_least=True),
             Figure(
                 "time to converge after the release ended, longest",
-                _longest_convergence(course, errors.distance),
+                _longest_convergence(course, errors.distance, metrics.CONVERGED * robot.length),
                 "s",
                 "about 6 s",
             ),
@@ -63,8 +66,9 @@ def run(recorded: RecordedRun) -> Result:
         ],
         parameters={"bag": str(recorded.bag), "samples": len(course.time), "seconds": float(course.time[-1])},
         notes=[
-            f"At rest: {STILL_TIME:g} s during which the tip stays within {1e3 * STILL_TIP:g} mm and gravity within"
-            f" {np.degrees(STILL_GRAVITY):g} deg; the last such window of every stretch counts. r is the correlation of the"
+            f"At rest: {still.time:.2g} s during which the tip stays within"
+            f" {1e3 * still.tip_limit(course.tip_position):.2g} mm and gravity within {np.degrees(still.gravity):g} deg; the last"
+            " such window of every stretch counts. r is the correlation of the"
             " modelled and the measured tip, each coordinate centred on its own mean.",
             *(
                 []
@@ -106,8 +110,8 @@ def _recovery(course: Course, rows: np.ndarray) -> float:
     return metrics.recovery_rate(course.tip_position[rows], course.model_tip_position[rows])
 
 
-def _longest_convergence(course: Course, distance: np.ndarray) -> float:
-    """Return the longest time (s) from a change from released to held until the error has settled; NaN without any."""
+def _longest_convergence(course: Course, distance: np.ndarray, band: float) -> float:
+    """Return the longest time (s) from released to held until the error stays within `band` (m); NaN without any."""
     changes = np.flatnonzero((course.phase[1:] == HELD) & (course.phase[:-1] == RELEASED)) + 1
     times = []
     for start in changes:
@@ -115,7 +119,7 @@ def _longest_convergence(course: Course, distance: np.ndarray) -> float:
         end = start + ends[0] if len(ends) else len(course.time)
         if end - start > 2:
             part = slice(start, end)
-            times.append(metrics.settling_time(course.time[part], distance[part], start=course.time[start], band=_BAND))
+            times.append(metrics.settling_time(course.time[part], distance[part], start=course.time[start], band=band))
     return float(np.nanmax(times)) if np.isfinite(times).any() else float("nan")
 
 

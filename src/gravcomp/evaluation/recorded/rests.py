@@ -1,16 +1,12 @@
-"""Stretches at rest in a recorded course, with their mean errors."""
+"""Stretches at rest in a recorded course, with their mean errors. What counts as rest is that of a calibration."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.standstill import Standstill
 from gravcomp.evaluation import metrics
 from gravcomp.evaluation.recorded.course import BETWEEN, Course
-
-STILL_TIME = 0.5  # s: length of a window
-STILL_TIP = 0.6e-3  # m: largest motion of the tip in a window
-STILL_GRAVITY = math.radians(0.5)  # rad: of the gravity direction
 
 
 @dataclass(frozen=True)
@@ -23,13 +19,13 @@ class Rest:
     errors: metrics.TipErrors[float]
 
 
-def rests(course: Course) -> list[Rest]:
+def rests(course: Course, still: Standstill) -> list[Rest]:
     """Return the last window at rest of every stretch between two motions, changes of phase or changes of target."""
-    count = max(2, round(STILL_TIME / max(float(np.median(np.diff(course.time))), 1e-6)))
+    count, limit = still.samples(course.time), still.tip_limit(course.tip_position)
     found: list[Rest] = []
     last: Rest | None = None
     for start in range(0, len(course.time) - count + 1, max(1, count // 2)):
-        rest = _rest(course, np.arange(start, start + count))
+        rest = _rest(course, np.arange(start, start + count), limit, still.gravity)
         if last is not None and (rest is None or rest.phase != last.phase):
             found.append(last)
         last = rest
@@ -41,15 +37,15 @@ def errors_of(course: Course) -> metrics.TipErrors[np.ndarray]:
     return metrics.tip_errors(course.tip_position, course.tip_direction, course.target_position, course.target_direction)
 
 
-def _rest(course: Course, rows: np.ndarray) -> Rest | None:
-    """Return the rest in a window, None where the window is not at rest."""
+def _rest(course: Course, rows: np.ndarray, tip: float, gravity: float) -> Rest | None:
+    """Return the rest in a window, None where it is not at rest: the tip moves by more than `tip` (m), or gravity turns (rad)."""
     window = course.rows(rows)
     down = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     at_rest = (
         window.phase[0] != BETWEEN
         and (window.phase == window.phase[0]).all()
-        and np.ptp(window.tip_position, axis=0).max() <= STILL_TIP
-        and np.ptp(down, axis=0).max() <= STILL_GRAVITY
+        and np.ptp(window.tip_position, axis=0).max() <= tip
+        and np.ptp(down, axis=0).max() <= gravity
         and np.ptp(window.target_position, axis=0).max() == 0.0
     )
     if not at_rest:

@@ -16,7 +16,9 @@ from gravcomp.recordings.bags import BagError
 from gravcomp.recordings.bags.streams import CONTROLLER_STATUS, POSE, SHAPE_TARGET, VECTOR, Stream, Wanted, read_streams
 
 # When a target is refused, the last one stays in force.
-_KEEPING = (ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE, ControllerCode.REFUSED)
+_KEEPING = (
+    ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE, ControllerCode.CONTACT, ControllerCode.REFUSED
+)  # fmt: skip
 _RATE = 100.0  # Hz, largest rate of the tip that is kept
 _WANTED = {
     "tip": Wanted(POSE, TIP_TOPICS),

@@ -1,6 +1,9 @@
 """A clamped rod under gravity, and forces and moments in its middle and at its tip, against SoRoSim; nothing is fitted.
 
-Forces and moments of the table are constant in the base frame, whose x is the straight rod.
+Forces and moments of the table are constant in the base frame, whose x is the straight rod: turning with the section they miss by
+8 to 40 % of the length. A rod's clamp leaves the contraction across free; that of the finite elements holds it, which acts like a
+rod that is shorter by 0.1 of its radius. Elements as long as the radius make five times as much of it: the layers at the clamp
+have to be thin.
 """
 
 import csv
@@ -18,7 +21,7 @@ from gravcomp.simulation import Simulator
 
 LENGTH = 0.4
 _ROD = Segment("rod", LENGTH, 0.01, material=Material("svk", 70e6, 0.4, density=1200.0))
-_ELEMENTS = Elements(around=4, along=80, grading=1.0, equal_stiffness=True)
+_ELEMENTS = Elements(around=8, along=24, grading=32.0, equal_stiffness=True)
 _FORCES, _ANGLES = ("Px", "Py", "Pz"), ("EulX", "EulY", "EulZ")
 
 
@@ -45,14 +48,14 @@ def in_soft_base(shape: dict[str, np.ndarray], lines: tuple[str, ...], column: i
     return np.array([y, z, x])
 
 
-def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part:
-    """Compute all shapes (brief: three)."""
+def evaluate(folder: Path, progress: Callable[[str], None], brief: bool = False, count: int | None = None) -> Part:
+    """Compute all shapes, or the first `count` (brief: three)."""
     shapes = read(folder / "statics.csv")
     simulator = Simulator(Robot("rod", segments=(_ROD,), elements=_ELEMENTS), reduced=False)
     free: list[tuple] = []
     loaded: list[tuple] = []
     for number, (name, shape) in enumerate(shapes.items()):
-        if brief and number == 3:
+        if number == (3 if brief else count):
             break
         progress(f"shape {number + 1} of {len(shapes)}")
         wrenches = []

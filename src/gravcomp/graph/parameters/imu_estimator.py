@@ -27,6 +27,11 @@ class ImuEstimatorParameters:
     stale_time: float = parameter(
         0.5, unit="s", minimum=0.05, maximum=10, description="without a sample for this time the status is NO_DATA"
     )
+    arm_acceleration: bool = parameter(
+        False,
+        read_only=True,
+        description="subtract arm/acceleration of arm_gravity, so that a fast arm does not tilt the estimate",
+    )
     bias_model_file: str = parameter(
         "", read_only=True, description="file of the bias over temperature; empty: neither used nor learned", unit="path"
     )

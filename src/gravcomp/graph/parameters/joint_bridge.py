@@ -21,6 +21,11 @@ class JointBridgeParameters:
         read_only=True,
     )
     state_rate: float = parameter(50.0, unit="Hz", minimum=1, maximum=500, description="rate of cable/state", read_only=True)
+    guard: bool = parameter(
+        True,
+        description="with a controller of efforts: drive only while a guard process runs, which sends zeros when the bridge dies",
+        read_only=True,
+    )
     require_imu: bool = parameter(
         False,
         description="subscribe to imu/data_raw and hold the cables when no samples arrive; without it, the stamps of the commands"

@@ -3,6 +3,7 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 
 BOARDS = ("virtual", "emulated")
@@ -90,4 +91,7 @@ class VirtualRobotNodeParameters:
     base_frame: str = parameter("soft_base", description="frame of truth/... and measured/tip", read_only=True)
     tracker: VirtualTrackerParameters = parameter(
         default_factory=VirtualTrackerParameters, description="tracker of the tip, which publishes measured/tip"
+    )
+    load_cells: VirtualLoadCellParameters = parameter(
+        default_factory=VirtualLoadCellParameters, description="load cells at the capstans, which publish measured/tension"
     )

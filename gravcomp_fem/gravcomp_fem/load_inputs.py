@@ -1,0 +1,164 @@
+"""External loads of fem_simulator: external/wrench, a payload that changes, and an unknown load that is found.
+
+Known loads come on external/wrench and with the parameter payload_mass_g. An unknown one is estimated from measured/tip and
+measured/tension, and published on estimated/wrench.
+"""
+
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.lifecycle import LifecycleNode
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from std_srvs.srv import Trigger
+
+from gravcomp.description import Robot
+from gravcomp.external_loads import LivePayload, WrenchInput
+from gravcomp.full_model.wrench import Wrench
+from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
+from gravcomp.load_estimation import LoadEstimate, LoadObserver
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.simulation import DynamicSimulator, Shape, Simulator
+from gravcomp_fem.conversion import doubles
+from gravcomp_msgs.msg import WrenchEstimate
+from gravcomp_node import SENSOR
+
+_COMPLIANCE_EVERY = 10  # samples between two computations of the tip's compliance
+
+
+class LoadInputs:
+    """The loads of `node`'s robot."""
+
+    def __init__(self, node: LifecycleNode, robot: Robot, parameters: FemSimulatorParameters):
+        self._node, self._robot = node, robot
+        self._frames = parameters.base_frame, parameters.tip_frame
+        self.payload = LivePayload(robot, parameters.external.ramp_time)
+        self._publisher = node.create_publisher(WrenchEstimate, "estimated/wrench", SENSOR)
+        self._service = node.create_service(Trigger, "~/zero_load", self._on_zero)
+        self.change(parameters)
+
+    def change(self, parameters: FemSimulatorParameters) -> None:
+        """Begin again with these parameters. Raises ConfigError for a payload that the robot cannot carry."""
+        wanted = self._robot.payload.mass if parameters.payload_mass < 0.0 else parameters.payload_mass
+        self.payload.ramp_time = parameters.external.ramp_time
+        self.payload.set(wanted)
+        self._wrenches = WrenchInput(self._robot, parameters.external, *self._frames)
+        self._observer = None if parameters.load.kind == "none" else LoadObserver(self._robot, parameters.load)
+        self._samples, self._compliance = 0, np.zeros((3, 3))
+
+    def begin(self) -> None:
+        """Subscribe, without any load."""
+        self._wrenches.reset()
+        if self._observer is not None:
+            self._observer.reset()
+        self._samples = 0
+        create = self._node.create_subscription
+        self._subscriptions = [
+            create(WrenchStamped, "external/wrench", self._on_wrench, SENSOR),
+            create(PoseStamped, "measured/tip", self._on_tip, SENSOR),
+            create(JointState, "measured/tension", self._on_tension, SENSOR),
+        ]
+
+    def end(self) -> None:
+        """Unsubscribe."""
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+
+    def destroy(self) -> None:
+        """Destroy publisher and service."""
+        self._node.destroy_publisher(self._publisher)
+        self._node.destroy_service(self._service)
+
+    def carried(self, gravity: np.ndarray, stamp: float) -> tuple[Wrench, ...]:
+        """Return what the model carries under gravity (3,) at the stamp (s), the unknown load last."""
+        found = self._wrenches.wrenches(self._now())
+        known = self.payload.wrench(gravity, stamp)
+        unknown = None if self._observer is None else self._observer.wrench(gravity, stamp)
+        return (*found, *(wrench for wrench in (known, unknown) if wrench is not None))
+
+    def observe(
+        self,
+        header: Header,
+        shape: Shape,
+        simulator: Simulator | DynamicSimulator,
+        carried: tuple[Wrench, ...],
+        wound: np.ndarray | None,
+    ) -> None:
+        """Compare a shape with what is measured, and publish the estimate."""
+        if self._observer is None or not shape.is_equilibrium:
+            return
+        stamp = _seconds(header)
+        if self._samples % _COMPLIANCE_EVERY == 0:
+            try:
+                self._compliance = simulator.tip_compliance()
+            except NotPositiveDefinite:
+                return
+        self._samples += 1
+        # Wrenches that are known are part of the model; the observer looks for what is missing.
+        unknown = self._observer.carries(carried)
+        self._observer.predict(stamp, shape, self._compliance, unknown, wound)
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(_message(header, self._observer.estimate(shape.gravity, stamp)))
+
+    def report(self, gravity: np.ndarray, stamp: float) -> tuple[str, dict[str, Any]]:
+        """Return what the user has to know, empty while all is well, and the values for /diagnostics."""
+        sentences, values = [self._wrenches.sentence], {}
+        if self._wrenches.used or self._wrenches.refused:
+            values |= {"external_wrenches": self._wrenches.used, "external_wrenches_refused": self._wrenches.refused}
+        if self.payload.mass:
+            values["payload_g"] = round(1e3 * self.payload.mass, 3)
+        if self._observer is not None:
+            estimate = self._observer.estimate(gravity, stamp)
+            sentences.append(estimate.sentence)
+            values["load_n"] = ", ".join(f"{value:.4f}" for value in estimate.force)
+        return "; ".join(sentence for sentence in sentences if sentence), values
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9
+
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        force, moment = message.wrench.force, message.wrench.torque
+        used = self._wrenches.take(
+            _seconds(message.header),
+            self._now(),
+            message.header.frame_id,
+            np.array([force.x, force.y, force.z]),
+            np.array([moment.x, moment.y, moment.z]),
+        )
+        if not used:
+            self._node.get_logger().warning(f"external/wrench refused: {self._wrenches.refusal}", throttle_duration_sec=1.0)
+
+    def _on_tip(self, message: PoseStamped) -> None:
+        p = message.pose.position
+        if self._observer is not None and message.header.frame_id == self._frames[0]:
+            self._observer.measure_tip(_seconds(message.header), np.array([p.x, p.y, p.z]))
+
+    def _on_tension(self, message: JointState) -> None:
+        if self._observer is not None:
+            self._observer.measure_tensions(_seconds(message.header), np.array(message.effort, dtype=float))
+
+    def _on_zero(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._observer is None:
+            response.message = "no unknown load is looked for: set load.kind to force or payload"
+            return response
+        self._observer.zero(self._now())
+        response.success = True
+        response.message = f"learning the errors of model and sensors for {self._observer.options.zero_time:g} s without load"
+        return response
+
+
+def _seconds(header: Header) -> float:
+    return Time.from_msg(header.stamp).nanoseconds * 1e-9
+
+
+def _message(header: Header, estimate: LoadEstimate) -> WrenchEstimate:
+    message = WrenchEstimate(header=header, zeroed=estimate.zeroed, sources=list(estimate.sources), message=estimate.sentence)
+    force = message.wrench.force
+    force.x, force.y, force.z = map(float, estimate.force)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = estimate.covariance
+    message.covariance = doubles(covariance.ravel())
+    message.mass, message.mass_std = float(estimate.mass), float(estimate.mass_std)
+    return message

@@ -1,0 +1,210 @@
+"""Contact of the model with a scene: accuracy against closed forms, penetration, energy, and the time of a step."""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gravcomp.config import from_mapping
+from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
+from gravcomp.full_model.shape import Shape
+from gravcomp.full_model.wrench import Wrench
+from gravcomp.inverse import InverseController, straight_target
+from gravcomp.references.contact_beams import buckled_in_tube, laid_on_plane, over_peg, pressed_on_plane
+from gravcomp.scene import SceneSection
+from gravcomp.scene.scene import Scene
+from gravcomp.simulation import RobotModel, Simulator
+
+Progress = Callable[[str], None]
+
+_GRAVITY = 9.81
+_SCENES, _STEPS = 200, 20  # seeded scenes, and steps of motion in each
+_TURN, _INTERVAL = np.deg2rad(2.0), 0.01  # of gravity in a step, rad; s
+# A rod so slender that Euler-Bernoulli's beam is exact enough: 200 mm long, 4 mm thick.
+_LENGTH, _DIAMETER, _MODULUS, _DENSITY = 0.2, 4e-3, 2e6, 1100.0
+_SMALL = 0.01  # deflection of the closed forms, of the length
+
+
+def run(progress: Progress, *, every: int = 1) -> dict:
+    """Return all figures, with every `every`-th of the scenes; see the functions below."""
+    return {**accuracy(progress), **motion(progress, every), **step_time(progress)}
+
+
+def scene_of(**kinds: Any) -> Scene:
+    """Return a scene of the obstacles that a section `scene` would have."""
+    return Scene(from_mapping(SceneSection, kinds, source="scene", key="scene"))
+
+
+def slender_rod() -> Robot:
+    """Return the rod of the closed forms."""
+    material = Material(law="svk", youngs_modulus=_MODULUS, poissons_ratio=0.3, density=_DENSITY)
+    segment = Segment(name="rod", length=_LENGTH, outer_diameter=_DIAMETER, material=material)
+    return Robot("slender rod", segments=(segment,), elements=Elements(around=8, along=24))
+
+
+def accuracy(progress: Progress) -> dict:
+    """Return `contact_by_case_pct`: errors of force and tip against the closed forms, and their largest, `contact_error_pct`.
+
+    Errors of the force are shares of it, those of the tip of the length.
+    """
+    model = RobotModel(slender_rod())
+    stiffness = _MODULUS * np.pi * _DIAMETER**4 / 64
+    line = _DENSITY * np.pi / 4 * _DIAMETER**2  # kg/m
+    weight = 8.0 * stiffness * 2.0 * _SMALL / _LENGTH**3  # N/m, sags freely by twice the small deflection
+    gravity = np.array([-weight / line, 0.0, 0.0])
+    gap, below = _SMALL * _LENGTH, -0.5 * _DIAMETER - _SMALL * _LENGTH
+    errors = {}
+    progress("closed forms")
+    plane = scene_of(planes=[{"normal": [1, 0, 0], "point_mm": [1e3 * below, 0, 0]}])
+    shape = Simulator(model, reduced=False, scene=plane).solve(gravity)
+    errors["pressed on a plane"] = _errors(shape, *pressed_on_plane(weight, _LENGTH, stiffness, gap))
+    place, radius = 0.6 * _LENGTH, 1e-3
+    half = 0.25 * gap  # the peg holds it there
+    low = 1e3 * (-0.5 * _DIAMETER - half - radius)
+    peg = {"points_mm": [[low, -50, 1e3 * place], [low, 50, 1e3 * place]], "radius_mm": [1e3 * radius], "side": "outside"}
+    shape = Simulator(model, reduced=False, scene=scene_of(tubes=[peg])).solve(gravity)
+    errors["over a peg"] = _errors(shape, *over_peg(weight, _LENGTH, stiffness, half, place))
+    near = 0.05 * gap
+    plane = scene_of(planes=[{"normal": [1, 0, 0], "point_mm": [1e3 * (-0.5 * _DIAMETER - near), 0, 0]}])
+    shape = Simulator(model, reduced=False, scene=plane).solve(3.0 * gravity)
+    force, place = laid_on_plane(3.0 * weight, stiffness, near)
+    # The plane bears the rest of the weight beyond the place where the rod comes down.
+    errors["laid on a plane"] = _errors(shape, force + 3.0 * weight * (_LENGTH - place), near)
+    clearance = 0.5 * gap
+    tube = {"points_mm": [[0, 0, -10], [0, 0, 1e3 * _LENGTH + 50]], "radius_mm": [1e3 * (0.5 * _DIAMETER + clearance)]}
+    simulator = Simulator(model, reduced=False, scene=scene_of(tubes=[tube]))
+    load = 2.0 * np.pi**2 * stiffness / (4.0 * _LENGTH**2)
+    # Its weight lays it on the tube, and the load, beyond the one at which it buckles freely, presses it on.
+    shape = simulator.solve(gravity, wrench=Wrench(force=np.array([0.0, 0.0, -load])))
+    errors["buckled in a tube"] = _errors(shape, *buckled_in_tube(weight, load, _LENGTH, stiffness, clearance))
+    worst = max(max(pair.values()) for pair in errors.values())
+    return {"contact_error_pct": worst, "contact_by_case_pct": errors}
+
+
+def _errors(shape: Shape, force: float, deflection: float) -> dict[str, float]:
+    if not shape.is_equilibrium:
+        return {"force": np.inf, "tip": np.inf}
+    found = float(np.linalg.norm(shape.contacts.force[:, :2].sum(axis=0)))
+    lateral = float(np.linalg.norm(shape.tip_position[:2]))
+    return {
+        "force": round(100.0 * abs(found - force) / force, 4),
+        "tip": round(100.0 * abs(lateral - deflection) / _LENGTH, 4),
+    }
+
+
+def motion(progress: Progress, every: int = 1) -> dict:
+    """Return figures of seeded scenes in which gravity turns, there and back.
+
+    `penetration_mm`: deepest place of the surface in a rigid wall; `contact_energy`: work that contact gives to the robot over
+    the closed path, as a share of the work of the weight on it, taken without sign; `contact_scenes`: scenes that touched;
+    `lost_steps`: share of the steps without an equilibrium.
+    """
+    robot = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=6, along=10))
+    model = RobotModel(robot)
+    deepest, gained, touched, lost, steps = 0.0, 0.0, 0, 0, 0
+    for seed in range(0, _SCENES, every):
+        progress(f"scene {seed + 1} of {_SCENES}")
+        simulator, start = Simulator(model, reduced=False, scene=random_scene(seed, robot)), seeded_gravity(seed)
+        axis = np.random.default_rng(seed).standard_normal(3)
+        axis /= np.linalg.norm(axis)
+        angles = _TURN * np.concatenate([np.arange(_STEPS // 2), np.arange(_STEPS // 2 - 2, -1, -1)])
+        before, moved = simulator.solve(start), simulator.displacements.copy()
+        net = whole = 0.0
+        for angle in angles:
+            gravity = _turned(start, axis, angle)
+            shape = simulator.step(gravity)
+            steps += 1
+            lost += not shape.is_equilibrium
+            if shape.is_equilibrium and len(shape.contacts):
+                touched_at = simulator.solver.contact
+                assert touched_at is not None
+                deepest = max(deepest, touched_at.depth(simulator.displacements))
+                net += _work(before, shape)
+            whole += abs(float(model.nodal_weight @ (simulator.displacements - moved) @ gravity))
+            before, moved = shape, simulator.displacements.copy()
+        touched += bool(len(before.contacts))
+        gained = max(gained, net / whole) if whole else gained
+    return {
+        "penetration_mm": 1e3 * deepest, "contact_energy": gained, "contact_scenes": touched, "lost_steps": lost / max(steps, 1),
+    }  # fmt: skip
+
+
+def random_scene(seed: int, robot: Robot) -> Scene:
+    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some with friction."""
+    rng = np.random.default_rng(seed)
+    length, radius = 1e3 * robot.length, 0.5e3 * robot.segments[0].outer_diameter
+    place, deep = rng.uniform(0.5, 1.0) * length, rng.uniform(0.03, 0.15) * length
+    friction = float(rng.choice([0.0, 0.3]))
+    angle = rng.uniform(-0.3, 0.3)
+    down = np.array([-np.cos(angle), np.sin(angle), 0.0])
+    common = {"friction": friction}
+    size = rng.uniform(0.5, 2.0) * radius
+    middle = (down * (radius + deep + size) + [0.0, 0.0, place]).tolist()
+    kind = seed % 5
+    if kind == 0:
+        return scene_of(planes=[common | {"normal": (-down).tolist(), "point_mm": (down * (radius + deep)).tolist()}])
+    if kind == 1:
+        return scene_of(spheres=[common | {"centre_mm": middle, "radius_mm": size}])
+    across = np.cross(down, [0.0, 0.0, 1.0]) * length
+    if kind == 2:
+        ends = [(np.array(middle) - across).tolist(), (np.array(middle) + across).tolist()]
+        return scene_of(tubes=[common | {"points_mm": ends, "radius_mm": [size], "side": "outside"}])
+    if kind == 3:
+        box = {"centre_mm": middle, "size_mm": [2 * size] * 3, "rpy_deg": [0.0, 0.0, float(np.degrees(-angle))]}
+        return scene_of(boxes=[common | box])
+    bend = rng.uniform(-0.2, 0.2, 2) * length
+    line = [[0, 0, -length / 5], [0, 0, length / 3], [bend[0] / 2, bend[1] / 2, length], [bend[0], bend[1], 1.5 * length]]
+    return scene_of(tubes=[common | {"points_mm": line, "radius_mm": [radius + deep / 2]}])
+
+
+def seeded_gravity(seed: int) -> np.ndarray:
+    """Return gravity (3,) in m/s^2 for a robot that lies nearly horizontal."""
+    tilt = np.random.default_rng(1000 + seed).uniform(-0.3, 0.3)
+    return _GRAVITY * np.array([-np.cos(tilt), 0.0, np.sin(tilt)])
+
+
+def _turned(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
+    along = axis * (axis @ vector)
+    return along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector)
+
+
+def _work(before: Shape, shape: Shape) -> float:
+    """Work of the contact forces in J in a step, on the backbone where they act."""
+    c = shape.contacts
+    station = shape.backbone_station
+    moved = shape.backbone_position - before.backbone_position
+    at = np.column_stack([np.interp(c.station, station, moved[:, i]) for i in range(3)])
+    return float((c.force * at).sum())
+
+
+def step_time(progress: Progress) -> dict:
+    """Return `contact_step_ms`: a closed-loop step of the reduced model with the inverse problem in contact, median.
+
+    `contact_full_step_ms`: the same of the full model; `contact_places`: median number of places; `contact_reduced_share`: share
+    of the steps for which the reduced model was used.
+    """
+    progress("time of a step")
+    file = load_robot_file("article")
+    wall = scene_of(planes=[{"normal": [1, 0, 0], "point_mm": [-6.5, 0, 0]}])
+    figures: dict[str, Any] = {}
+    for key, reduced in (("contact_step_ms", True), ("contact_full_step_ms", False)):
+        simulator, controller = Simulator(file.robot, reduced=reduced, scene=wall), InverseController(file.robot)
+        target, shape = straight_target(simulator.model.length), simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
+        times, places, used = [], [], 0
+        for step in range(120):
+            angle = 0.3 * np.sin(0.02 * step)
+            gravity = _GRAVITY * np.array([-np.cos(angle), np.sin(angle), 0.0])
+            started = time.process_time()
+            shape = simulator.step(gravity, None)
+            controller.step(
+                shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=_INTERVAL
+            )
+            times.append(time.process_time() - started)
+            places.append(len(shape.contacts))
+            used += shape.model == "reduced"
+        figures[key] = 1e3 * float(np.median(times[20:]))
+        if reduced:
+            figures |= {"contact_places": float(np.median(places)), "contact_reduced_share": used / len(times)}
+    return figures

@@ -1,0 +1,168 @@
+"""A calibration on a running robot, pose by pose: what to do, whether it is done, and the samples of each rest.
+
+    turn    the base is turned by hand until gravity is as planned and steady
+    pull    the cables move to the planned displacements, within their limits
+    rest    the robot is given its time; the samples since the turn ended are kept
+    done    all poses are measured
+
+Each finished pose is appended to a CSV file in the form of `files`. A session that finds such a file goes on after its last pose.
+After a pause the course begins again: a new trial, whose robot counts as relaxed.
+"""
+
+import csv
+import enum
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gravcomp.calibration.files import csv_header, csv_row
+from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.plan import Plan, PlannedPose
+from gravcomp.calibration.plan_table import instruction
+from gravcomp.config import parameter
+from gravcomp.description import Robot
+from gravcomp.inverse.limits import within_limits
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """When a pose counts as reached."""
+
+    turned: float = parameter(8.0, edge="deg", minimum=0.5, maximum=45.0, description="farthest from the planned gravity")
+    steady: float = parameter(0.5, edge="deg", minimum=0.01, maximum=10.0, description="largest turn of a base held still")
+    hold: float = parameter(1.0, unit="s", minimum=0.1, maximum=30.0, description="time for which it has to be still")
+
+
+class Phase(enum.StrEnum):
+    """What a session waits for."""
+
+    TURN = "turn"
+    PULL = "pull"
+    REST = "rest"
+    DONE = "done"
+
+
+class LiveSession:
+    """One calibration. Times in s of any clock that does not jump; all else in SI and soft_base."""
+
+    def __init__(self, robot: Robot, plan: Plan, path: Path, options: LiveOptions | None = None):
+        """Begin, or go on with the file at `path`. Raises MeasurementError for a file of another robot or plan."""
+        self._robot, self._plan, self._path, self._options = robot, plan, path, options or LiveOptions()
+        self._pose, self._trial = self._progress()
+        self.phase = Phase.TURN if self._pose < len(plan.poses) else Phase.DONE
+        self._gravities: list[tuple[float, np.ndarray]] = []
+        self._rows: list[list] = []
+        self._command: np.ndarray | None = None
+        self._since = math.nan
+        self._commanded_at = math.nan
+
+    @property
+    def pose(self) -> PlannedPose | None:
+        """The pose that is being measured; None when all are."""
+        return self._plan.poses[self._pose] if self._pose < len(self._plan.poses) else None
+
+    @property
+    def finished(self) -> int:
+        """Number of poses that are measured."""
+        return self._pose
+
+    def sentence(self) -> str:
+        """Return what to do, or what is happening."""
+        pose = self.pose
+        if pose is None:
+            return f"all {len(self._plan.poses)} poses are measured: {self._path}"
+        place = f"pose {self._pose + 1} of {len(self._plan.poses)}"
+        if self.phase == Phase.TURN:
+            away = "" if not self._gravities else f", about {5 * round(self._degrees_away() / 5)} deg away"
+            return f"{place}: hold the base with its {instruction(pose)}{away}"
+        if self.phase == Phase.PULL:
+            return f"{place}: hold still, the cables move"
+        return f"{place}: hold still, measuring"
+
+    def on_gravity(self, time: float, gravity: np.ndarray) -> None:
+        """Take gravity (3,). A base that leaves the pose begins it again."""
+        self._gravities = [(t, g) for t, g in self._gravities if t >= time - self._options.hold] + [(time, gravity)]
+        if self.phase == Phase.DONE:
+            return
+        reached = self._away(gravity) <= self._options.turned
+        if self.phase == Phase.TURN:
+            whole = self._gravities[-1][0] - self._gravities[0][0] >= 0.9 * self._options.hold
+            if reached and whole and self._spread() <= self._options.steady:
+                self.phase, self._since = Phase.PULL, time
+        elif not reached:
+            self.phase, self._rows = Phase.TURN, []
+
+    def command(self, time: float, present: np.ndarray) -> np.ndarray | None:
+        """Return the displacements (m,) to send now, from the `present` ones on; None: send nothing."""
+        pose = self.pose
+        if pose is None:
+            return None
+        if self._command is None:
+            self._command, self._commanded_at = present.copy(), time
+        interval = min(max(time - self._commanded_at, 0.0), 0.1)
+        self._commanded_at = time
+        wanted = self._command if self.phase == Phase.TURN else pose.displacement
+        self._command = within_limits(wanted, self._command, self._robot.limits, interval)
+        if self.phase == Phase.PULL and np.abs(self._command - pose.displacement).max(initial=0.0) < 1e-9:
+            self.phase, self._since = Phase.REST, time
+        return self._command
+
+    def on_tip(self, time: float, position: np.ndarray, direction: np.ndarray) -> None:
+        """Take a measured tip; at the end of its time the pose is written, and the next one begins. Raises MeasurementError."""
+        if self.phase not in (Phase.PULL, Phase.REST) or self._command is None or not self._gravities:
+            return
+        gravity = self._gravities[-1][1]
+        self._rows.append(csv_row(self._trial, time, gravity, self._command, position, direction))
+        if self.phase == Phase.REST and time - self._since >= self._plan.rest:
+            self._finish()
+
+    def _finish(self) -> None:
+        fresh = not self._path.exists()
+        try:
+            with self._path.open("a", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                if fresh:
+                    writer.writerow(["pose", *csv_header(self._robot.cable_names, directed=True)])
+                writer.writerows([self._pose + 1, *row] for row in self._rows)
+        except OSError as error:
+            raise MeasurementError(f"{self._path}: cannot be written: {error.strerror}") from error
+        self._pose, self._rows, self._since = self._pose + 1, [], math.nan
+        pose, last = self.pose, self._plan.poses[self._pose - 1]
+        if pose is None:
+            self.phase = Phase.DONE
+        else:
+            self.phase = Phase.PULL if pose.station == last.station else Phase.TURN
+
+    def _progress(self) -> tuple[int, int]:
+        """Return the number of poses in the file, and the number of the next trial."""
+        if not self._path.exists():
+            return 0, 0
+        with self._path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            header, rows = reader.fieldnames or [], list(reader)
+        needed = ["pose", *csv_header(self._robot.cable_names, directed=True)]
+        try:
+            done = max((int(row["pose"]) for row in rows), default=0) if header == needed else -1
+            trial = max((int(row["trial"]) for row in rows), default=-1) + 1 if header == needed else 0
+        except (KeyError, TypeError, ValueError):
+            done, trial = -1, 0
+        if not 0 <= done <= len(self._plan.poses):
+            raise MeasurementError(f"{self._path}: is not of this robot and plan; name another file to begin again")
+        return done, trial
+
+    def _away(self, gravity: np.ndarray) -> float:
+        """Return the angle in rad between gravity and the planned one."""
+        pose = self.pose
+        assert pose is not None
+        one, other = gravity / np.linalg.norm(gravity), pose.gravity / np.linalg.norm(pose.gravity)
+        return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+
+    def _degrees_away(self) -> float:
+        return math.degrees(self._away(self._gravities[-1][1]))
+
+    def _spread(self) -> float:
+        """Return by how much gravity turned within the time of `hold`, in rad."""
+        units = np.array([g / np.linalg.norm(g) for _, g in self._gravities])
+        return float(np.arccos(np.clip(units @ units[-1], -1.0, 1.0)).max())

@@ -1,0 +1,265 @@
+"""The plan of a calibration: the poses that tell most about the robot, in the time that it may take.
+
+Candidates are orientations of the base with the cables released, or with one cable under a tension that the limits allow. The
+model gives the derivatives J_k of the tip by all unknowns of the fit (`unknowns`). Poses are chosen one by one so that they add
+most to
+
+    log det (P + sum_k J_k^T W J_k)
+
+for the time that they take (a turn of the base takes longer than a pull), with the prior P and the noise W of `fit`. This greedy
+choice is D-optimal up to a constant factor, because the determinant's logarithm is submodular (Nemhauser, Wolsey and Fisher,
+Math. Programming 14, 1978; for designs: Pukelsheim, Optimal Design of Experiments, 1993).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gravcomp.calibration.fit import TipNoise, starting_parameters
+from gravcomp.calibration.measured import StillWindows
+from gravcomp.calibration.statics import StaticPredictor
+from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
+from gravcomp.config import ConfigError, parameter
+from gravcomp.description import Robot
+from gravcomp.description.transmission import Transmission
+from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.simulation import Shape, Simulator
+from gravcomp.standard_gravity import STANDARD_GRAVITY
+
+_LEVELS = (0.35, 1.0)  # of the largest tension that is used: two are needed to distinguish an offset from a stretch
+_MEAN_TURN = math.radians(80.0)  # of the base from station to station
+_FARTHER = 1.5  # than the linear model expects, a tip may turn
+_LEAST_REST = 0.3  # of the longest time that a pose may take
+_WIDEST = 0.5  # deviation of the logarithm of all moduli together before the measurement
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """How long a calibration takes, and how far it bends the robot."""
+
+    budget: float = parameter(180.0, unit="s", minimum=10.0, maximum=3600.0, description="robot time of all poses together")
+    periods: float = parameter(14.0, minimum=2.0, maximum=200.0, description="first periods of the robot at rest in each pose")
+    fewest: int = parameter(12, minimum=3, maximum=200, description="poses for whose sake the time at rest is shortened")
+    most: int = parameter(26, minimum=3, maximum=500, description="poses beyond which the time at rest is lengthened instead")
+    rate: float = parameter(40.0, edge="deg", minimum=1.0, maximum=360.0, description="speed of the base's turns, deg/s")
+    bend: float = parameter(35.0, edge="deg", minimum=1.0, maximum=180.0, description="largest turn of the tip by a cable")
+    slack: float = parameter(
+        0.05, minimum=1e-3, maximum=1.0, description="of a released cable beyond its path, over the robot's length"
+    )
+    tension: float = parameter(0.7, minimum=0.01, maximum=1.0, description="largest tension, over the limit")
+
+
+@dataclass(frozen=True)
+class PlannedPose:
+    """One pose: the base at inclination and roll in rad (`virtual.motion`), the cables at `displacement` (m,) in m.
+
+    pulled: names of the cables that are to be taut; tension (m,) in N and tip (3,) in m: as the model expects them.
+    """
+
+    inclination: float
+    roll: float
+    displacement: np.ndarray
+    pulled: tuple[str, ...]
+    tension: np.ndarray
+    tip: np.ndarray
+
+    @property
+    def station(self) -> tuple[float, float]:
+        """Inclination and roll, by which poses with the same orientation of the base are known."""
+        return self.inclination, self.roll
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """Gravity (3,) in m/s^2 in soft_base."""
+        return gravity_of(self.inclination, self.roll)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Poses in the order in which they are measured.
+
+    times: for which each is held in s, with the move of the cables; rate: of the base's turns in rad/s; rest: time at rest in s.
+    """
+
+    poses: tuple[PlannedPose, ...]
+    times: tuple[float, ...]
+    rest: float
+    rate: float
+
+    @property
+    def duration(self) -> float:
+        """Robot time in s, with the turns of the base."""
+        return sum(self.times) + sum(turn_time(a, b, self.rate) for a, b in zip(self.poses, self.poses[1:]))
+
+
+def turn_time(one: PlannedPose, other: PlannedPose, rate: float) -> float:
+    """Return the time in s of the turn of the base between two poses at `rate` rad/s."""
+    from scipy.spatial.transform import Rotation
+
+    a, b = (Rotation.from_euler("yz", [-pose.inclination, pose.roll]) for pose in (one, other))
+    return float((a.inv() * b).magnitude()) / rate
+
+
+def creep_times(rest: float) -> tuple[float, ...]:
+    """Return the times in s of the branches of creep that rests of `rest` s show: below them, and beyond."""
+    return 0.3 * rest, 3.0 * rest
+
+
+def gravity_of(inclination: float, roll: float) -> np.ndarray:
+    """Return gravity (3,) in m/s^2 in soft_base for an inclination of the robot's axis and a roll about it, in rad."""
+    c, s = math.cos(inclination), math.sin(inclination)
+    return -STANDARD_GRAVITY * np.array([c * math.cos(roll), -c * math.sin(roll), s])
+
+
+ORIENTATIONS = tuple(
+    (math.radians(inclination), math.radians(roll))
+    for inclination, rolls in ((0.0, range(0, 360, 60)), (45.0, range(30, 360, 120)), (-45.0, range(90, 450, 120)))
+    for roll in rolls
+)
+"""Inclination and roll of the candidates in rad."""
+
+
+def make_plan(
+    robot: Robot,
+    period: float,
+    transmission: Transmission | None = None,
+    options: PlanOptions | None = None,
+    priors: Priors | None = None,
+    noise: TipNoise | None = None,
+    progress: Callable[[str], None] = lambda sentence: None,
+) -> Plan:
+    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose."""
+    options, priors, noise = options or PlanOptions(), priors or Priors(), noise or TipNoise()
+    robot = with_coarse_elements(robot)
+    candidates = _candidates(robot, transmission, options, progress)
+    if not candidates:
+        raise ConfigError(
+            f"robot '{robot.name}': in none of {len(ORIENTATIONS)} orientations has the released robot an equilibrium within"
+            " the limits of its cables; no calibration can be planned"
+        )
+    windows = StillWindows(
+        np.array([pose.gravity for pose in candidates]),
+        np.array([pose.displacement for pose in candidates]),
+        np.zeros((len(candidates), 3)),
+        np.tile([0.0, 0.0, 1.0], (len(candidates), 1)),
+    )
+    predictor = StaticPredictor(robot, windows)
+    initial = starting_parameters(robot, ())
+    unknowns = unknowns_of(robot, predictor.predict(initial), initial, None, priors)
+    progress(f"planning: sensitivities of {len(candidates)} poses")
+    derivatives = predictor.differentiate(initial, {unknown.kind for unknown in unknowns})
+    scale = 1.0 / np.repeat([noise.position_share * robot.length, noise.direction], 3)
+    rows = np.stack([unknown.derivative(derivatives) for unknown in unknowns], axis=2) * scale[:, None]
+    prior = np.vstack([prior_rows(unknowns, priors), [(u.kind == "modulus") / _WIDEST for u in unknowns]])
+    longest = options.budget / options.fewest
+    held = float(np.clip(options.periods * period, options.budget / options.most, longest))
+    pull = _pull_time(candidates, robot)
+    rest = max(held - pull, _LEAST_REST * longest)
+    chosen = _chosen(candidates, rows, prior, rest, robot, options)
+    poses = _ordered([candidates[k] for k in chosen])
+    if not poses:
+        raise ConfigError(
+            f"robot '{robot.name}': no pose of {rest + pull:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
+        )
+    free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
+    poses.append(free)  # let go at the end, it swings: the damping
+    return Plan(tuple(poses), (rest + pull,) * len(poses), rest, options.rate)
+
+
+def _candidates(
+    robot: Robot, transmission: Transmission | None, options: PlanOptions, progress: Callable[[str], None]
+) -> list[PlannedPose]:
+    """Return the poses that the limits allow, from the model's equilibria."""
+    simulator, found = Simulator(robot, reduced=False), []
+    count = len(robot.cables)
+    slack = options.slack * robot.length
+    for number, (inclination, roll) in enumerate(ORIENTATIONS):
+        progress(f"planning: orientation {number + 1} of {len(ORIENTATIONS)}")
+        gravity = gravity_of(inclination, roll)
+        free = simulator.solve(gravity)
+        if not free.is_equilibrium:
+            continue
+        found.append(_pose(robot, inclination, roll, free, np.zeros(count), slack, transmission))
+        turns = np.linalg.norm(free.response.compliance_ea[3:6], axis=0)
+        largest = np.minimum(options.tension * robot.limits.tension_max, options.bend / np.maximum(turns, 1e-12))
+        for one in np.eye(count):
+            for level in _LEVELS:
+                tension = level * largest * one
+                shape = simulator.solve(gravity, tension=tension)
+                if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
+                    found.append(_pose(robot, inclination, roll, shape, tension, slack, transmission))
+    return [pose for pose in found if pose.displacement.max(initial=0.0) <= robot.limits.displacement_max]
+
+
+def _turned(shape: Shape, free: Shape) -> float:
+    """Return the angle in rad between the tips of two shapes."""
+    return float(np.arccos(np.clip(shape.tip_direction @ free.tip_direction, -1.0, 1.0)))
+
+
+def _pose(
+    robot: Robot,
+    inclination: float,
+    roll: float,
+    shape: Shape,
+    tension: np.ndarray,
+    slack: float,
+    transmission: Transmission | None,
+) -> PlannedPose:
+    released = np.maximum(shape.cable_displacement - slack, robot.limits.displacement_min)
+    displacement = np.where(tension > 0.0, shape.cable_displacement, released)
+    if transmission is not None:
+        displacement = transmission.possible(displacement, tension)
+    pulled = tuple(cable.name for cable, force in zip(robot.cables, tension) if force > 0.0)
+    return PlannedPose(inclination, roll, displacement, pulled, tension, shape.tip_position)
+
+
+def _chosen(
+    candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, rest: float, robot: Robot, options: PlanOptions
+) -> list[int]:
+    """Return the chosen candidates. rows (k, 6, u): derivatives over the noise."""
+    information = prior.T @ prior
+    chosen: list[int] = []
+    held = rest + _pull_time(candidates, robot)
+    turn = _MEAN_TURN / options.rate
+    spent, stations = held, set()  # the last pose, released
+    while True:
+        factor = np.linalg.inv(information)
+        gain = np.linalg.slogdet(np.eye(6) + np.einsum("kiu,uv,kjv->kij", rows, factor, rows))[1]
+        # At each station the released robot is measured as well: no error of a cable disturbs it.
+        cost = np.array([held + (0.0 if pose.station in stations else turn + held * bool(pose.pulled)) for pose in candidates])
+        gain = gain / cost
+        gain[chosen] = -np.inf
+        gain[spent + cost > options.budget] = -np.inf
+        best = int(np.argmax(gain))
+        if not gain[best] > 0.0:
+            return chosen
+        spent += float(cost[best])
+        new = [best]
+        if candidates[best].station not in stations and candidates[best].pulled:
+            station = candidates[best].station
+            new.append(next(k for k, pose in enumerate(candidates) if pose.station == station and not pose.pulled))
+        for k in new:
+            information = information + rows[k].T @ rows[k]
+        chosen += new
+        stations.add(candidates[best].station)
+
+
+def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:
+    """Return the time in s of the largest move of the cables."""
+    moves = np.ptp(np.array([pose.displacement for pose in candidates]), axis=0).max(initial=0.0)
+    return float(moves / robot.limits.displacement_rate)
+
+
+def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
+    """Return the poses station by station, each next to the one before; released first, then cable by cable."""
+    left, ordered = list(poses), []
+    here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
+    while left:
+        station = [pose for pose in left if pose.station == here.station]
+        ordered += sorted(station, key=lambda pose: (pose.pulled, float(pose.tension.sum())))
+        left = [pose for pose in left if not any(pose is one for one in station)]
+        if left:
+            here = max(left, key=lambda pose: float(pose.gravity @ ordered[-1].gravity))
+    return ordered

@@ -1,0 +1,155 @@
+"""Kalman filter of a load and of the errors that look like one.
+
+The state is x = (load, s_E, s_w, b_e, b_lambda, b_u): the load in k numbers that give the force D x, the relative errors of
+compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (friction, zeros of the
+sensors) and in the cables' displacements (backlash, stretch). All of it walks at random (Kalman 1960). As a load makes cables
+slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+
+The errors are learnt while the robot is known to carry nothing. Afterwards they only count in the variances (Schmidt 1966): a
+load that comes must not be taken for an error, nor the robot's lag behind the model.
+"""
+
+import copy
+from collections.abc import Callable
+
+import numpy as np
+
+from gravcomp.description import Limits
+from gravcomp.load_estimation.options import LoadEstimationOptions
+from gravcomp.load_estimation.sensitivity import HeldRobot, Sensitivity
+
+_ITERATIONS = 6
+_SAME = 1e-3  # of the standard deviation of the load: a change that ends the iteration
+
+
+class LoadFilter:
+    """State and covariance; m cables, k numbers of the load."""
+
+    def __init__(self, options: LoadEstimationOptions, limits: Limits, cables: int, numbers: int, sag: float):
+        """limits: of the cables; sag in m: by which the tip hangs without them."""
+        self._options, self._k, self._m = options, numbers, cables
+        size = numbers + 5 + 2 * cables
+        self.state = np.zeros(size)
+        self.learning = True  # of the errors
+        tip, offset = options.drift * sag + options.tip_std, options.tension_offset * limits.tension_max
+        self._displacement = options.displacement_error * limits.displacement_max
+        deviations = [*[0.0] * numbers, options.stiffness_error, options.weight_error, *[tip] * 3, *[offset] * cables]
+        deviations += [self._displacement] * cables
+        self.covariance = np.diag(np.square(deviations))
+        self._sag, self._floor = sag, options.tension_floor * limits.tension_max
+        self._largest = limits.tension_max
+
+    @property
+    def load(self) -> np.ndarray:
+        """The load (k,)."""
+        return self.state[: self._k]
+
+    @property
+    def load_covariance(self) -> np.ndarray:
+        """Covariance (k, k) of the load."""
+        return self.covariance[: self._k, : self._k]
+
+    def free_load(self, deviation: float) -> None:
+        """Let the load be anything of this standard deviation; what is known of the errors stays."""
+        self.state[: self._k] = 0.0
+        self.covariance[: self._k] = 0.0
+        self.covariance[:, : self._k] = 0.0
+        self.covariance[: self._k, : self._k] = deviation**2 * np.eye(self._k)
+
+    def open_load(self, deviation: float) -> None:
+        """Let the load be farther from what it was, by this standard deviation."""
+        self.covariance[: self._k, : self._k] += deviation**2 * np.eye(self._k)
+
+    def copy(self) -> "LoadFilter":
+        """Return a filter in the same state; the steps of one do not change the other."""
+        other = copy.copy(self)
+        other.state, other.covariance = self.state.copy(), self.covariance.copy()
+        return other
+
+    def diffuse(self, elapsed: float, load_rate: float, tension_change: np.ndarray) -> None:
+        """Let what walks walk, for `elapsed` s.
+
+        load_rate: standard deviation of the load in 1 s; tension_change (m,) N: since the last call.
+        """
+        k, m = self._k, self._m
+        step = np.zeros(len(self.state))
+        step[:k] = load_rate**2 * elapsed
+        step[k + 2 : k + 5] = (self._options.drift * self._sag) ** 2 * elapsed
+        step[k + 5 : k + 5 + m] = (self._options.cable_friction * tension_change) ** 2
+        step[k + 5 + m :] = self._displacement**2 * np.minimum(1.0, np.abs(tension_change) / self._largest)
+        self.covariance[np.diag_indices(len(step))] += step
+
+    def take_tip(
+        self, residual: np.ndarray, robot: HeldRobot, direction: np.ndarray, carried: np.ndarray, moved: np.ndarray
+    ) -> float:
+        """Take a measured tip and return the squared Mahalanobis distance from what was expected.
+
+        residual (3,) m: against the model, which carries the force (3,) N; direction D (3, k); moved (3,) m: of the model while
+        the robot may be behind it.
+        """
+        k, noise = self._k, self._options.tip_std**2 * np.eye(3) + np.outer(moved, moved)
+
+        def seen(at: Sensitivity) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            rows = np.zeros((3, len(self.state)))
+            rows[:, :k] = at.tip_force @ direction
+            rows[:, k] = rows[:, k + 1] = at.tip_error
+            rows[:, k + 2 : k + 5] = np.eye(3)
+            rows[:, k + 5 + self._m :] = at.tip_cables
+            return residual, at.tip, rows, noise
+
+        return self._take(seen, robot, direction, carried)
+
+    def take_tensions(
+        self,
+        residual: np.ndarray,
+        robot: HeldRobot,
+        direction: np.ndarray,
+        carried: np.ndarray,
+        moved: np.ndarray,
+        tension: np.ndarray,
+    ) -> float:
+        """Take measured tensions (m,) N, as `take_tip`; cables that should be slack are left out."""
+        k, m = self._k, self._m
+        noise = np.diag((self._options.tension_noise * tension) ** 2 + self._floor**2) + np.outer(moved, moved)
+
+        def seen(at: Sensitivity) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+            rows = np.zeros((m, len(self.state)))
+            rows[:, :k] = at.tension_force @ direction
+            rows[:, k], rows[:, k + 1] = at.tension_stiffness, at.tension_weight
+            rows[:, k + 5 : k + 5 + m] = np.eye(m)
+            rows[:, k + 5 + m :] = at.tension_cables
+            return residual[at.taut], at.tension[at.taut], rows[at.taut], noise[np.ix_(at.taut, at.taut)]
+
+        return self._take(seen, robot, direction, carried)
+
+    def _take(
+        self,
+        seen: Callable[[Sensitivity], tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
+        robot: HeldRobot,
+        direction: np.ndarray,
+        carried: np.ndarray,
+    ) -> float:
+        """Take a measurement: residual, what the load changes of it, derivatives by the state, noise; all of the taut cables."""
+        k, start = self._k, self.state
+        state, distance = start, 0.0
+        deviation = np.sqrt(np.diag(self.load_covariance))
+        for iteration in range(_ITERATIONS):
+            residual, changed, rows, noise = seen(robot.under(direction @ state[:k] - carried))
+            if not len(residual):
+                return 0.0
+            errors = rows.copy()
+            errors[:, :k] = 0.0
+            innovation = residual - changed - errors @ state - rows @ (start - state)
+            spread = rows @ self.covariance @ rows.T + noise
+            if iteration == 0:
+                distance = float(innovation @ np.linalg.solve(spread, innovation))
+            gain = np.linalg.solve(spread, rows @ self.covariance).T
+            if not self.learning:
+                gain[k:] = 0.0
+            last, state = state, start + gain @ innovation
+            if (np.abs(state[:k] - last[:k]) <= _SAME * deviation).all():
+                break
+        self.state = state
+        kept = np.eye(len(state)) - gain @ rows
+        self.covariance = kept @ self.covariance @ kept.T + gain @ noise @ gain.T
+        return distance

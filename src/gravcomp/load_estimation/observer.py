@@ -1,0 +1,245 @@
+"""The observer: compares tips and tensions with the model that carries the load estimated so far, and improves the estimate.
+
+    observer.predict(stamp, shape, tip_compliance, carried, wound)   # each shape of the model, and the force that it carries
+    observer.zero(now)                                        # the robot carries nothing now: what differs is the model's error
+    observer.measure_tip(stamp, position), observer.measure_tensions(stamp, tensions)
+    observer.wrench(gravity, now)                             # for the next step of the model
+    observer.estimate(gravity, now)
+
+The model that carries the estimate is nearly that of the robot: the residuals are linear in what the estimate lacks, also where
+the load bends the robot far. G. Zhang, Z. Chen, L. Wang (arXiv 2501.05418) find the shape from the tip's pose first and then the
+force from the tensions by virtual work; here both enter with their variances, gravity and the model's errors are part of it, and
+either sensor alone is enough.
+"""
+
+import collections
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from gravcomp.description import Robot
+from gravcomp.full_model.shape import Shape
+from gravcomp.full_model.wrench import Wrench
+from gravcomp.load_estimation.load_filter import LoadFilter
+from gravcomp.load_estimation.options import LoadEstimationOptions
+from gravcomp.load_estimation.sensitivity import HeldRobot
+from gravcomp.load_estimation.tension_check import TensionCheck
+from gravcomp.mesh.robot_axis import rest_axis
+from gravcomp.standard_gravity import STANDARD_GRAVITY
+
+_KEPT = 2.0  # s of predictions, for measurements that arrive late
+_INTERVAL = 1.96  # standard deviations of an interval of 95 %
+# Squared Mahalanobis distance of an outlier: 1 in 10000 good measurements is farther (chi-square, 3 and about 6 numbers).
+_GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
+_OUTLIERS = 6  # in a row: then it is the load that has changed
+_CONSTANT = 1e5  # s: a payload changes at once or not at all
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadEstimate:
+    """The load at the tip.
+
+    force (3,) in N in soft_base, with covariance (3, 3); mass in kg and its standard deviation, for a payload; zeroed: the
+    model's errors were measured without load; sources: what was measured lately; sentence: what the user has to know, empty while
+    all is well.
+    """
+
+    force: np.ndarray
+    covariance: np.ndarray
+    mass: float
+    mass_std: float
+    zeroed: bool
+    sources: tuple[str, ...]
+    sentence: str
+
+    @property
+    def mass_interval(self) -> tuple[float, float]:
+        """The interval in kg that holds the mass in 95 of 100 cases, if the errors are as the options say."""
+        return self.mass - _INTERVAL * self.mass_std, self.mass + _INTERVAL * self.mass_std
+
+
+class _Prediction(NamedTuple):
+    stamp: float
+    tip: np.ndarray
+    tension: np.ndarray
+    robot: HeldRobot
+    carried: np.ndarray
+    gravity: np.ndarray
+
+
+class LoadObserver:
+    """Estimates the load of one robot."""
+
+    def __init__(self, robot: Robot, options: LoadEstimationOptions):
+        self._robot, self.options = robot, options
+        self._rest_tip = rest_axis(robot).frames(np.array([robot.length]))[0][0]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._history: collections.deque[_Prediction] = collections.deque()
+        self._filter: LoadFilter | None = None
+        self._check = TensionCheck(self._robot.cable_names, self._robot.limits.tension_max)
+        self._scale = 0.0  # of the load: N, or kg of a payload
+        self._zero_until, self.zeroed, self._released = -np.inf, False, False
+        self._last_change: tuple[float, np.ndarray] | None = None
+        self._applied, self._applied_at = np.zeros(self._numbers), -np.inf
+        self._seen: dict[str, float] = {}
+        self._outliers: dict[str, int] = {}
+        self._sentence = ""
+        self._last_wrench: Wrench | None = None
+
+    @property
+    def _numbers(self) -> int:
+        return 1 if self.options.kind == "payload" else 3
+
+    def predict(
+        self, stamp: float, shape: Shape, tip_compliance: np.ndarray, carried: np.ndarray, wound: np.ndarray | None
+    ) -> None:
+        """Remember a shape of the model: stamp in s, compliance (3, 3) m/N of the tip, and the force (3,) N that it carries.
+
+        wound (m,) m: displacements that its winches hold, None: released.
+        """
+        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip)
+        self._history.append(_Prediction(stamp, shape.tip_position, shape.cable_tension, robot, carried, shape.gravity))
+        while self._history[0].stamp < stamp - _KEPT:
+            self._history.popleft()
+        if self._filter is None:
+            sag = float(np.linalg.norm(tip_compliance @ shape.gravity)) * self._weight_of(shape, tip_compliance)
+            self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
+        if not self._scale and (shape.cable_tension > 0.0).any():
+            strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
+            self._scale = self._robot.limits.tension_max / strongest
+            if self.options.kind == "payload":
+                self._scale /= STANDARD_GRAVITY
+        if self._scale and not self._released and stamp >= self._zero_until:
+            self._filter.free_load(self._scale)
+            self._filter.learning, self._released = False, True
+
+    def zero(self, now: float) -> None:
+        """Begin to learn the model's errors and the sensors' zeros: the robot carries no load for `zero_time` s."""
+        self._zero_until = now + self.options.zero_time
+        if self._filter is not None:
+            self._filter.free_load(0.0)
+            self._filter.learning = True
+        self._released, self.zeroed = False, True
+        self._applied[:] = 0.0
+
+    def measure_tip(self, stamp: float, position: np.ndarray) -> None:
+        """Take a measured tip (3,) m in soft_base at its stamp (s)."""
+        then = self._at(stamp)
+        if then is None or self._filter is None or not np.isfinite(position).all():
+            return
+        self._diffuse(then)
+        moved = then.tip - self._behind(then).tip
+        direction = self._direction(then.gravity)
+        self._take(
+            "tip", then, lambda one: one.take_tip(position - then.tip, then.robot, direction, then.carried, moved), _GATE_TIP
+        )
+
+    def measure_tensions(self, stamp: float, tension: np.ndarray) -> None:
+        """Take measured tensions (m,) N at their stamp (s). Sensors that cannot be right are named, and not used."""
+        then = self._at(stamp)
+        if then is None or self._filter is None:
+            return
+        self._sentence = self._check.observe(tension, then.tension)
+        if self._sentence:
+            return
+        self._diffuse(then)
+        moved = then.tension - self._behind(then).tension
+        residual, direction = tension - then.tension, self._direction(then.gravity)
+        self._take(
+            "tensions",
+            then,
+            lambda one: one.take_tensions(residual, then.robot, direction, then.carried, moved, tension),
+            _GATE_TENSIONS,
+        )
+
+    def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
+        """Return the load that the model has to carry from `now` (s) on under gravity (3,) m/s^2; None: none."""
+        if self._filter is None or not self.options.compensate or not self._released:
+            return None
+        interval = max(0.0, now - self._applied_at) if np.isfinite(self._applied_at) else 0.0
+        share = interval / (interval + self.options.response) if interval + self.options.response > 0.0 else 1.0
+        wanted = self._filter.load if self._seen else np.zeros(self._numbers)
+        largest = 2.0 * self._scale
+        size = float(np.linalg.norm(wanted))
+        wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
+        self._applied = self._applied + share * (wanted - self._applied)
+        self._applied_at = now
+        self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
+        return self._last_wrench
+
+    def carries(self, wrenches: tuple[Wrench, ...]) -> np.ndarray:
+        """Return the force (3,) in N of the last one of a model's wrenches if it is that of `wrench`, else zeros."""
+        return wrenches[-1].force if wrenches and self._last_wrench is wrenches[-1] else np.zeros(3)
+
+    def estimate(self, gravity: np.ndarray, now: float) -> LoadEstimate:
+        """Return the estimate under gravity (3,) m/s^2 at `now` (s)."""
+        direction = self._direction(gravity)
+        sources = tuple(name for name, at in self._seen.items() if now - at <= self.options.stale_after)
+        sentence = self._sentence
+        if not sources and not sentence:
+            sentence = (
+                "neither tips nor tensions are measured: the load is not known"
+                if not self._seen
+                else ("no measurement lately: the last estimate is kept")
+            )
+        if self._filter is None:
+            return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
+        load, covariance = self._filter.load, self._filter.load_covariance
+        payload = self.options.kind == "payload"
+        return LoadEstimate(
+            force=direction @ load,
+            covariance=direction @ covariance @ direction.T,
+            mass=float(load[0]) if payload else np.nan,
+            mass_std=float(np.sqrt(covariance[0, 0])) if payload else np.nan,
+            zeroed=self.zeroed,
+            sources=sources,
+            sentence=sentence,
+        )
+
+    def _take(self, source: str, then: _Prediction, step: Callable[[LoadFilter], float], gate: float) -> None:
+        """Let the filter take a measurement; an outlier is left out, and several in a row mean that the load has changed."""
+        assert self._filter is not None
+        taken = self._filter.copy()
+        if step(taken) > gate:
+            self._outliers[source] = self._outliers.get(source, 0) + 1
+            if self._outliers[source] < _OUTLIERS:
+                return
+            taken = self._filter.copy()
+            if self._released:
+                taken.open_load(self._scale)
+            step(taken)
+        self._filter, self._outliers[source] = taken, 0
+        self._seen[source] = then.stamp
+
+    def _direction(self, gravity: np.ndarray) -> np.ndarray:
+        return gravity[:, None] if self.options.kind == "payload" else np.eye(3)
+
+    def _weight_of(self, shape: Shape, tip_compliance: np.ndarray) -> float:
+        """Return the mass in kg at the tip that would displace it as far as the robot's weight does."""
+        sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
+        return sag / max(float(np.linalg.norm(tip_compliance @ shape.gravity)), 1e-30)
+
+    def _at(self, stamp: float) -> _Prediction | None:
+        """Return the prediction nearest to a stamp; None for a stamp before the first one or far ahead."""
+        if not self._history or not np.isfinite(stamp) or stamp < self._history[0].stamp - 0.1:
+            return None
+        return min(self._history, key=lambda entry: abs(entry.stamp - stamp))
+
+    def _behind(self, then: _Prediction) -> _Prediction:
+        """Return the prediction at which the robot may still be."""
+        return self._at(max(then.stamp - self.options.lag, self._history[0].stamp)) or then
+
+    def _diffuse(self, then: _Prediction) -> None:
+        """Let the filter forget with the time and the change of tensions since the last measurement."""
+        assert self._filter is not None
+        if self._last_change is not None:
+            before, tension = self._last_change
+            time = _CONSTANT if self.options.kind == "payload" else self.options.change_time
+            rate = self._scale / np.sqrt(time) if self._released else 0.0
+            self._filter.diffuse(max(0.0, then.stamp - before), rate, then.tension - tension)
+        self._last_change = then.stamp, then.tension

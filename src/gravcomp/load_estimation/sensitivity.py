@@ -1,0 +1,79 @@
+"""How measured tip and tensions depend on a load at the tip and on the model's errors, near one shape of the model.
+
+The winches hold the displacements u. With the force f at the tip, the compliance C of the tip under it, and W_af = W_ea^T, as the
+body is elastic (Maxwell 1864),
+
+    u <= W_aa lambda + W_af f + delta_g,   lambda >= 0, complementary,      e = W_ea lambda + C f + e_g.
+
+A load makes cables slack, and the robot is softer without them. So tensions and tip are those of the taut cables under the load
+that is assumed, and the derivatives d lambda = -W_aa^-1 W_af df, de = (C - W_ea W_aa^-1 W_af) df hold for these. A weight that is
+larger by the share s_w acts like more of delta_g and e_g. A body that is more compliant by the share s_E has all three W and C
+larger by it: it keeps the tensions of a straight robot, whose cables carry its weight whatever its stiffness, and moves the tip
+as more weight does. Displacements that differ from the commanded ones by b_u (backlash, friction, line) give d lambda = W_aa^-1
+b_u and de = W_ea W_aa^-1 b_u.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gravcomp.cables.slack import pivoted
+from gravcomp.full_model.shape import Shape
+
+
+class Sensitivity(NamedTuple):
+    """Tip and tensions under a load, as changes of the model's, and their derivatives. Slack cables have rows of zeros.
+
+    tip (3,) m and tension (m,) N; tip_force (3, 3) m/N, tip_error (3,) m by s_E and by s_w alike, tip_cables (3, m);
+    tension_force (m, 3), tension_stiffness and tension_weight (m,) N, tension_cables (m, m) N/m; taut (m,).
+    """
+
+    tip: np.ndarray
+    tension: np.ndarray
+    tip_force: np.ndarray
+    tip_error: np.ndarray
+    tip_cables: np.ndarray
+    tension_force: np.ndarray
+    tension_stiffness: np.ndarray
+    tension_weight: np.ndarray
+    tension_cables: np.ndarray
+    taut: np.ndarray
+
+
+class HeldRobot:
+    """The linear response of a shape whose winches hold their displacements."""
+
+    def __init__(self, shape: Shape, tip_compliance: np.ndarray, wound: np.ndarray | None, rest_tip: np.ndarray):
+        """tip_compliance (3, 3) m/N at given tensions; wound (m,) m, None: released; rest_tip (3,) m: without any load."""
+        self._shape, self._tip_compliance = shape, tip_compliance
+        self._wound = np.full(len(shape.cable_tension), np.nan) if wound is None else wound
+        self._free_tip = shape.response.effector_free[:3] - rest_tip
+
+    def under(self, force: np.ndarray) -> Sensitivity:
+        """Return what another force (3,) in N than the model's changes."""
+        response, before = self._shape.response, self._shape.cable_tension
+        compliance = np.ascontiguousarray(response.compliance_aa)
+        to_tip, held = response.compliance_ea[:3], np.isfinite(self._wound)
+        lack = np.where(held, self._wound - response.displacement_free - to_tip.T @ force, 0.0)
+        tension = pivoted(compliance, lack, held, held & (before > 0.0))
+        taut = tension > 0.0
+        m = len(taut)
+        by_force, stiffness, weight, cables = np.zeros((m, 3)), np.zeros(m), np.zeros(m), np.zeros((m, m))
+        if taut.any():
+            inverse = np.linalg.pinv(compliance[np.ix_(taut, taut)], rcond=1e-9)
+            cables[np.ix_(taut, taut)] = inverse
+            by_force[taut] = -inverse @ to_tip[:, taut].T
+            weight[taut] = -inverse @ (response.displacement_free + to_tip.T @ force)[taut]
+            stiffness[taut] = weight[taut] - tension[taut]
+        return Sensitivity(
+            tip=self._tip_compliance @ force + to_tip @ (tension - before),
+            tension=tension - before,
+            tip_force=self._tip_compliance + to_tip @ by_force,
+            tip_error=self._free_tip + self._tip_compliance @ force + to_tip @ weight,
+            tip_cables=to_tip @ cables,
+            tension_force=by_force,
+            tension_stiffness=stiffness,
+            tension_weight=weight,
+            tension_cables=cables,
+            taut=taut,
+        )

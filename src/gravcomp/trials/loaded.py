@@ -1,0 +1,72 @@
+"""A robot that is held, gets an unknown load at its tip, and finds it."""
+
+import dataclasses
+
+import numpy as np
+
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
+from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
+from gravcomp.inverse import straight_target
+from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions
+from gravcomp.trials.holding import errors_to
+from gravcomp.virtual.motion import StaticMotion, base_orientation
+
+_SETTLING, _FINDING, _MEASURED = 4.0, 6.0, 1.0  # s
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadedCase:
+    """An unknown load: a payload in kg, or a force (3,) in N in soft_base; sensors; inclination and roll of the base, deg."""
+
+    payload: float = 0.0
+    force: tuple[float, float, float] | None = None
+    tracker: VirtualTrackerParameters | None = None
+    cells: VirtualLoadCellParameters | None = None
+    inclination: float = 0.0
+    roll: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class LoadedOutcome:
+    """estimate: mean of the last second; before, after: RMS of the lateral tip error in m without load, and with it found."""
+
+    estimate: LoadEstimate
+    before: float
+    after: float
+
+
+def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
+    """Hold the robot straight, zero, attach the load, and estimate it."""
+    setup, case = job
+    kind = "payload" if case.force is None else "force"
+    start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
+    options = LoadEstimationOptions(kind=kind)
+    loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
+    target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
+    loop.hold(target)
+    loop.run(_SETTLING)
+    loop.zero_load()
+    loop.run(options.zero_time + 0.5)
+
+    def lateral() -> float:
+        trace = loop.trace.between(loop.time - _MEASURED)
+        return float(np.sqrt(np.mean(errors_to(trace, target).lateral ** 2)))
+
+    before = lateral()
+    if case.force is None:
+        loop.virtual.attach(case.payload)
+    else:
+        loop.virtual.push(np.array(case.force))
+    loop.run(_FINDING)
+    estimates = []
+    for _ in range(10):
+        loop.run(_MEASURED / 10.0)
+        estimates.append(loop.load)
+    mean = dataclasses.replace(
+        estimates[-1],
+        force=np.mean([one.force for one in estimates], axis=0),
+        mass=float(np.mean([one.mass for one in estimates])),
+    )
+    return LoadedOutcome(mean, before, lateral())

@@ -1,0 +1,89 @@
+"""The bench test of a board and its parameters over a bus: a board of C code behind python-can's virtual bus, in real time."""
+
+import threading
+import time
+
+import can
+import numpy as np
+import pytest
+
+from gravcomp.config import ConfigError
+from gravcomp.description import load_robot_file
+from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.doctor import board as bench_test
+from gravcomp.firmware.client import BoardClient
+from gravcomp.firmware.settings import settings_of, value_of
+from gravcomp.virtual.emulated_board import EmulatedBoard
+from gravcomp.virtual.parameters import Board
+
+UP = np.array([0.0, 0.0, 9.81])
+
+
+@pytest.fixture
+def live(request):
+    """A board on a bus of its own: the channel, and the board."""
+    channel, ending = request.node.name, threading.Event()
+    board = EmulatedBoard(Board(), np.random.default_rng(1))
+
+    def serve():
+        begin, samples = time.monotonic(), 0
+        with can.Bus(interface="virtual", channel=channel) as bus:
+            while not ending.is_set():
+                for _ in range(50):
+                    message = bus.recv(0.001)
+                    if message is None:
+                        break
+                    board.receive(message)
+                now = time.monotonic() - begin
+                if now >= 0.01 * (samples + 1):
+                    samples += 1
+                    frames = board.sample(np.zeros(3), UP, False)
+                else:
+                    board.advance(now)
+                    frames = board.to_host()
+                for frame in frames:
+                    bus.send(frame)
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    yield channel, board
+    ending.set()
+    thread.join(5.0)
+
+
+def test_the_bench_test_finds_a_good_board_good_and_says_what_is_wrong_with_a_bad_one(live, monkeypatch):
+    channel, board = live
+    monkeypatch.setattr(bench_test, "_DELAY", 1000.0)  # a busy machine answers late
+    found = {finding.subject: finding for finding in bench_test.examine("virtual", channel, 1.6)}
+    assert set(found) == {"board", "samples", "noise", "delay of answers", "heater", "state"}
+    assert "firmware 1.1" in found["board"].found and found["noise"].level == "ok"
+    assert "duty 0.50" in found["heater"].found and "ms after the last command" in found["heater"].found
+    board.chip.imu_fault = "silent"
+    found = {finding.subject: finding for finding in bench_test.examine("virtual", channel, 0.3)}
+    assert found["samples"].level == "missing" and "the IMU does not answer" in found["state"].found
+
+
+def test_the_parameters_of_a_robot_are_written_and_stored(live):
+    channel, board = live
+    file = load_robot_file("article")
+    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    with BoardClient(CanInterface("virtual", channel)) as client:
+        client.configure(settings_of(hardware, between=True))
+        board.firmware.restart()
+        for name, value in settings_of(hardware, between=True).items():
+            assert value_of(name, board.firmware.word(name)) == pytest.approx(value, rel=1e-6)
+        with pytest.raises(ConfigError, match="the board refuses current_limit = 99999: out of range"):
+            client.configure({"current_limit": 99999})
+        client.configure({"board_number": 2})
+    with (
+        BoardClient(CanInterface("virtual", channel), 3) as client,
+        pytest.raises(ConfigError, match="no board has the number 3; on the bus: 2"),
+    ):
+        client.value("uptime")
+
+
+def test_without_a_board_the_bus_is_named():
+    found = bench_test.examine("virtual", "nobody-is-here", 0.2)
+    assert [finding.level for finding in found] == ["missing"] and "no board answers" in found[0].found
+    with pytest.raises(ConfigError, match="0 to 15"):
+        BoardClient(CanInterface("virtual", "x"), 77)

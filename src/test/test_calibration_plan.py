@@ -1,0 +1,126 @@
+"""Planned calibrations: what is chosen, the table on paper, the session on a running robot, and how intervals cover the truth."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.calibration.files import read_measured
+from gravcomp.calibration.live import LiveSession, Phase
+from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of, make_plan
+from gravcomp.calibration.plan_file import load_plan, save_plan
+from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
+from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
+from gravcomp.trials.coverage import coverage
+
+PERIOD = 0.3  # s
+
+
+@pytest.fixture(scope="module")
+def robot():
+    segment = Segment("s", length=0.08, outer_diameter=0.01, lumen_diameter=0.004, material=Material(youngs_modulus=0.8e6))
+    cables = tuple(Cable(f"c{i}", np.radians(120.0 * i), 3.5e-3, segment="s") for i in range(3))
+    elements = Elements(around=6, along=4, radial=1)
+    return Robot("short", segments=(segment,), cables=cables, elements=elements, limits=Limits(tension_max=2.0))
+
+
+@pytest.fixture(scope="module")
+def plan(robot):
+    return make_plan(robot, PERIOD, options=PlanOptions(budget=60.0, fewest=6, most=9))
+
+
+def test_a_plan_keeps_to_its_time_and_to_the_limits(robot, plan):
+    assert len(plan.poses) >= 6 and plan.duration <= 66.0  # the turns of the base are estimated while poses are chosen
+    for pose in plan.poses:
+        assert pose.displacement.max() <= robot.limits.displacement_max
+        assert pose.displacement.min() >= robot.limits.displacement_min
+        assert pose.tension.max() <= robot.limits.tension_max
+
+
+def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, plan):
+    assert {name for pose in plan.poses for name in pose.pulled} == set(robot.cable_names)
+    for station in {pose.station for pose in plan.poses}:
+        assert any(not pose.pulled for pose in plan.poses if pose.station == station)
+
+
+def test_a_plan_is_read_as_it_was_saved(plan, tmp_path):
+    save_plan(plan, tmp_path / "plan.json")
+    read = load_plan(tmp_path / "plan.json")
+    assert read.times == plan.times and [pose.pulled for pose in read.poses] == [pose.pulled for pose in plan.poses]
+    np.testing.assert_array_equal(read.poses[1].displacement, plan.poses[1].displacement)
+
+
+def test_a_filled_table_becomes_windows_at_rest(robot, plan, tmp_path):
+    path = tmp_path / "plan.csv"
+    write_plan_table(plan, robot, path)
+    assert is_plan_table(path)
+    with pytest.raises(MeasurementError, match="0 rows have a tip"):
+        read_plan_table(path, robot.cable_names)
+    lines = path.read_text().splitlines()
+    filled = [lines[0], *(line.removesuffix(",,,") + ",-10.5,0.2,79" if n < 4 else line for n, line in enumerate(lines[1:]))]
+    path.write_text("\n".join(filled))
+    windows = read_plan_table(path, robot.cable_names)
+    assert len(windows.gravity) == 4
+    np.testing.assert_allclose(windows.tip_position[0], [-10.5e-3, 0.2e-3, 79e-3])
+    np.testing.assert_allclose(windows.gravity[0], plan.poses[0].gravity, atol=1e-3)
+    released = np.array([[name not in pose.pulled for name in robot.cable_names] for pose in plan.poses[:4]])
+    np.testing.assert_array_equal(np.isnan(windows.displacement), released)
+    with pytest.raises(MeasurementError, match="of another robot"):
+        read_plan_table(path, ("other",))
+
+
+def session_plan() -> Plan:
+    poses = tuple(
+        PlannedPose(0.0, roll, np.array([pull, -2e-3, -2e-3]), ("c0",), np.zeros(3), np.zeros(3))
+        for roll, pull in ((0.0, -2e-3), (0.0, 1e-3), (1.0, 1e-3))
+    )
+    return Plan(poses, (2.0, 2.0, 2.0), 1.5, 1.0)
+
+
+def run(session: LiveSession, roll: float, start: float, duration: float) -> float:
+    """Let `duration` s pass at 50 Hz with the base at a roll; return the time."""
+    present = np.zeros(3)
+    for step in range(round(duration / 0.02)):
+        time = start + 0.02 * step
+        session.on_gravity(time, gravity_of(0.0, roll))
+        session.command(time, present)
+        session.on_tip(time, np.array([0.0, 0.0, 0.08]), np.array([0.0, 0.0, 1.0]))
+    return start + duration
+
+
+def test_a_session_waits_for_the_base_and_goes_on_where_it_was(robot, tmp_path):
+    out = tmp_path / "live.csv"
+    session = LiveSession(robot, session_plan(), out)
+    now = run(session, 2.0, 0.0, 3.0)
+    assert session.phase == Phase.TURN and session.finished == 0 and "hold the base" in session.sentence()
+    now = run(session, 0.05, now, 3.5)
+    assert session.finished == 1 and session.phase in (Phase.PULL, Phase.REST)
+    again = LiveSession(robot, session_plan(), out)  # after an interruption in the second pose
+    assert again.finished == 1 and again.phase == Phase.TURN
+    now = run(again, 0.0, now, 3.5)
+    assert again.finished == 2 and again.phase == Phase.TURN
+    run(again, 1.0, now, 3.5)
+    assert again.phase == Phase.DONE
+    measured = read_measured(out, robot.cable_names)
+    assert set(measured.trial) == {0, 1}
+    other = dataclasses.replace(robot, cables=robot.cables[:2])
+    with pytest.raises(MeasurementError, match="not of this robot"):
+        LiveSession(other, session_plan(), out)
+
+
+def test_a_base_that_leaves_its_pose_begins_it_again(robot, tmp_path):
+    session = LiveSession(robot, session_plan(), tmp_path / "live.csv")
+    now = run(session, 0.0, 0.0, 1.5)
+    assert session.phase in (Phase.PULL, Phase.REST)
+    run(session, 1.0, now, 0.1)
+    assert session.phase == Phase.TURN and not (tmp_path / "live.csv").exists()
+
+
+def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
+    """Of a few seeds; `bench robots --figures coverage_pct` takes 50 and three robots."""
+    found = coverage(robot, plan.poses, range(12))
+    counted = sum(one.count for one in found.values())
+    inside = sum(one.share * one.count for one in found.values())
+    assert counted > 50 and inside / counted >= 0.9
+    assert found["modulus"].share >= 0.9

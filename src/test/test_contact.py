@@ -1,0 +1,176 @@
+"""Contact: forces and states from the compliance, places on the surface, and equilibria of a robot that touches a scene."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.bench.contact import scene_of, slender_rod
+from gravcomp.config import ConfigError
+from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
+from gravcomp.description import Elements, load_robot_file
+from gravcomp.inverse import ControllerCode, InverseController, Target
+from gravcomp.references.contact_beams import over_peg
+from gravcomp.simulation import RobotModel, Simulator
+
+G = np.array([-9.81, 0.0, 0.0])
+
+
+def forces(compliance, free, gap, friction=(), wound=(), tension=(), given=(), bend=()):
+    c = len(gap)
+    state = np.full(c, OPEN)
+    found, change, settled = contact_forces(
+        np.asarray(compliance, dtype=float), np.asarray(free, dtype=float), np.asarray(wound, dtype=float),
+        np.asarray(given, dtype=float), np.asarray(tension, dtype=float), np.asarray(gap, dtype=float), np.zeros(c),
+        np.asarray(friction, dtype=float), np.asarray(bend, dtype=float), np.zeros(c), np.zeros((c, 2)), state,
+    )  # fmt: skip
+    assert settled
+    return found, change, state
+
+
+def random_compliance(rng, size, rank=None):
+    factor = rng.standard_normal((size, rank or size))
+    return factor @ factor.T
+
+
+def test_normal_forces_and_tensions_are_complementary_to_gaps_and_slack():
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        m, c = 3, 6
+        s = random_compliance(rng, m + c)
+        free, gap, wound = rng.standard_normal(m + c), rng.uniform(0, 1, c), rng.standard_normal(m)
+        found, _, state = forces(s, free, gap, wound=wound, tension=np.zeros(m))
+        slack = s @ found + free + np.concatenate([-wound, gap])
+        scale = np.abs(found).max()
+        assert found.min() >= 0.0
+        assert slack.min() >= -1e-5 * scale
+        assert (found * slack).max() <= 1e-5 * scale**2
+        assert ((state != OPEN) == (found[m:] > 0)).all()
+
+
+def test_friction_sticks_below_its_limit_and_slides_against_the_motion_at_it():
+    kinds = set()
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        c = 4
+        s = random_compliance(rng, 3 * c)
+        free, gap, friction = rng.standard_normal(3 * c), np.zeros(c), np.full(c, 0.3)
+        found, _, state = forces(s, free, gap, friction)
+        moved = s @ found + free
+        normal, rub, slid = found[:c], found[c:].reshape(c, 2), moved[c:].reshape(c, 2)
+        assert (np.abs(rub) <= 0.3 * normal[:, None] + 1e-4 * normal.max()).all()
+        for i in range(c):
+            kinds.add(int(state[i]))
+            if state[i] == STICKING:
+                assert np.abs(slid[i]).max() < 1e-4 * np.abs(free).max()
+            if state[i] == SLIDING:
+                assert (rub[i] * slid[i] <= 1e-6 * np.abs(free).max() * normal.max()).all()
+    assert kinds == {OPEN, STICKING, SLIDING}
+
+
+def test_more_places_than_the_body_can_move_share_the_force():
+    """A stiff body on many places: S has a low rank, and the solution is found all the same."""
+    rng = np.random.default_rng(1)
+    c = 20
+    factor = np.vstack([rng.uniform(0.5, 1.5, (c, 3)), rng.standard_normal((2 * c, 3))])
+    s = factor @ factor.T
+    found, _, _ = forces(s, -np.ones(3 * c) * np.repeat([1.0, 0.0], [c, 2 * c]), np.zeros(c), np.full(c, 0.2))
+    response = s @ found - np.repeat([1.0, 0.0], [c, 2 * c])
+    assert response[:c].min() > -1e-4
+
+
+@pytest.fixture(scope="module")
+def model():
+    return RobotModel(dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=5)))
+
+
+def in_scene(model, **kinds):
+    return Simulator(model, reduced=False, scene=scene_of(**kinds))
+
+
+def test_a_sagging_robot_rests_on_a_plane_without_penetration(model):
+    simulator = in_scene(model, planes=[{"normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
+    shape = simulator.solve(G)
+    assert shape.is_equilibrium
+    assert simulator.solver.contact.depth(simulator.displacements) < 1e-6
+    assert shape.contacts.normal_force.sum() > 1e-3
+    # The clamp's reaction and the plane's force carry the weight.
+    mesh_force = model.elements.internal_force(simulator.displacements)[model.n_free :].sum(axis=0)
+    clamp = mesh_force - model.nodal_weight[model.n_free :].sum() * G
+    assert clamp + shape.contacts.force.sum(axis=0) == pytest.approx(-model.mass * G, abs=1e-6)
+
+
+def test_friction_holds_a_robot_that_is_pushed_along_a_wall(model):
+    planes = {"normal": [1, 0, 0], "point_mm": [-15, 0, 0]}
+    tips = []
+    for friction in (0.0, 2.0):
+        simulator = in_scene(model, planes=[planes | {"friction": friction}])
+        simulator.solve(G)
+        simulator.step(G)
+        before = simulator.step(G)
+        shape = simulator.step(G + np.array([0.0, 0.05, 0.0]))
+        tips.append(np.linalg.norm(shape.contacts.position[-1] - before.contacts.position[-1]))
+        assert shape.is_equilibrium
+        assert shape.contacts.sliding.all() == (friction == 0.0)
+    assert tips[1] < 2e-2 * tips[0]  # the robot rolls a little where it sticks
+
+
+def test_a_robot_follows_a_curved_tube_that_the_straight_robot_would_cross(model):
+    tube = {"points_mm": [[0, 0, -20], [0, 0, 20], [0, 8, 60], [0, 25, 110], [0, 35, 130]], "radius_mm": [6]}
+    simulator = in_scene(model, tubes=[tube])
+    assert simulator.solver.contact.depth(np.zeros_like(model.mesh.nodes)) > 5e-3
+    shape = simulator.solve(G)
+    assert shape.is_equilibrium
+    assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
+
+
+def test_contact_is_a_constraint_in_the_response_to_the_cables(model):
+    simulator = in_scene(model, planes=[{"normal": [1, 0, 0], "point_mm": [-10, 0, 0]}])
+    tension = np.array([0.0, 0.1, 0.05, 0.1, 0.0, 0.1])
+    base = simulator.solve(G, tension=tension)
+    step = np.array([0.0, 1e-4, 0.0, 2e-4, 0.0, 0.0])
+    after = simulator.step(G, tension=tension + step)
+    foreseen = base.response.compliance_ea[:3] @ step
+    assert len(base.contacts)
+    assert after.tip_position - base.tip_position == pytest.approx(foreseen, abs=2e-2 * np.abs(foreseen).max())
+
+
+def test_a_rod_over_a_peg_follows_the_closed_form():
+    rod = slender_rod()
+    stiffness, length, radius = 2e6 * np.pi * 4e-3**4 / 64, rod.length, 2e-3
+    weight, gap, place = 8 * stiffness * 0.02 / length**3, 5e-4, 0.6 * length
+    low = 1e3 * (-radius - gap - 1e-3)
+    peg = {"points_mm": [[low, -50, 1e3 * place], [low, 50, 1e3 * place]], "radius_mm": [1], "side": "outside"}
+    model = RobotModel(dataclasses.replace(rod, elements=Elements(around=4, along=12)))
+    gravity = np.array([-weight * length / model.body_weight.sum(), 0.0, 0.0])
+    shape = in_scene(model, tubes=[peg]).solve(gravity)
+    force, tip = over_peg(weight, length, stiffness, gap, place)
+    assert shape.contacts.force[:, 0].sum() == pytest.approx(force, rel=1e-2)
+    assert -shape.tip_position[0] == pytest.approx(tip, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "message"),
+    [
+        ({"planes": [{"normal": [1, 0, 0], "point_mm": [-3, 0, 0]}]}, "starts 1.5 mm inside 'plane 1'"),
+        ({"tubes": [{"points_mm": [[0, 0, -10], [0, 0, 200]], "radius_mm": [9, 4]}]}, "radius of 'tube 1' is 4 mm"),
+    ],
+)
+def test_a_scene_that_leaves_no_room_for_the_robot_is_refused(model, kinds, message):
+    with pytest.raises(ConfigError, match=message):
+        in_scene(model, **kinds)
+
+
+def test_a_target_behind_a_wall_gives_the_nearest_shape_and_names_the_wall(model):
+    simulator = in_scene(model, planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
+    controller, shape = InverseController(model.robot), simulator.solve(G)
+    behind = Target(np.array([-0.02, 0.0, 0.095]))
+    for _ in range(60):
+        command = controller.step(
+            shape.response, behind, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02,
+            followed=shape.is_equilibrium, contact=shape.contacts.sentence,
+        )  # fmt: skip
+        shape = simulator.step(G, command.displacement)
+    assert command.code == ControllerCode.CONTACT
+    assert "leans on 'table' at (" in command.message
+    assert simulator.solver.contact.depth(simulator.displacements) < 2e-5

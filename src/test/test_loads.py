@@ -1,0 +1,180 @@
+"""External loads while the robot runs: wrenches, payloads, tension sensors, and what is found of an unknown load."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.config import ConfigError
+from gravcomp.description import MaxWrench, load_robot_file
+from gravcomp.external_loads import ExternalLoadOptions, LivePayload, WrenchInput
+from gravcomp.full_model.shape import Response, Shape
+from gravcomp.load_estimation import LoadEstimationOptions, LoadObserver
+from gravcomp.load_estimation.sensitivity import HeldRobot
+from gravcomp.load_estimation.tension_check import TensionCheck
+
+ROBOT = dataclasses.replace(load_robot_file("article").robot, max_wrench=MaxWrench(0.5, 0.01))
+GRAVITY = np.array([-9.81, 0.0, 0.0])
+ZERO = np.zeros(3)
+
+
+def taken(**changes):
+    values = {"stamp": 10.0, "now": 10.0, "frame": "soft_tip", "force": np.array([0.1, 0, 0]), "moment": ZERO} | changes
+    source = WrenchInput(changes.pop("robot", ROBOT), ExternalLoadOptions())
+    values.pop("robot", None)
+    source.take(**values)
+    return source
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"frame": "map"}, "frame 'map', which is not known; allowed: soft_base, soft_tip"),
+        ({"force": np.array([1e4, 0, 0])}, "its force is 1e+04 N; robot.max_wrench.force allows 0.5 N"),
+        ({"moment": np.array([0, 0, 1.0])}, "its moment is 1 N m"),
+        ({"force": np.array([np.nan, 0, 0])}, "finite numbers are needed"),
+        ({"stamp": 8.0}, "it is 2.00 s old"),
+        ({"stamp": 11.0}, "ahead"),
+        ({"stamp": 0.0}, "no stamp"),
+        ({"robot": dataclasses.replace(ROBOT, max_wrench=None)}, "no robot.max_wrench"),
+    ],
+)
+def test_wrenches_that_cannot_be_used_are_refused_with_the_reason(changes, reason):
+    source = taken(**changes)
+    assert reason in source.refusal
+    assert not source.wrenches(10.1)
+
+
+def test_the_frame_says_where_a_wrench_acts_and_whether_it_turns():
+    for frame, station, follower in (("soft_tip", 1.0, True), ("soft_base", 1.0, False), ("soft_base_backbone_5", 0.5, True)):
+        (wrench,) = taken(frame=frame).wrenches(10.0)
+        assert (wrench.station, wrench.follower) == (pytest.approx(station), follower)
+
+
+def test_a_wrench_comes_slowly_and_goes_when_it_is_stale():
+    source = taken()
+    source.wrenches(10.0)
+    size = [source.wrenches(10.0 + 0.01 * k)[0].force[0] for k in range(1, 50)]
+    assert 0.0 < size[0] < 0.05 * 0.1 and size[-1] > 0.07
+    assert np.all(np.diff(size) > 0.0)
+    for k in range(1000):
+        left = source.wrenches(10.5 + 0.01 * k)
+    assert not left
+    assert not source.sentence
+
+
+def test_a_payload_that_breaks_the_robot_is_refused_and_another_one_is_ramped():
+    payload = LivePayload(ROBOT, ramp_time=0.3)
+    for mass in (10.0, -0.001, np.nan):
+        with pytest.raises(ConfigError, match=r"payload\.mass_g"):
+            payload.set(mass)
+    payload.set(0.004)
+    payload.wrench(GRAVITY, 0.0)
+    weights = [payload.wrench(GRAVITY, 0.1 * k).force[0] for k in range(1, 30)]
+    assert np.all(np.diff(weights) < 0.0) and weights[-1] == pytest.approx(-9.81 * 0.004, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("reading", "expected", "reason"),
+    [
+        (lambda t, noise: -t + noise, 1.0, "wrong sign"),
+        (lambda t, noise: np.full(6, 0.7), 1.0, "stuck"),
+        (lambda t, noise: 0.5 + noise, 0.0, "not zeroed"),
+        (lambda t, noise: 1e3 * t + noise, 1.0, "its unit"),
+        (lambda t, noise: t[:3], 1.0, "3 tensions for 6 cables"),
+        (lambda t, noise: t * np.nan, 1.0, "not a finite number"),
+        (lambda t, noise: t + noise, 1.0, ""),
+        (lambda t, noise: np.abs(noise), 0.0, ""),
+    ],
+)
+def test_tension_sensors_that_cannot_be_right_are_named(reading, expected, reason):
+    check, random = TensionCheck(ROBOT.cable_names, 5.0), np.random.default_rng(1)
+    said = {check.observe(reading(np.full(6, expected), 0.01 * random.normal(size=6)), np.full(6, expected)) for _ in range(120)}
+    if reason:
+        assert any(reason in sentence for sentence in said)
+    else:
+        assert said == {""}
+
+
+@pytest.fixture
+def shape():
+    """A straight robot of one segment with three cables around it, linear: 2 mm/N of the tip, and its own weight."""
+    angle = 2 * np.pi * np.arange(3) / 3
+    lever = np.column_stack([np.cos(angle), np.sin(angle), np.full(3, -0.02)])  # m of cable per m of the tip
+    tip = np.diag([0.8, 0.8, 0.002])
+    to_tip = tip @ lever.T
+    compliance = lever @ tip @ lever.T + 1e-4 * np.eye(3)
+    weight = 0.01 * GRAVITY
+    free, tension = to_tip.T @ weight, np.array([0.3, 0.1, 0.1])
+    response = Response(
+        compliance, np.vstack([to_tip, np.zeros((3, 3))]), free, np.append(tip @ weight + [0, 0, 0.1], np.zeros(3))
+    )
+    place = response.effector_free[:3] + to_tip @ tension
+    empty = np.zeros((0, 3))
+    tip = tip + np.diag([0.4, 0.4, 0.0])  # what the cables do not hold
+    return tip, Shape(
+        place, np.array([0, 0, 0, 1.0]), np.zeros(0), empty, empty, compliance @ tension + free, tension, GRAVITY, response, 0.0
+    )
+
+
+def test_derivatives_of_a_held_robot_are_those_of_its_tensions_and_tip(shape):
+    tip, shape = shape
+    robot = HeldRobot(shape, tip, shape.cable_displacement, np.array([0, 0, 0.1]))
+    at, h = np.array([0.01, -0.02, 0.005]), 1e-6
+    here = robot.under(at)
+    for axis in range(3):
+        ahead, behind = robot.under(at + h * np.eye(3)[axis]), robot.under(at - h * np.eye(3)[axis])
+        assert here.tip_force[:, axis] == pytest.approx((ahead.tip - behind.tip) / (2 * h), abs=1e-6)
+        assert here.tension_force[:, axis] == pytest.approx((ahead.tension - behind.tension) / (2 * h), abs=1e-5)
+    # Cables that a load makes slack do not push.
+    slackened = robot.under(np.array([-1.0, 0, 0]))
+    assert slackened.taut.tolist() == [True, False, False]
+    assert shape.cable_tension + slackened.tension == pytest.approx([1.2, 0, 0], abs=0.01)
+
+
+@pytest.mark.parametrize("sources", ["tip", "tensions", "both"])
+def test_a_payload_is_found_after_zeroing_whatever_the_models_errors(shape, sources):
+    """The true robot is 20 % softer than the model; both are linear, so that the rest of the error is noise."""
+    tip, shape = shape
+    robot = dataclasses.replace(ROBOT, cables=ROBOT.cables[:3])
+    observer = LoadObserver(robot, LoadEstimationOptions(kind="payload", compensate=False))
+    random, mass, wound = np.random.default_rng(2), 0.004, shape.cable_displacement
+    soft = dataclasses.replace(
+        shape,
+        response=dataclasses.replace(
+            shape.response,
+            compliance_aa=1.2 * shape.response.compliance_aa,
+            compliance_ea=1.2 * shape.response.compliance_ea,
+            displacement_free=1.2 * shape.response.displacement_free,
+            effector_free=1.2 * (shape.response.effector_free - [0, 0, 0.1, 0, 0, 0]) + [0, 0, 0.1, 0, 0, 0],
+        ),
+    )
+    truth, start = HeldRobot(soft, 1.2 * tip, wound, np.array([0, 0, 0.1])), soft.response.effector_free[:3]
+    for k in range(600):
+        now, carried = 0.02 * k, mass * GRAVITY * (k >= 300)
+        observer.predict(now, shape, tip, ZERO, wound)
+        if k == 100:
+            observer.zero(now)
+        here = truth.under(carried)
+        tension = soft.cable_tension + here.tension
+        if sources != "tip":
+            observer.measure_tensions(now, tension * (1 + 0.01 * random.normal(size=3)))
+        if sources != "tensions" and k % 10 == 0:
+            place = start + soft.response.compliance_ea[:3] @ soft.cable_tension + here.tip
+            observer.measure_tip(now, place + 5e-4 * random.normal(size=3))
+        if k == 299:
+            assert abs(observer.estimate(GRAVITY, now).mass) < 0.05 * mass + 2 * observer.estimate(GRAVITY, now).mass_std
+    found = observer.estimate(GRAVITY, now)
+    low, high = found.mass_interval
+    assert low <= mass <= high
+    assert abs(found.mass - mass) < 0.2 * mass
+    assert found.force == pytest.approx(found.mass * GRAVITY)
+
+
+def test_without_sensors_the_load_is_said_to_be_unknown(shape):
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="force"))
+    observer.predict(0.0, shape, tip, ZERO, shape.cable_displacement)
+    found = observer.estimate(GRAVITY, 0.0)
+    assert "not known" in found.sentence
+    assert np.sqrt(found.covariance[0, 0]) > 0.1
