@@ -25,7 +25,7 @@ class Places(NamedTuple):
     row (c,): of the obstacle in the scene; station (c,): the nearest one; first (c,) and share (c, 3): the first of three
     neighbours, and their weights; own (c, 2): x and y in the section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent
     in the section; along (c, 3): the other tangent; curvature (c,) of the obstacle across the robot in 1/m: change of the
-    normal along `around`, positive beside a ball; tilt (c, 3): weights of the three stations for the slope along the robot, a
+    normal along `around`, positive next to a ball; tilt (c, 3): weights of the three stations for the slope along the robot, a
     station; rocking (c,): -1 / g'' a station in 1/m, by which the place moves along the robot when it tilts; 0 where it does not.
     """
 
@@ -117,8 +117,8 @@ def find_places(
         for s in range(stations):
             free = gap[k, s] + normal[k, s] @ moved[s]
             # A force moves from station to station as the robot slides or tilts.
-            beside = last[k, max(s - 1, 0)].any() or last[k, s].any() or last[k, min(s + 1, stations - 1)].any()
-            if beside or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
+            near = last[k, max(s - 1, 0)].any() or last[k, s].any() or last[k, min(s + 1, stations - 1)].any()
+            if near or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
                 chosen[k, s] = True
                 count += 1
     result = Places(
@@ -152,19 +152,19 @@ def _write_place(
     slope = 0.5 * (gap[k, first + 2] - gap[k, first]) + (place - 1.0) * bend
     if best <= before and best <= after and bend > 0.0 and slope * slope > 2.0 * bend * _WORTH * surface.radius[s]:
         low, high = max(place - 0.5, 0.0), min(place + 0.5, 2.0)
-        moved, other, beside = place - slope / bend, np.empty(2), np.empty(3)
+        moved, other, across = place - slope / bend, np.empty(2), np.empty(3)
         for _ in range(_MOVES):
             moved = min(max(moved, low), high)
             _section_at(sections, first, moved, share, section)
-            found = deepest(scene, k, surface, s, section, other, beside)
+            found = deepest(scene, k, surface, s, section, other, across)
             if found < best:
                 best, place = found, moved
-                here[:], there[:] = other, beside
+                here[:], there[:] = other, across
             # The gap's slope along the robot follows from its gradient; its bend is that of the stations.
             ahead = 0.0
             for j in range(3):
                 curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
-                ahead += beside[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
+                ahead += across[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
             moved -= ahead / bend
         result.rocking[i] = -1.0 / bend
     _section_at(sections, first, place, share, section)

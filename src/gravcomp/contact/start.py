@@ -38,5 +38,5 @@ def refuse_start(scene: Scene, robot: Robot) -> None:
             way = ", ".join(f"{1e3 * depth * x:+.3g}" for x in normal)
             raise ConfigError(
                 f"{scene.source}: scene: the robot starts {1e3 * depth:.3g} mm inside '{name}', where it is clamped;"
-                f" move the obstacle by at least that (the robot's nearest way out is {way} mm)"
+                f" move the obstacle by at least that (the robot's shortest displacement that frees it is {way} mm)"
             )

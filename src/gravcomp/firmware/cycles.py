@@ -223,7 +223,7 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
 
 
 def table_waits(blob: bytes) -> int:
-    """Return the cycles for which a step waits for the model's tables: one line of 16 bytes after the other, each time anew.
+    """Return the cycles for which a step waits for the model's tables, read line by line of 16 bytes, with nothing in the cache.
 
     The step reads B and the pieces of the cables twice, the cables' stiffness once, and the tip's section for each cable.
     """

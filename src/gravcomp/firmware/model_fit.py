@@ -24,7 +24,7 @@ LONGEST_MS = 7.0
 """For a step, of the 10 ms between two samples; the rest is for interrupts, and for what the estimate may lack."""
 
 _EXTRA = (36, 16, 8, 4, 0)
-"""Principal strains beside those of the modes, in the order in which they are tried."""
+"""Principal strains in addition to those of the modes, in the order in which they are tried."""
 
 # Cycles of the Cortex-M4 for one multiply-add of each part, with its loads and the wait states of the flash; measured on the
 # emulated image (`bench board`).

@@ -1,7 +1,7 @@
 """Contact of the full model with the obstacles of a scene.
 
 In every Newton step the places near an obstacle are found at the present shape (`contact.places`). Their directions are further
-right-hand sides of the factor that the step has anyway, A X = C^T, beside those of the cables. What remains is small and
+right-hand sides of the factor that the step has anyway, A X = C^T, next to those of the cables. What remains is small and
 dense: the compliance S of cables and places, from which forces and states follow (`contact.condensed`).
 """
 

@@ -59,7 +59,7 @@ class BoxWall(Wall):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TubeWall(Wall):
-    """A tube along a smooth curve through points: a lumen around the robot, or a bent bar beside it."""
+    """A tube along a smooth curve through points: a lumen around the robot, or a bent bar next to it."""
 
     points: tuple[_Point, ...] = parameter(edge="mm", minimum=-1e5, maximum=1e5, description="centre line, in order")
     radius: tuple[float, ...] = parameter(

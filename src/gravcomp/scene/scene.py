@@ -81,7 +81,7 @@ class Scene:
                 if not _SIZES[0] < share < _SIZES[1] and _SIZES[0] < share * unit / wall.file_unit < _SIZES[1]:
                     raise ConfigError(
                         f"{self.source}: scene.meshes ('{name}').file_unit_mm is {1e3 * wall.file_unit:g}: the surface is"
-                        f" {1e3 * size:.3g} mm large beside a robot of {1e3 * length:g} mm; with file_unit_mm: {1e3 * unit:g}"
+                        f" {1e3 * size:.3g} mm large, next to a robot of {1e3 * length:g} mm; with file_unit_mm: {1e3 * unit:g}"
                         f" it is {1e3 * size * unit / wall.file_unit:.4g} mm large"
                     )
 
