@@ -26,6 +26,9 @@ def test_gravity_from_the_arm_only_works_as_well(gravcomp):
 
 def test_an_arm_with_other_axes_is_refused_in_words(gravcomp, tmp_path):
     xacro = tmp_path / "two.urdf.xacro"
-    xacro.write_text('<robot name="two"><link name="world"/><link name="soft_tip"/></robot>')
+    xacro.write_text(
+        '<robot name="two"><link name="world"/><link name="soft_tip"/>'
+        '<joint name="arm" type="fixed"><parent link="world"/><child link="soft_tip"/></joint></robot>'
+    )
     answer = gravcomp("arm", "--xacro", str(xacro))
     assert answer.code == 2 and "has no link 'soft_base'; it has: world, soft_tip" in answer.err
