@@ -25,7 +25,7 @@ from gravcomp.training.build import alone
 SMALL = BuildOptions(
     modes=30,
     strains=24,
-    training=TrainingOptions(paths=24, steps=12, bend=0.3),
+    training=TrainingOptions(paths=36, steps=12, bend=0.3),
     test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
 )
 
