@@ -21,7 +21,7 @@ from gravcomp.references.beams import Tube, elastica, euler_bernoulli
 from gravcomp.report.page import write_index, write_report
 from gravcomp.report.result import Figure, Plot, Result, Table, number
 from gravcomp.sweep import Sweep
-from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.free_fall import falling_rod, free_fall
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.trials.lumen import Lumen
 from gravcomp.virtual.motion import StaticMotion, base_orientation
@@ -211,10 +211,16 @@ def test_the_loop_lets_the_robot_sag_and_straightens_it(setup):
 
 
 def test_a_free_fall_begins_straight_and_ends_where_the_robot_hangs(setup):
-    fall = free_fall((setup, 0.0, 0.0, 1.0, 0))
-    # A tracker's noise is 0.1 mm a coordinate, and half a degree of the direction.
-    assert np.linalg.norm(fall.tip_position[0] - [0.0, 0.0, 0.1]) < 0.6e-3
-    assert fall.tip_direction[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+    fall, base = free_fall((setup, 0.0, 0.0, 1.0, 0)), base_orientation(0.0)
+    true = [(base.T @ position[-1], base.T @ orientation[-1, :, 2]) for position, orientation in falling_rod(setup, base, 1.0)]
+    tip, direction = (np.array(column) for column in zip(*true))
+    assert tip[0] == pytest.approx([0.0, 0.0, 0.1], abs=1e-9)
+    assert direction[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    # A tracker's noise is 0.1 mm a coordinate, and half a degree of the direction; along the direction none is seen.
+    assert len(fall.tip_position) == len(tip) == 101
+    assert (fall.tip_position - tip).std() == pytest.approx(0.1e-3, rel=0.2)
+    assert (fall.tip_direction - direction).std() == pytest.approx(np.sqrt(2 / 3) * np.radians(0.5), rel=0.2)
+    assert np.linalg.norm(fall.tip_position[0] - tip[0]) < 0.6e-3
     # In free fall at first: g t^2 / 2 is 0.5 mm after 10 ms, one and a half times that at the tip.
     assert 0.3e-3 < -fall.tip_position[1, 0] < 1.2e-3
     assert fall.tip_position[:, 0].min() < -40e-3 < fall.tip_position[-1, 0] < -20e-3

@@ -111,7 +111,13 @@ def energy(rod, shape) -> float:
     strain = np.empty((rod.elements, 6))
     strains(shape.orientation, shape.position, rod.length, strain)
     off = strain - rod.rest_strain
-    return 0.5 * float(np.einsum("e,ei,eij,ej->", rod.length, off, rod.stiffness, off))
+    linear = 0.5 * np.einsum("e,ei,eij,ej->", rod.length, off, rod.stiffness, off)
+    # The law's curve: integral of c e^2 + d e^3 in each filament, whose strain e stays on this side of the straight part.
+    of_filament = off[:, 2, None] + off[:, 3, None] * rod.filament[:, :, 0] + off[:, 4, None] * rod.filament[:, :, 1]
+    c, d, folding = (rod.curve[:, i, None] for i in range(3))
+    assert np.all(of_filament > folding)
+    curved = np.einsum("e,ef,ef->", rod.length, rod.filament[:, :, 2], c * of_filament**3 / 3 + d * of_filament**4 / 4)
+    return float(linear + curved)
 
 
 def test_section_constants_of_closed_forms():
