@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import yaml
 
 from gravcomp.calibration.apply import robot_of_poses
 from gravcomp.calibration.chain import Chain
@@ -219,9 +220,8 @@ def test_calibrate_fits_a_table_and_writes_the_robot(tmp_path, capsys, monkeypat
         == 0
     )
     assert "written" in capsys.readouterr().out
-    written = (tmp_path / "out.yaml").read_text()
-    modulus = float(written.split("youngs_modulus_mpa:")[1].split(",")[0])
-    assert modulus == pytest.approx(0.4, rel=0.02)
+    (segment,) = yaml.safe_load((tmp_path / "out.yaml").read_text())["robot"]["segments"]
+    assert segment["material"]["youngs_modulus_mpa"] == pytest.approx(0.4, rel=0.02)
 
 
 def test_a_folder_without_measurements_is_refused(tmp_path):
