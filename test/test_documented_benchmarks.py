@@ -14,6 +14,8 @@ pytestmark = pytest.mark.timeout(1600)
         ("./gravcomp bench estimator", "CPU time of a sample"),
         ("./gravcomp bench estimator --write src/doc/figures.md", "CPU time of a sample"),
         ("./gravcomp bench streams --json", "bench streams"),
+        ("./gravcomp bench board", "hostile frames"),
+        ("./gravcomp bench loads", "payload"),
         ("./gravcomp bench joints --write src/doc/joints.md", "joint_bridge"),
         ("./gravcomp bench track", "with a tracker"),
         ("./gravcomp bench track --write src/doc/figures.md", "with a tracker"),

@@ -56,6 +56,7 @@ ROS2_LINES = (
     ("ros2 service call /inverse_controller/enable std_srvs/srv/SetBool '{data: true}'", "success=True"),
     ("ros2 lifecycle set /inverse_controller deactivate", "successful"),
     ("ros2 lifecycle set /inverse_controller activate", "successful"),
+    ("ros2 param set /fem_simulator payload_mass_g 3.0", "successful"),
     ("ros2 service call /can_bridge/home std_srvs/srv/Trigger", "success=True"),
     ("ros2 service call /can_bridge/stop std_srvs/srv/Trigger", "success=True"),
 )

@@ -32,6 +32,11 @@ def test_a_robot_with_joints_is_demonstrated(type_in):
     assert code == 0 and "sag without compensation" in output and "joint_bridge" in output, output
 
 
+def test_the_firmware_is_the_board_of_a_demonstration(type_in):
+    code, output = type_in("./gravcomp demo --board emulated", "--headless --duration 12")
+    assert code == 0 and "sag without compensation" in output, output
+
+
 @pytest.fixture
 def own_domain(monkeypatch):
     """A ROS domain without other nodes."""

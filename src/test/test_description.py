@@ -97,7 +97,7 @@ def test_the_error_names_the_mistake(document, tmp_path, mistake, words):
 
 def test_unknown_sections_and_missing_files_are_refused(document, tmp_path):
     document["motors"] = {}
-    with pytest.raises(ConfigError, match="unknown key 'motors'; allowed: robot, scene, hardware, virtual_robot, nodes, base, calibration"):
+    with pytest.raises(ConfigError, match="unknown key 'motors'; allowed: robot, scene, hardware, virtual_robot, nodes"):
         load(document, tmp_path)
     with pytest.raises(ConfigError, match=r"does not exist; give the path .* or the name of a shipped robot: article"):
         load_robot_file("artikle")
