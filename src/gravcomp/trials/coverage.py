@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics, starting_parameters
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import StaticParameters
@@ -60,8 +61,8 @@ def coverage(robot: Robot, poses: Sequence[PlannedPose], seeds: Sequence[int]) -
         fit = fit_statics(robot, linear.windows, groups=_GROUPS, mass=mass, noise=noise, predictor=linear)
         for estimate in fit.estimates:
             if estimate.seen:
-                unit = estimate.value / float(fit.parameters.values(estimate.kind)[estimate.index]) if estimate.value else 1.0
-                error = estimate.value - unit * float(true.values(estimate.kind)[estimate.index])
+                _, factor = edge_unit(estimate.kind)
+                error = estimate.value - factor * float(true.values(estimate.kind)[estimate.index])
                 errors.setdefault(estimate.kind, []).append(error)
                 halves.setdefault(estimate.kind, []).append(estimate.interval)
     return {
