@@ -28,10 +28,9 @@ _NO_CREEP = 1e-4  # ratio of a branch that is not described
 def calibrated_robot(
     robot: Robot,
     parameters: StaticParameters,
-    damping_time: float | None = None,
     creep_times: tuple[float, ...] = (),
 ) -> Robot:
-    """Return the robot with the fitted parameters and, if given, damping time in s; creep_times: of its branches in s."""
+    """Return the robot with the fitted parameters; creep_times: of its branches in s."""
     robot = with_cable_places(robot, parameters.radius, parameters.angle)
     cables = tuple(
         dataclasses.replace(
@@ -40,8 +39,6 @@ def calibrated_robot(
         )
         for cable, compliance in zip(robot.cables, parameters.compliance)
     )
-    if damping_time is not None:
-        robot = robot.with_material(damping_time=damping_time)
     if creep_times:
         robot = robot.with_material(prony=_terms(parameters.creep, creep_times), creep_ratio=0.0)
     moduli = np.broadcast_to(parameters.youngs_modulus, len(robot.materials))

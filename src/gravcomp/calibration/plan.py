@@ -214,9 +214,7 @@ def _pose(
     return PlannedPose(inclination, roll, displacement, pulled, tension, shape.tip_position)
 
 
-def _chosen(
-    candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, held: float, options: PlanOptions
-) -> list[int]:
+def _chosen(candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, held: float, options: PlanOptions) -> list[int]:
     """Return the chosen candidates. rows (k, 6, u): derivatives over the noise; held: time in s of each pose."""
     information = prior.T @ prior
     chosen: list[int] = []
