@@ -213,15 +213,20 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
     if bias_model is not None:
         estimator["bias_model_file"] = str(bias_model.resolve())
     if found.mount is not None:
-        _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in found.mount]
+        _set_mount(document, found.mount)
     _write(document, target)
 
 
 def write_mount(source: str | Path, target: str | Path, rpy: tuple[float, float, float]) -> None:
     """Write the robot's file `source` to `target` with the mount of the IMU: roll, pitch, yaw in rad. Raises ConfigError."""
     document = _document(source)
-    _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
+    _set_mount(document, rpy)
     _write(document, target)
+
+
+def _set_mount(document: dict, rpy: tuple[float, float, float]) -> None:
+    """Write roll, pitch, yaw in rad into the document; one on a base may have no section `robot` yet."""
+    _section(_section(document, "robot"), "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
 
 
 def _section(mapping: dict, key: str) -> dict:
