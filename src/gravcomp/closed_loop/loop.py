@@ -313,7 +313,7 @@ class ClosedLoop:
                 shape.tip_direction,
                 self._sent,
                 truth.base_position,
-                float(np.linalg.norm(truth.contact_force, axis=1).sum()),
+                truth.wall_force,
                 float(truth.contact_depth.max(initial=0.0)),
             )
         )

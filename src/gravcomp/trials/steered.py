@@ -126,7 +126,7 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
         base = Rotation.from_quat(truth.base_orientation).as_matrix()
         tip = truth.base_position + base @ truth.tip_position
         picture = camera.look(tip, base @ Rotation.from_quat(truth.tip_orientation).as_matrix(), target)
-        does = hand.act(picture, float(np.linalg.norm(truth.contact_force, axis=1).sum()))
+        does = hand.act(picture, truth.wall_force)
         hurt += does.hurt
         near = float(np.linalg.norm(target - tip)) < _NEAR * width
         held = held + _PERIOD if near and picture.off_middle < _CENTRED else 0.0

@@ -26,7 +26,7 @@ class MovingRod:
     ):
         """Start unloaded and at rest, the base at the origin, the tendons slack. Without `surroundings` nothing is around it."""
         self.model, self.material, self.friction = model, material, friction
-        self._around = around = surroundings or RodSurroundings.none(model)
+        self._around = around = surroundings or RodSurroundings.none()
         self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
         self._rim = np.zeros((len(around.walls.moving), 3))
         self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
@@ -73,7 +73,7 @@ class MovingRod:
     @property
     def touches(self) -> Touches:
         """The places where the rod touches walls at present."""
-        return touches_of(self._touching, self._around.walls, self.orientation, self.position)
+        return touches_of(self._touching)
 
     def place_free_of_walls(self, shape: RodShape, base_orientation: np.ndarray, base_position: np.ndarray) -> tuple[float, int]:
         """Set the rod to `shape` as `rest` does; return by how much (m) it is then in a wall, and that obstacle's number."""

@@ -216,7 +216,6 @@ class VirtualRobot:
             temperature=self._board.temperature,
             recorded=self._base.recorded,
             base_position=self._rod.position[0].copy(),
-            contact_position=(touches.place - self._rod.position[0]) @ base,
             contact_force=touches.force @ base,
             contact_depth=touches.depth,
         )
