@@ -8,7 +8,7 @@ from gravcomp.report.drawing import WITHOUT as WITHOUT_COLOUR
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
 from gravcomp.trials.lumen import Lumen
-from gravcomp.trials.steered import Passage, Steered, steer
+from gravcomp.trials.steered import DEPTH, Passage, Steered, steer
 
 _SEEDS = 20
 _SECONDS = 20.0  # until a run is given up
@@ -33,7 +33,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
         Figure("steered: peak force of the wall, without / with compensation, median of the seeds", ratio, "", limit=_FORCE_RATIO,
                at_least=True),
         Figure("steered: peak force of the wall with compensation, median", float(np.median([r.peak for r in held])), "N"),
-        Figure("steered: deepest place in a wall, all runs", 1e3 * max(r.worst for r in runs), "mm", limit=0.02),
+        Figure("steered: deepest place in a wall, all runs", 1e3 * max(r.worst for r in runs), "mm", limit=1e3 * DEPTH),
     ]  # fmt: skip
     header = ("seed", "lumen", "compensation", "reached", "time, s", "peak force, N", "mean force, N", "path of the tip, mm",
               "time at pain, %", "deepest in the wall, mm")  # fmt: skip
@@ -54,7 +54,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
             header,
             rows,
             "Reached: the target near the middle of the picture, and in reach of a tool, for half a second, no wall entered by"
-            " more than 0.02 mm. A run that does not reach it is given up.",
+            f" more than {1e3 * DEPTH:g} mm. A run that does not reach it is given up.",
         ),
     ]
     result.notes += [
@@ -101,7 +101,7 @@ def _forces(held: list[Steered], without: list[Steered]) -> str:
     with Drawing(1, 2, width=9.0, height=3.0, sharey=True) as drawing:
         for axes, runs, colour, title in zip(drawing.axes, (without, held), (WITHOUT_COLOUR, REAL), ("without", "with")):
             for run in runs:
-                axes.plot(0.01 * np.arange(len(run.force)), run.force, color=colour, linewidth=0.7, alpha=0.6)
+                axes.plot(run.samples, run.force, color=colour, linewidth=0.7, alpha=0.6)
             axes.set_title(f"{title} compensation")
             axes.set_xlabel("time in s")
         drawing.axes[0].set_ylabel("force of the wall in N")
