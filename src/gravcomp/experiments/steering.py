@@ -6,8 +6,9 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.report.drawing import REAL, TARGET, Drawing, draw_robot
 from gravcomp.report.drawing import WITHOUT as WITHOUT_COLOUR
 from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.lumen import Lumen
+from gravcomp.trials.lumen import Reach
 from gravcomp.trials.steered import DEPTH, Passage, Steered, steer
 
 _SEEDS = 20
@@ -17,10 +18,11 @@ _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0
 
 
-def add_steering(result: Result, context: Context, setup: Setup, places: list[tuple[str, Lumen, float, float]]) -> None:
-    """Add to `result` what a person reaches in `places`: name, lumen, inclination and roll in deg; seeds take turns."""
+def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -> None:
+    """Add to `result` what a person reaches in the lumens of `reaches`, with the calibrated controller; seeds take turns."""
+    setup = context.once(calibrate_on_virtual_robot).setup
     seeds = range(1, 2 if context.brief else 1 + _SEEDS)
-    passages = [_passage(setup, places[seed % len(places)], seed) for seed in seeds]
+    passages = [_passage(setup, reaches[seed % len(reaches)], seed) for seed in seeds]
     jobs = [(setup, passage, way, seed) for passage, seed in zip(passages, seeds) for way in (True, False)]
     runs = context.map(steer, jobs, "a person steers through lumens")
     held, without = runs[::2], runs[1::2]
@@ -45,7 +47,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
     result.parts += [
         Plot(
             "A person steers: the lumen and the path of the tip",
-            _lumens(held[: len(places)], without[: len(places)]),
+            _lumens(held[: len(reaches)], without[: len(reaches)]),
             "Section in the plane of bending. Vermilion with compensation, pink without; dot: the target on the wall.",
         ),
         Plot("A person steers: force of the wall", _forces(held, without), "Sum of the sizes of all contact forces; every seed."),
@@ -64,12 +66,11 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
     ]
 
 
-def _passage(setup: Setup, place: tuple[str, Lumen, float, float], seed: int) -> Passage:
-    name, lumen, inclination, roll = place
+def _passage(setup: Setup, reach: Reach, seed: int) -> Passage:
     length, random = setup.robot.length, np.random.default_rng([seed, 11])
     return Passage(
-        name, lumen, inclination, roll, first=_FIRST * length, depth=random.uniform(*_DEPTHS) * length,
-        angle=random.uniform(0.0, 2.0 * np.pi), seconds=_SECONDS,
+        reach.name, reach.lumen, reach.inclination, reach.roll, first=_FIRST * length,
+        depth=random.uniform(*_DEPTHS) * length, angle=random.uniform(0.0, 2.0 * np.pi), seconds=_SECONDS,
     )  # fmt: skip
 
 
