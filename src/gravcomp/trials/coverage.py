@@ -14,10 +14,12 @@ import numpy as np
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics, starting_parameters
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import StaticParameters
-from gravcomp.calibration.plan import PlannedPose
+from gravcomp.calibration.plan import PlannedPose, make_plan
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import GROUPS
-from gravcomp.description import Robot
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.description import Robot, load_robot_file
+from gravcomp.full_model.modes import first_period
 from gravcomp.mesh.tube import with_coarse_elements
 
 _GROUPS = set(GROUPS) - {"creep"}  # of poses without a history
@@ -126,11 +128,6 @@ def coverage_of_robots(
     files: Sequence[str], seeds: Sequence[int], progress: Callable[[str], None]
 ) -> dict[str, dict[str, Covered]]:
     """Return the coverage of robots, each in its own plan. Raises ConfigError, MeshError."""
-    from gravcomp.calibration.plan import make_plan
-    from gravcomp.closed_loop.setup import Setup
-    from gravcomp.description import load_robot_file
-    from gravcomp.full_model.modes import first_period
-
     found = {}
     for file in files:
         setup = Setup.of(load_robot_file(file))
