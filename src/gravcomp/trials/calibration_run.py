@@ -67,11 +67,10 @@ def measure(context: Context, plan: Plan) -> Measured:
     return context.map(run_plan, [(context.setup, plan)], stage)[0]
 
 
-def weighed(setup: Setup, noise: TipNoise | None = None) -> float:
+def weighed(setup: Setup) -> float:
     """Return the mass in kg of the virtual robot's body and payload, as a balance shows it."""
-    noise = noise or TipNoise()
     true = RobotModel(with_coarse_elements(_with_true_densities(setup))).mass
-    return true * float(1.0 + noise.balance * np.random.default_rng([setup.seed, 1]).standard_normal())
+    return true * float(1.0 + TipNoise().balance * np.random.default_rng([setup.seed, 1]).standard_normal())
 
 
 def calibrate_on_virtual_robot(context: Context) -> Calibration:
@@ -104,15 +103,6 @@ def run_plan(job: tuple[Setup, Plan]) -> Measured:
     time, gravity, displacement, tip, direction = (np.array(column)[rows] for column in zip(*rig.rows))
     tip, direction = Tracker().seen(setup.nominal.length, tip, direction, np.random.default_rng([setup.seed, 0]))
     return Measured("virtual robot", np.zeros(len(time), int), time, gravity, displacement, tip, direction)
-
-
-def joined(trials: list[Measured]) -> Measured:
-    """Concatenate trials to one measurement."""
-    columns = {
-        name: np.concatenate([getattr(trial, name) for trial in trials])
-        for name in ("trial", "time", "gravity", "displacement", "tip_position", "tip_direction")
-    }
-    return Measured(source=trials[0].source, **columns)
 
 
 def _stops(plan: Plan) -> tuple[list[tuple[np.ndarray, float]], float]:
