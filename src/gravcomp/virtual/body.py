@@ -59,15 +59,12 @@ def build_rod(true: TrueRobot) -> RodModel:
         k = _nearest(ends, s)
         mass[k] += one
         inertia[k] += np.diag([about_diameter, about_diameter, about_axis])
-    for load, s, offset in loads:
-        k = _nearest(ends, s)
-        mass[k] += load.mass
-        moment[k] += load.mass * offset
-        inertia[k] += load.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    payload, at = robot.payload, np.array(robot.payload.centre)
-    mass[-1] += payload.mass
-    moment[-1] += payload.mass * at
-    inertia[-1] += payload.mass * (at @ at * np.eye(3) - np.outer(at, at))
+    carried = [(_nearest(ends, s), load.mass, offset) for load, s, offset in loads]
+    carried.append((n, robot.payload.mass, np.array(robot.payload.centre)))
+    for k, one, offset in carried:
+        mass[k] += one
+        moment[k] += one * offset
+        inertia[k] += one * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     centre = moment / np.maximum(mass, 1e-300)[:, None]
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
