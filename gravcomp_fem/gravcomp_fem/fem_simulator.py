@@ -75,8 +75,8 @@ class FemSimulator(ManagedNode):
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
         self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
-        robot = self.robot_file.robot
-        self._chain_names = joint_names(self.parameters.joint_prefix, len(robot.effectors.backbone_station))
+        points = len(self.robot_file.robot.effectors.backbone_station)
+        self._chain_names = joint_names(self.parameters.joint_prefix, points)
         self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
         self._loads = LoadInputs(self, self.robot_file.robot, self.parameters)
 
