@@ -7,6 +7,20 @@ from gravcomp.graph.interface import Node, Port
 
 _PARAMETERS = "gravcomp.graph.parameters"
 _DIAGNOSTICS = Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "state of the node, 1 Hz")
+_CONTROLLER = (
+    Port(
+        "CONTROLLER/joint_trajectory",
+        "trajectory_msgs/msg/JointTrajectory",
+        "angles in rad (command: trajectory)",
+        optional=True,
+    ),
+    Port(
+        "CONTROLLER/commands",
+        "std_msgs/msg/Float64MultiArray",
+        "angles in rad or efforts in N m (position, effort)",
+        optional=True,
+    ),
+)
 
 NODES = (
     Node(
@@ -40,14 +54,7 @@ NODES = (
         ),
         publishes=(
             Port("cable/state", "gravcomp_msgs/msg/CableState", "bridge state, measured displacements (m) and tensions (N)"),
-            Port(
-                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
-                optional=True,
-            ),
-            Port(
-                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
-                optional=True,
-            ),
+            *_CONTROLLER,
             _DIAGNOSTICS,
         ),
         services=(
@@ -59,16 +66,7 @@ NODES = (
     Node(
         "gravcomp_hw", "joint_robot", "stands in for a ros2_control robot: its controller, its joint_states and an IMU",
         f"{_PARAMETERS}.joint_robot:JointRobotParameters",
-        subscribes=(
-            Port(
-                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
-                optional=True,
-            ),
-            Port(
-                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
-                optional=True,
-            ),
-        ),
+        subscribes=_CONTROLLER,
         publishes=(
             Port("joint_states", "sensor_msgs/msg/JointState", "angles (rad), speeds (rad/s), efforts (N m) of the joints"),
             Port(
