@@ -98,6 +98,11 @@ class ArmGravity(ManagedNode):
             if publisher is not None:
                 self.destroy_publisher(publisher)
 
+    def parameters_changed(self, old: ArmGravityParameters, new: ArmGravityParameters) -> None:
+        """Apply new deviations and limits to the fusion."""
+        if hasattr(self, "_fusion"):
+            self._fusion.trust(new.imu_std, new.arm_std, new.tolerance, new.patience)
+
     # The arm's pose.
 
     def _on_description(self, message: String) -> None:
