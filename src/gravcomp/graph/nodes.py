@@ -109,7 +109,7 @@ NODES = (
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
             Port("external/wrench", "geometry_msgs/msg/WrenchStamped", "known force (N) and moment (N m); the frame says where"),
-            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m (load.kind)"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m"),
             Port("measured/tension", "sensor_msgs/msg/JointState", "tensions of the cables in effort, N (load.kind)"),
         ),
         publishes=(
