@@ -23,9 +23,7 @@ bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
   loop->target = gc_target_stored(model.settings);
   gc_gravity_reset(&loop->gravity, model.settings);
   gc_equilibrium_reset(&loop->equilibrium, &loop->model);
-  float zero[GC_CABLES_MAX];  // homing leaves the cables where the straight robot has them
-  gc_zero(zero, sizeof zero);
-  gc_inverse_reset(&loop->controller, &loop->model, zero);
+  gc_inverse_reset(&loop->controller, &loop->model);  // homing leaves the cables where the straight robot has them
   return true;
 }
 
