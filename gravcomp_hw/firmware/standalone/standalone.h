@@ -24,7 +24,6 @@ typedef struct {
   gc_equilibrium equilibrium;
   gc_shape shape;
   gc_inverse_controller controller;
-  gc_target target;
   float down[3];      // m/s^2, gravity in soft_base
   bool has_gravity;
   bool has_sample;
