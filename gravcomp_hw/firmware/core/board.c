@@ -97,7 +97,6 @@ static void send_currents(gc_board *board) {
 }
 
 static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *frame) {
-  board->host_seen = true;
   board->host_time = board->now;
   board->went_silent = false;
   for (uint32_t k = 0; k < MOTORS_A_FRAME; k++) {

@@ -85,7 +85,6 @@ typedef struct {
   gc_homing homing;
   gc_queue queues[GC_BUSES];
   bool bus_off[GC_BUSES];
-  bool host_seen;
   bool went_silent;     // the host has stopped
   bool begun;           // the robot without a PC has begun to home
   uint32_t host_time;   // us, of the last currents

@@ -5,8 +5,6 @@
 
 size_t gc_host_size(void) { return sizeof(gc_host); }
 
-size_t gc_host_record_size(void) { return sizeof(gc_parameter_record); }
-
 static bool erase(void *context, uint32_t place) {
   gc_host *host = (gc_host *)context;
   if (host->words_left == 0u) {

@@ -11,7 +11,6 @@ typedef struct {
 } gc_host;
 
 size_t gc_host_size(void);
-size_t gc_host_record_size(void);
 
 // Let a board that was copied to another place in memory use its own stored places.
 void gc_host_attach(gc_host *host);
