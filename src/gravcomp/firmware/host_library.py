@@ -54,7 +54,6 @@ def load() -> ctypes.CDLL:
         ("transmit", flag, (memory, u32, frame)),
         ("bus_off", None, (memory, u32, flag)),
         ("duty", u32, (memory,)),
-        ("state", u32, (memory,)),
         ("faults", u32, (memory,)),
     ):
         function = getattr(library, f"gc_host_{name}")

@@ -13,11 +13,10 @@ from pathlib import Path
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.environment.errors import SetupError
-from gravcomp.firmware.elf import Elf, read_elf
+from gravcomp.firmware.elf import read_elf
 from gravcomp.firmware.sources import CHIP, CORE, EXACT, STANDALONE, WARNINGS, contents, firmware_folder, sources
 from gravcomp.firmware.toolchain import LOCK, zig
 
-BOARDS = ("stm32f407",)
 BOOT_START, CODE_START = 0x08000000, 0x08010000
 _TARGET = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
 _OPTIONS = (
@@ -118,6 +117,3 @@ def _run(command: list[str], environment: dict[str, str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode != 0:
         raise SetupError(f"the firmware's image cannot be built:\n{done.stderr.strip()[-4000:]}")
-
-
-__all__ = ["BOARDS", "BOOT_START", "CODE_START", "Elf", "Image", "build_image"]

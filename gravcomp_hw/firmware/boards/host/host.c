@@ -82,6 +82,4 @@ void gc_host_bus_off(gc_host *host, uint32_t bus, bool off) { gc_board_bus_off(&
 
 uint32_t gc_host_duty(const gc_host *host) { return host->board.heater.duty; }
 
-uint32_t gc_host_state(const gc_host *host) { return (uint32_t)host->board.state; }
-
 uint32_t gc_host_faults(const gc_host *host) { return gc_board_faults(&host->board); }

@@ -37,7 +37,6 @@ bool gc_host_transmit(gc_host *host, uint32_t bus, gc_frame *frame);
 void gc_host_bus_off(gc_host *host, uint32_t bus, bool off);
 
 uint32_t gc_host_duty(const gc_host *host);
-uint32_t gc_host_state(const gc_host *host);
 uint32_t gc_host_faults(const gc_host *host);
 
 #endif
