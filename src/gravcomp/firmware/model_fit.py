@@ -7,6 +7,7 @@ import numpy as np
 
 from gravcomp.cables.friction import Sliding
 from gravcomp.config import ConfigError
+from gravcomp.firmware.cycles import CLOCK_HZ
 from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, POINTS_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
 from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
@@ -19,7 +20,6 @@ from gravcomp.reduction.tracking import ReducedTracker
 SLOT_BYTES = 384 * 1024
 """Room for a blob in the flash of the STM32F407 (boards/stm32f407/image.ld)."""
 
-CLOCK_HZ = 168e6
 LONGEST_MS = 7.0
 """For a step, of the 10 ms between two samples; the rest is for interrupts, and for what the estimate may lack."""
 
