@@ -71,14 +71,19 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
 
 
+def reduction_for(model: RobotModel, source: str) -> Reduction:
+    """Return the reduced model that is built for the robot of the file `source`. Raises ConfigError where there is none."""
+    reduction = load(model)
+    if reduction is None:
+        reason = why_not(model) or f"it is not built: run ./gravcomp model build {source}"
+        raise ConfigError(f"{source}: there is no reduced model for the board: {reason}")
+    return reduction
+
+
 def blob_for(parameters: LoopParameters) -> bytes:
     """Return the blob of a robot. Raises ConfigError where it does not fit, or its reduced model is not built."""
     model = RobotModel(parameters.robot)
-    reduction = load(model)
-    if reduction is None:
-        reason = why_not(model) or "it is not built: run ./gravcomp model build"
-        raise ConfigError(f"{parameters.source}: there is no reduced model for the board: {reason}")
-    return fit(model, reduction, parameters).blob
+    return fit(model, reduction_for(model, parameters.source), parameters).blob
 
 
 def cost(model: ReducedModel) -> tuple[int, float]:
