@@ -87,8 +87,7 @@ bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float inter
   return true;
 }
 
-bool gc_standalone_step(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
-  gc_standalone *loop = (gc_standalone *)context;
+bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
   if (!loop->loaded) {
     return false;
   }

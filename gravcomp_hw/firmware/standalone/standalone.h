@@ -41,9 +41,9 @@ bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size);
 // load rises after a start; the command, in loop->controller, is then the displacement 0.
 bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval);
 
-// Compute targets of the motors from a sample; a gc_controller. displacement (8,) in m, positive: pulled in, and tension (8,) in
+// Compute targets of the motors from a sample. motors: bits of those that exist. displacement (8,) in m, positive: pulled in, and tension (8,) in
 // N, both by the number of the motor less 1. Returns false while there is nothing to send: the motors hold.
-bool gc_standalone_step(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
+bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
 
 // Take a frame of the host: the joystick's. Returns true with the reply, the loop's status. A gc_receiver.
 bool gc_standalone_receive(void *context, const gc_frame *frame, gc_frame *reply);
