@@ -255,21 +255,16 @@ void gc_board_home(gc_board *board) {
   gc_board_enter(board, GC_HOMING);
 }
 
-void gc_board_run(gc_board *board) {
+// Enter a state in which the board drives, from where the cables are.
+static void hold_in(gc_board *board, gc_state state) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     gc_motor_hold(&board->motors[index], &board->parameters, index);
   }
   board->next_drive = board->now;
-  gc_board_enter(board, GC_STANDALONE);
+  gc_board_enter(board, state);
 }
 
-static void hold(gc_board *board) {
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    gc_motor_hold(&board->motors[index], &board->parameters, index);
-  }
-  board->next_drive = board->now;
-  gc_board_enter(board, GC_HOLDING);
-}
+void gc_board_run(gc_board *board) { hold_in(board, GC_STANDALONE); }
 
 static bool has_current(const gc_board *board) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
@@ -289,7 +284,7 @@ static void watch_host(gc_board *board) {
     board->went_silent = true;
     const bool current = has_current(board);
     if (current && is_between(board)) {
-      hold(board);
+      hold_in(board, GC_HOLDING);
     } else if (!current || board->now - board->host_time >= timeout + holding) {
       gc_board_enter(board, GC_RELEASED);
     } else {
@@ -337,7 +332,7 @@ static void finish_homing(gc_board *board) {
       gc_board_run(board);
     } else {
       board->went_silent = false;  // held until the host takes over
-      hold(board);
+      hold_in(board, GC_HOLDING);
     }
   } else {
     // It goes on.
