@@ -29,6 +29,11 @@ static bool is_present(const gc_board *board, uint32_t index) {
 
 static bool is_between(const gc_board *board) { return gc_parameter_int(&board->parameters, GC_WIRING) == 1; }
 
+// Whether the board's own loops drive the motors.
+static bool drives_itself(const gc_board *board) {
+  return board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
+}
+
 uint32_t gc_board_motor_bus(const gc_board *board) { return is_between(board) ? 1u : 0u; }
 
 void gc_board_enter(gc_board *board, gc_state state) {
@@ -64,8 +69,7 @@ void gc_board_start(gc_board *board) {
 
 // Currents to the motors: the wanted ones through the last clamp, zero for motors that do not exist or do not answer.
 static void send_currents(gc_board *board) {
-  const bool driving = board->state == GC_FOLLOWING || board->state == GC_HOLDING || board->state == GC_HOMING ||
-                       board->state == GC_STANDALONE;
+  const bool driving = board->state == GC_FOLLOWING || drives_itself(board);
   for (uint32_t group = 0; group < 2u; group++) {
     gc_frame frame = gc_frame_of(current_ids[group], 8u);
     bool any = false;
@@ -313,7 +317,7 @@ static void watch_motors(gc_board *board) {
     silent = silent || (is_present(board, index) && !gc_rotor_answers(&motor->rotor, board->now));
     gc_motor_warm(motor, &board->parameters, 1e-6f * (float)GC_TICK);
   }
-  const bool own = board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
+  const bool own = drives_itself(board);
   if (silent && (own || board->state == GC_FOLLOWING)) {
     board->passing |= GC_FAULT_MOTOR_SILENT;
   }
@@ -446,8 +450,7 @@ void gc_board_tick(gc_board *board, uint32_t now) {
   }
   watch_motors(board);
   watch_host(board);
-  const bool own = board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
-  if (own && (int32_t)(now - board->next_drive) >= 0) {
+  if (drives_itself(board) && (int32_t)(now - board->next_drive) >= 0) {
     board->next_drive = now + DRIVE_PERIOD;
     drive(board);
   }
