@@ -23,8 +23,16 @@ static uint8_t motors_present(const gc_board *board) {
   return (uint8_t)gc_parameter_int(&board->parameters, GC_MOTORS);
 }
 
-static bool is_present(const gc_board *board, uint32_t index) {
-  return ((uint32_t)motors_present(board) >> index & 1u) != 0u;
+bool gc_board_has_motor(const gc_board *board, uint32_t index) {
+  return index < GC_MOTORS_MOST && ((uint32_t)motors_present(board) >> index & 1u) != 0u;
+}
+
+bool gc_board_motors_answer(const gc_board *board) {
+  bool all = motors_present(board) != 0u;
+  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
+    all = all && (!gc_board_has_motor(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
+  }
+  return all;
 }
 
 static bool is_between(const gc_board *board) { return gc_parameter_int(&board->parameters, GC_WIRING) == 1; }
@@ -76,7 +84,7 @@ static void send_currents(gc_board *board) {
     for (uint32_t k = 0; k < MOTORS_A_FRAME; k++) {
       const uint32_t index = MOTORS_A_FRAME * group + k;
       gc_motor *motor = &board->motors[index];
-      if (!is_present(board, index)) {
+      if (!gc_board_has_motor(board, index)) {
         continue;
       }
       any = true;
@@ -105,7 +113,7 @@ static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *
   board->went_silent = false;
   for (uint32_t k = 0; k < MOTORS_A_FRAME; k++) {
     const uint32_t index = MOTORS_A_FRAME * group + k;
-    if (is_present(board, index) && board->state != GC_HOMING && board->state != GC_STANDALONE) {
+    if (gc_board_has_motor(board, index) && board->state != GC_HOMING && board->state != GC_STANDALONE) {
       board->motors[index].wanted = (int16_t)gc_get16(&frame->data[2u * k]);
     }
   }
@@ -180,7 +188,7 @@ void gc_board_receive(gc_board *board, uint32_t bus, const gc_frame *frame) {
   }
   const uint32_t motor = (uint32_t)frame->id - (uint32_t)GC_ID_FEEDBACK - 1u;
   if (motor < GC_MOTORS_MOST) {
-    if (bus == gc_board_motor_bus(board) && frame->length == 8u && is_present(board, motor)) {
+    if (bus == gc_board_motor_bus(board) && frame->length == 8u && gc_board_has_motor(board, motor)) {
       take_feedback(board, motor, frame);
     }
     return;
@@ -225,7 +233,7 @@ void gc_board_targets(gc_board *board, const float *displacement, const float *t
   const float most = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MAX);
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     const bool usable = gc_finite(displacement[index]) && gc_finite(tension[index]);
-    if (board->state == GC_STANDALONE && is_present(board, index) && usable) {
+    if (board->state == GC_STANDALONE && gc_board_has_motor(board, index) && usable) {
       board->motors[index].target = gc_clamp(displacement[index], least, most);
       board->motors[index].tension = tension[index];
     }
@@ -314,7 +322,7 @@ static void watch_motors(gc_board *board) {
     if (gc_rotor_forget(&motor->rotor, board->now)) {
       motor->zero_known = false;
     }
-    silent = silent || (is_present(board, index) && !gc_rotor_answers(&motor->rotor, board->now));
+    silent = silent || (gc_board_has_motor(board, index) && !gc_rotor_answers(&motor->rotor, board->now));
     gc_motor_warm(motor, &board->parameters, 1e-6f * (float)GC_TICK);
   }
   const bool own = drives_itself(board);
@@ -353,7 +361,7 @@ static void drive(gc_board *board) {
     gc_homing_step(&board->homing, board->motors, &board->parameters, motors_present(board), dt);
   }
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    if (!is_present(board, index)) {
+    if (!gc_board_has_motor(board, index)) {
       continue;
     }
     gc_motor *motor = &board->motors[index];
@@ -418,11 +426,7 @@ static void begin_alone(gc_board *board) {
   if (board->begun || gc_parameter_int(&board->parameters, GC_AT_START) != 1 || board->now < START_TIME) {
     return;
   }
-  bool all = motors_present(board) != 0u;
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    all = all && (!is_present(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
-  }
-  if (all && !board->supply_low && board->state != GC_FAULT) {
+  if (gc_board_motors_answer(board) && !board->supply_low && board->state != GC_FAULT) {
     board->begun = true;
     gc_board_home(board);
   }

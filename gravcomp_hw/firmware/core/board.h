@@ -132,6 +132,12 @@ bool gc_board_transmit(gc_board *board, uint32_t bus, gc_frame *frame);
 // Bus of the motors: that of the host, or the other.
 uint32_t gc_board_motor_bus(const gc_board *board);
 
+// Whether motor `index` + 1 exists.
+bool gc_board_has_motor(const gc_board *board, uint32_t index);
+
+// Whether there are motors and all of them answer.
+bool gc_board_motors_answer(const gc_board *board);
+
 // Enter a state.
 void gc_board_enter(gc_board *board, gc_state state);
 
