@@ -20,8 +20,7 @@ static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
   if (key >= (uint32_t)GC_KEY_DISPLACEMENT && key < (uint32_t)GC_KEY_DISPLACEMENT + GC_MOTORS_MOST) {
     const uint32_t index = key - (uint32_t)GC_KEY_DISPLACEMENT;
     const gc_motor *motor = &board->motors[index];
-    const int32_t from = motor->zero_known ? motor->zero : 0;
-    *value = (uint32_t)(gc_motor_direction(&board->parameters, index) * (motor->rotor.count - from));
+    *value = (uint32_t)gc_motor_counts(motor, &board->parameters, index);
     return motor->rotor.seen ? GC_DONE : GC_NO_MOTOR;
   }
   if (key >= (uint32_t)GC_KEY_ZERO_KNOWN && key < (uint32_t)GC_KEY_ZERO_KNOWN + GC_MOTORS_MOST) {
