@@ -29,7 +29,7 @@ _MAGIC = 0x474D4947
 
 @dataclasses.dataclass(frozen=True)
 class Image:
-    """A built image. `path`: the ELF file; frames: stack that each function takes, in bytes, by name."""
+    """A built image. `path`: the ELF file; frames: stack in bytes by function, the largest where several have one name."""
 
     path: Path
     boot: bytes
@@ -63,7 +63,9 @@ def build_image(*, standalone: bool = False, fresh: bool = False) -> Image:
         _build(parts, standalone, path, usage)
     elf = read_elf(path.read_bytes())
     boot, code = elf.flash(BOOT_START), elf.flash(CODE_START)
-    frames = {name: int(size) for name, size in (line.split() for line in usage.read_text().splitlines())}
+    frames: dict[str, int] = {}
+    for name, size in (line.split() for line in usage.read_text().splitlines()):
+        frames[name] = max(int(size), frames.get(name, 0))
     return Image(path, boot, code, elf.size("gc_data_start", "gc_bss_end"), elf.size("gc_ccm_start", "gc_ccm_end"), frames)
 
 
