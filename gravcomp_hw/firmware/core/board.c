@@ -23,11 +23,24 @@ static uint8_t motors_present(const gc_board *board) {
   return (uint8_t)gc_parameter_int(&board->parameters, GC_MOTORS);
 }
 
-static bool is_present(const gc_board *board, uint32_t index) {
-  return ((uint32_t)motors_present(board) >> index & 1u) != 0u;
+bool gc_board_has_motor(const gc_board *board, uint32_t index) {
+  return index < GC_MOTORS_MOST && ((uint32_t)motors_present(board) >> index & 1u) != 0u;
+}
+
+bool gc_board_motors_answer(const gc_board *board) {
+  bool all = motors_present(board) != 0u;
+  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
+    all = all && (!gc_board_has_motor(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
+  }
+  return all;
 }
 
 static bool is_between(const gc_board *board) { return gc_parameter_int(&board->parameters, GC_WIRING) == 1; }
+
+// Whether the board's own loops drive the motors.
+static bool drives_itself(const gc_board *board) {
+  return board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
+}
 
 uint32_t gc_board_motor_bus(const gc_board *board) { return is_between(board) ? 1u : 0u; }
 
@@ -64,15 +77,14 @@ void gc_board_start(gc_board *board) {
 
 // Currents to the motors: the wanted ones through the last clamp, zero for motors that do not exist or do not answer.
 static void send_currents(gc_board *board) {
-  const bool driving = board->state == GC_FOLLOWING || board->state == GC_HOLDING || board->state == GC_HOMING ||
-                       board->state == GC_STANDALONE;
+  const bool driving = board->state == GC_FOLLOWING || drives_itself(board);
   for (uint32_t group = 0; group < 2u; group++) {
     gc_frame frame = gc_frame_of(current_ids[group], 8u);
     bool any = false;
     for (uint32_t k = 0; k < MOTORS_A_FRAME; k++) {
       const uint32_t index = MOTORS_A_FRAME * group + k;
       gc_motor *motor = &board->motors[index];
-      if (!is_present(board, index)) {
+      if (!gc_board_has_motor(board, index)) {
         continue;
       }
       any = true;
@@ -97,12 +109,11 @@ static void send_currents(gc_board *board) {
 }
 
 static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *frame) {
-  board->host_seen = true;
   board->host_time = board->now;
   board->went_silent = false;
   for (uint32_t k = 0; k < MOTORS_A_FRAME; k++) {
     const uint32_t index = MOTORS_A_FRAME * group + k;
-    if (is_present(board, index) && board->state != GC_HOMING && board->state != GC_STANDALONE) {
+    if (gc_board_has_motor(board, index) && board->state != GC_HOMING && board->state != GC_STANDALONE) {
       board->motors[index].wanted = (int16_t)gc_get16(&frame->data[2u * k]);
     }
   }
@@ -177,7 +188,7 @@ void gc_board_receive(gc_board *board, uint32_t bus, const gc_frame *frame) {
   }
   const uint32_t motor = (uint32_t)frame->id - (uint32_t)GC_ID_FEEDBACK - 1u;
   if (motor < GC_MOTORS_MOST) {
-    if (bus == gc_board_motor_bus(board) && frame->length == 8u && is_present(board, motor)) {
+    if (bus == gc_board_motor_bus(board) && frame->length == 8u && gc_board_has_motor(board, motor)) {
       take_feedback(board, motor, frame);
     }
     return;
@@ -222,7 +233,7 @@ void gc_board_targets(gc_board *board, const float *displacement, const float *t
   const float most = gc_parameter_real(&board->parameters, GC_DISPLACEMENT_MAX);
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     const bool usable = gc_finite(displacement[index]) && gc_finite(tension[index]);
-    if (board->state == GC_STANDALONE && is_present(board, index) && usable) {
+    if (board->state == GC_STANDALONE && gc_board_has_motor(board, index) && usable) {
       board->motors[index].target = gc_clamp(displacement[index], least, most);
       board->motors[index].tension = tension[index];
     }
@@ -256,21 +267,16 @@ void gc_board_home(gc_board *board) {
   gc_board_enter(board, GC_HOMING);
 }
 
-void gc_board_run(gc_board *board) {
+// Enter a state in which the board drives, from where the cables are.
+static void hold_in(gc_board *board, gc_state state) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     gc_motor_hold(&board->motors[index], &board->parameters, index);
   }
   board->next_drive = board->now;
-  gc_board_enter(board, GC_STANDALONE);
+  gc_board_enter(board, state);
 }
 
-static void hold(gc_board *board) {
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    gc_motor_hold(&board->motors[index], &board->parameters, index);
-  }
-  board->next_drive = board->now;
-  gc_board_enter(board, GC_HOLDING);
-}
+void gc_board_run(gc_board *board) { hold_in(board, GC_STANDALONE); }
 
 static bool has_current(const gc_board *board) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
@@ -290,7 +296,7 @@ static void watch_host(gc_board *board) {
     board->went_silent = true;
     const bool current = has_current(board);
     if (current && is_between(board)) {
-      hold(board);
+      hold_in(board, GC_HOLDING);
     } else if (!current || board->now - board->host_time >= timeout + holding) {
       gc_board_enter(board, GC_RELEASED);
     } else {
@@ -316,10 +322,10 @@ static void watch_motors(gc_board *board) {
     if (gc_rotor_forget(&motor->rotor, board->now)) {
       motor->zero_known = false;
     }
-    silent = silent || (is_present(board, index) && !gc_rotor_answers(&motor->rotor, board->now));
+    silent = silent || (gc_board_has_motor(board, index) && !gc_rotor_answers(&motor->rotor, board->now));
     gc_motor_warm(motor, &board->parameters, 1e-6f * (float)GC_TICK);
   }
-  const bool own = board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
+  const bool own = drives_itself(board);
   if (silent && (own || board->state == GC_FOLLOWING)) {
     board->passing |= GC_FAULT_MOTOR_SILENT;
   }
@@ -338,7 +344,7 @@ static void finish_homing(gc_board *board) {
       gc_board_run(board);
     } else {
       board->went_silent = false;  // held until the host takes over
-      hold(board);
+      hold_in(board, GC_HOLDING);
     }
   } else {
     // It goes on.
@@ -355,7 +361,7 @@ static void drive(gc_board *board) {
     gc_homing_step(&board->homing, board->motors, &board->parameters, motors_present(board), dt);
   }
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    if (!is_present(board, index)) {
+    if (!gc_board_has_motor(board, index)) {
       continue;
     }
     gc_motor *motor = &board->motors[index];
@@ -420,11 +426,7 @@ static void begin_alone(gc_board *board) {
   if (board->begun || gc_parameter_int(&board->parameters, GC_AT_START) != 1 || board->now < START_TIME) {
     return;
   }
-  bool all = motors_present(board) != 0u;
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    all = all && (!is_present(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
-  }
-  if (all && !board->supply_low && board->state != GC_FAULT) {
+  if (gc_board_motors_answer(board) && !board->supply_low && board->state != GC_FAULT) {
     board->begun = true;
     gc_board_home(board);
   }
@@ -452,8 +454,7 @@ void gc_board_tick(gc_board *board, uint32_t now) {
   }
   watch_motors(board);
   watch_host(board);
-  const bool own = board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
-  if (own && (int32_t)(now - board->next_drive) >= 0) {
+  if (drives_itself(board) && (int32_t)(now - board->next_drive) >= 0) {
     board->next_drive = now + DRIVE_PERIOD;
     drive(board);
   }

@@ -2,7 +2,7 @@
 // frames and the heater's duty.
 //
 //   IDLE --currents of the host--> FOLLOWING --host silent--> HOLDING --still silent--> RELEASED --currents--> FOLLOWING
-//   IDLE, RELEASED, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
+//   IDLE, RELEASED, FAULT, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
 //   any --stall, runaway, a silent motor while the board drives--> FAULT --resume--> RELEASED
 #ifndef GC_BOARD_H
 #define GC_BOARD_H
@@ -29,7 +29,7 @@ typedef enum {
   GC_FOLLOWING,   // the host's currents
   GC_HOLDING,     // the board holds the cables
   GC_RELEASED,    // zero current
-  GC_FAULT,       // zero current until resume
+  GC_FAULT,       // zero current until resume, stop, or the next homing or run
   GC_HOMING,      // the board homes the cables
   GC_STANDALONE,  // the loop on the board
 } gc_state;
@@ -57,10 +57,6 @@ enum { GC_RESET_POWER, GC_RESET_SUPPLY, GC_RESET_WATCHDOG, GC_RESET_SOFTWARE, GC
 
 #define GC_BUSES 2u
 
-// The loop on the board: targets (m) and expected tensions (N) of the motors, whose bits are in `motors`, from a sample; false:
-// hold. A board calls it below its interrupts, between gc_board_job and gc_board_targets.
-typedef bool gc_controller(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
-
 // Takes a frame of the host for the controller; true when `reply` is to be sent.
 typedef bool gc_receiver(void *context, const gc_frame *frame, gc_frame *reply);
 
@@ -85,7 +81,6 @@ typedef struct {
   gc_homing homing;
   gc_queue queues[GC_BUSES];
   bool bus_off[GC_BUSES];
-  bool host_seen;
   bool went_silent;     // the host has stopped
   bool begun;           // the robot without a PC has begun to home
   uint32_t host_time;   // us, of the last currents
@@ -119,10 +114,10 @@ void gc_board_receive(gc_board *board, uint32_t bus, const gc_frame *frame);
 // Take a sample of the IMU: counts, temperature and stamp are set.
 void gc_board_sample(gc_board *board, const gc_sample *sample);
 
-// Give the sample that the loop on the board has to work on; false when there is none.
+// Give the sample that the loop on the board has to work on, below the interrupts; false when there is none.
 bool gc_board_job(gc_board *board, gc_sample *sample);
 
-// Take the result for eight motors, as of gc_controller.
+// Take the result for eight motors: targets (m) and expected tensions (N).
 void gc_board_targets(gc_board *board, const float *displacement, const float *tension);
 
 // Take note that the supply is too low, or enough again: no current and no heater meanwhile.
@@ -136,6 +131,12 @@ bool gc_board_transmit(gc_board *board, uint32_t bus, gc_frame *frame);
 
 // Bus of the motors: that of the host, or the other.
 uint32_t gc_board_motor_bus(const gc_board *board);
+
+// Whether motor `index` + 1 exists.
+bool gc_board_has_motor(const gc_board *board, uint32_t index);
+
+// Whether there are motors and all of them answer.
+bool gc_board_motors_answer(const gc_board *board);
 
 // Enter a state.
 void gc_board_enter(gc_board *board, gc_state state);

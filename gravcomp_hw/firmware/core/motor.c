@@ -11,10 +11,13 @@ int32_t gc_motor_direction(const gc_parameters *parameters, uint32_t index) {
   return (reversed >> index & 1u) != 0u ? -1 : 1;
 }
 
-float gc_motor_displacement(const gc_motor *motor, const gc_parameters *parameters, uint32_t index) {
+int32_t gc_motor_counts(const gc_motor *motor, const gc_parameters *parameters, uint32_t index) {
   const int32_t from = motor->zero_known ? motor->zero : 0;
-  const float counts = (float)(gc_motor_direction(parameters, index) * (motor->rotor.count - from));
-  return counts * gc_parameter_real(parameters, GC_TRAVEL_PER_COUNT);
+  return gc_motor_direction(parameters, index) * (motor->rotor.count - from);
+}
+
+float gc_motor_displacement(const gc_motor *motor, const gc_parameters *parameters, uint32_t index) {
+  return (float)gc_motor_counts(motor, parameters, index) * gc_parameter_real(parameters, GC_TRAVEL_PER_COUNT);
 }
 
 float gc_motor_velocity(const gc_motor *motor, const gc_parameters *parameters, uint32_t index) {

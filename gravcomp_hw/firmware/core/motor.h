@@ -30,7 +30,10 @@ typedef struct {
 // +1 or -1: sign of the current that pulls the cable in.
 int32_t gc_motor_direction(const gc_parameters *parameters, uint32_t index);
 
-// Displacement (m) from the zero position; from the angle at the first feedback while that is unknown.
+// Counts in the direction that pulls in, from the zero position; from angle 0 of the first turn while that is unknown.
+int32_t gc_motor_counts(const gc_motor *motor, const gc_parameters *parameters, uint32_t index);
+
+// Displacement (m) from the zero position; from angle 0 of the first turn while that is unknown.
 float gc_motor_displacement(const gc_motor *motor, const gc_parameters *parameters, uint32_t index);
 
 // Velocity (m/s).

@@ -8,11 +8,6 @@ static bool drives(const gc_board *board) {
   return board->state != GC_IDLE && board->state != GC_RELEASED && board->state != GC_FAULT;
 }
 
-static bool is_motor(const gc_board *board, uint32_t index) {
-  const uint32_t present = (uint32_t)gc_parameter_int(&board->parameters, GC_MOTORS);
-  return index < GC_MOTORS_MOST && (present >> index & 1u) != 0u;
-}
-
 static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
   if (key < (uint32_t)GC_PARAMETER_COUNT) {
     *value = board->parameters.words[key];
@@ -25,8 +20,7 @@ static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
   if (key >= (uint32_t)GC_KEY_DISPLACEMENT && key < (uint32_t)GC_KEY_DISPLACEMENT + GC_MOTORS_MOST) {
     const uint32_t index = key - (uint32_t)GC_KEY_DISPLACEMENT;
     const gc_motor *motor = &board->motors[index];
-    const int32_t from = motor->zero_known ? motor->zero : 0;
-    *value = (uint32_t)(gc_motor_direction(&board->parameters, index) * (motor->rotor.count - from));
+    *value = (uint32_t)gc_motor_counts(motor, &board->parameters, index);
     return motor->rotor.seen ? GC_DONE : GC_NO_MOTOR;
   }
   if (key >= (uint32_t)GC_KEY_ZERO_KNOWN && key < (uint32_t)GC_KEY_ZERO_KNOWN + GC_MOTORS_MOST) {
@@ -91,7 +85,7 @@ static uint8_t save(gc_board *board, uint32_t value) {
 // The motor's displacement is `value` counts now.
 static uint8_t set_zero(gc_board *board, uint32_t index, uint32_t value) {
   const int32_t counts = (int32_t)value;
-  if (!is_motor(board, index)) {
+  if (!gc_board_has_motor(board, index)) {
     return GC_UNKNOWN_KEY;
   }
   if (counts > 0x10000000 || counts < -0x10000000) {
@@ -107,29 +101,16 @@ static uint8_t set_zero(gc_board *board, uint32_t index, uint32_t value) {
 }
 
 static uint8_t forget_zero(gc_board *board, uint32_t index) {
-  if (!is_motor(board, index)) {
+  if (!gc_board_has_motor(board, index)) {
     return GC_UNKNOWN_KEY;
   }
   board->motors[index].zero_known = false;
   return GC_DONE;
 }
 
-static bool all_answer(const gc_board *board) {
-  bool any = false;
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    if (is_motor(board, index)) {
-      any = true;
-      if (!gc_rotor_answers(&board->motors[index].rotor, board->now)) {
-        return false;
-      }
-    }
-  }
-  return any;
-}
-
 static bool all_have_zeros(const gc_board *board) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    if (is_motor(board, index) && !board->motors[index].zero_known) {
+    if (gc_board_has_motor(board, index) && !board->motors[index].zero_known) {
       return false;
     }
   }
@@ -140,7 +121,7 @@ static uint8_t home(gc_board *board) {
   if (drives(board) && board->state != GC_STANDALONE) {
     return GC_WRONG_STATE;
   }
-  if (!all_answer(board)) {
+  if (!gc_board_motors_answer(board)) {
     return GC_NO_MOTOR;
   }
   gc_board_home(board);
@@ -154,7 +135,7 @@ static uint8_t run(gc_board *board) {
   if (!board->has_controller || !all_have_zeros(board)) {
     return GC_WRONG_STATE;
   }
-  if (!all_answer(board)) {
+  if (!gc_board_motors_answer(board)) {
     return GC_NO_MOTOR;
   }
   gc_board_run(board);

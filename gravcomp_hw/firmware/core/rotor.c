@@ -17,7 +17,6 @@ static int32_t wrapped(int32_t counts) {
 
 bool gc_rotor_update(gc_rotor *rotor, uint16_t angle, int16_t speed, int16_t current, uint32_t now) {
   if (angle >= (uint16_t)GC_COUNTS_PER_TURN || speed > SPEED_LIMIT || speed < -SPEED_LIMIT) {
-    rotor->rejected++;
     return false;
   }
   (void)gc_rotor_forget(rotor, now);

@@ -13,7 +13,6 @@ typedef struct {
   int32_t current;    // mA
   uint32_t time;      // us, of the last feedback
   bool seen;          // there was a feedback, not longer ago than GC_ROTOR_FORGOTTEN
-  uint32_t rejected;  // feedbacks that no rotor can have sent
 } gc_rotor;
 
 #define GC_ROTOR_FORGOTTEN 1000000u  // us of silence after which the turns are unknown

@@ -1,5 +1,6 @@
 #include "cables.h"
 
+#include "../core/maths.h"
 #include "trigonometry.h"
 
 // Subtract `share` times t . D of a piece from a row (r,); change (3, r): D.
@@ -31,7 +32,7 @@ static void moved_by(const float *restrict change, const float *restrict q, uint
 static float angle_between(const float *a, const float *b) {
   const float x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
   const float cosine = (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-  return gc_atan2(__builtin_sqrtf((x * x + y * y) + z * z), cosine);
+  return gc_atan2(gc_sqrt((x * x + y * y) + z * z), cosine);
 }
 
 // Return (1 - exp(-turn)) / turn.
@@ -91,7 +92,7 @@ void gc_cables_at(const gc_model *model, const float *q, const float *pulling, g
     moved_by(change, q, r, moved);
     const float *rest = model->piece_rest + 3u * s;
     const float x = rest[0] + moved[0], y = rest[1] + moved[1], z = rest[2] + moved[2];
-    const float length = __builtin_sqrtf((x * x + y * y) + z * z), inverse = 1.0f / length;
+    const float length = gc_sqrt((x * x + y * y) + z * z), inverse = 1.0f / length;
     at->length[s] = length;
     at->displacement[i] -= length;
     at->tangent[s][0] = x * inverse, at->tangent[s][1] = y * inverse, at->tangent[s][2] = z * inverse;

@@ -12,16 +12,11 @@
 #define GC_RATE_MARGIN 1e-6f         // m
 #define GC_TENSION_MARGIN 1e-3f      // N
 
-void gc_inverse_reset(gc_inverse_controller *controller, const gc_model *model, const float *displacement) {
+void gc_inverse_reset(gc_inverse_controller *controller, const gc_model *model) {
+  gc_zero(controller, sizeof *controller);
   controller->model = model;
-  controller->started = displacement != NULL;
   controller->damping = 1.0f;
   controller->code = GC_CODE_INACTIVE;
-  gc_zero(controller->tension, sizeof controller->tension);
-  gc_zero(controller->change, sizeof controller->change);
-  if (displacement != NULL) {
-    gc_copy(controller->displacement, displacement, sizeof(float) * model->cables);
-  }
   gc_retreat_reset(&controller->retreat, model->settings);
 }
 
@@ -169,12 +164,8 @@ void gc_inverse_step(gc_inverse_controller *controller, const gc_shape *shape, c
   float largest = 0.0f;
   interval = gc_clamp(interval, 0.0f, longest_interval(model, shape));
   for (uint32_t i = 0; i < m; ++i) {
-    if (!controller->started) {
-      controller->displacement[i] = shape->displacement[i];
-    }
     largest = gc_max(largest, shape->tension[i]);
   }
-  controller->started = true;
   const gc_move move = gc_retreat_move(&controller->retreat, model->settings, shape->converged, target, shape->tip, largest);
   if (shape->converged) {
     interval *= controller->retreat.stride;
@@ -196,18 +187,4 @@ void gc_inverse_step(gc_inverse_controller *controller, const gc_shape *shape, c
     return;
   }
   take(controller, &problem, &solution, shape, target, interval);
-}
-
-void gc_inverse_relax(gc_inverse_controller *controller, const gc_shape *shape, float slack, float interval) {
-  const gc_model *model = controller->model;
-  const uint32_t m = model->cables;
-  float displacement[GC_CABLES_MAX], none[GC_CABLES_MAX];
-  gc_zero(none, sizeof none);
-  interval = gc_clamp(interval, 0.0f, GC_LONGEST_INTERVAL);
-  for (uint32_t i = 0; i < m; ++i) {
-    const float free = path_under(shape, m, i, none) - slack;
-    displacement[i] = controller->started ? within_limits(model->settings, free, controller->displacement[i], interval) : free;
-  }
-  gc_inverse_reset(controller, model, displacement);
-  controller->code = GC_CODE_RELAXING;
 }

@@ -17,7 +17,6 @@ typedef enum {
 
 typedef struct {
   const gc_model *model;
-  bool started;                             // a command was computed or given since the reset
   float displacement[GC_CABLES_MAX];        // m, last command
   float tension[GC_CABLES_MAX];             // N, of the last command
   float change[GC_CABLES_MAX];              // m, of the last programme's path displacement
@@ -27,14 +26,11 @@ typedef struct {
   uint32_t solver_steps;                    // of the last programme
 } gc_inverse_controller;
 
-// Forget all earlier steps. displacement (m,) in m: from which rate limits count, NULL: from the paths at the next step.
-void gc_inverse_reset(gc_inverse_controller *controller, const gc_model *model, const float *displacement);
+// Start from cables at displacement 0, from which rate limits count.
+void gc_inverse_reset(gc_inverse_controller *controller, const gc_model *model);
 
 // Compute the command that brings the modelled robot nearest to the target; the controller holds it. interval: s since the
 // last step. Where the shape has not converged the command goes back to the last equilibrium, then pays the cables out.
 void gc_inverse_step(gc_inverse_controller *controller, const gc_shape *shape, const gc_target *target, float interval);
-
-// Compute the command that pays the cables out, within their rates, until none has tension.
-void gc_inverse_relax(gc_inverse_controller *controller, const gc_shape *shape, float slack, float interval);
 
 #endif

@@ -46,7 +46,7 @@ static float tip_motion(const gc_model *model, const float *change) {
     }
     squared += moved * moved;
   }
-  return __builtin_sqrtf(squared);
+  return gc_sqrt(squared);
 }
 
 // Write the change (r,) from q to the equilibrium of the linear model, and its tensions (m,). Returns whether there is one.
@@ -159,7 +159,7 @@ static void observe(const gc_equilibrium *state, gc_shape *shape) {
   }
   const float *f1 = section + 3, *f2 = section + 6;
   float d[3] = {f1[1] * f2[2] - f1[2] * f2[1], f1[2] * f2[0] - f1[0] * f2[2], f1[0] * f2[1] - f1[1] * f2[0]};
-  const float inverse = 1.0f / __builtin_sqrtf((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
+  const float inverse = 1.0f / gc_sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
   for (uint32_t i = 0; i < 3u; ++i) {
     d[i] *= inverse;
     shape->tip[i] = section[i];
@@ -199,7 +199,7 @@ static void observe_length(const gc_equilibrium *state, gc_shape *shape) {
       length += along[i] * along[i];
       before[i] = now[i];
     }
-    const float inverse = point > 0u ? 1.0f / __builtin_sqrtf(length) : 0.0f;
+    const float inverse = point > 0u ? 1.0f / gc_sqrt(length) : 0.0f;
     for (uint32_t i = 0; point > 0u && i < 3u; ++i) {
       const float *earlier = change - 3u * r;
       const float part = along[i] * inverse;

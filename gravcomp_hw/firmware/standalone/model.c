@@ -1,6 +1,7 @@
 #include "model.h"
 
 #include "../core/crc.h"
+#include "../core/maths.h"
 
 #define GC_SETTINGS_FLOATS ((uint32_t)(sizeof(gc_settings) / sizeof(float)))
 #define GC_SECTION_ROWS 9u
@@ -19,7 +20,7 @@ size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_
 
 static bool all_finite(const float *values, size_t count) {
   for (size_t i = 0; i < count; ++i) {
-    if (!(values[i] - values[i] == 0.0f)) {
+    if (!gc_finite(values[i])) {
       return false;
     }
   }

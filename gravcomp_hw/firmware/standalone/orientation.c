@@ -18,8 +18,6 @@
 #define GC_GRAVITY_TIME 1.0f  // s
 #define GC_LARGEST_SCALE 0.1f
 
-typedef enum { NOT_RESTING, RESTING, CONTRADICTED } advance_result;
-
 static float squared(float x) { return x * x; }
 
 static float length_of(const float *v) { return gc_sqrt((v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]); }
@@ -168,8 +166,8 @@ static void learn_gravity(gc_filter_state *state, const gc_settings *s, float dt
       gc_clamp(state->norm_at_rest, (1.0f - GC_LARGEST_SCALE) * s->gravity, (1.0f + GC_LARGEST_SCALE) * s->gravity);
 }
 
-// Take a sample into the state.
-static advance_result advance(gc_orientation *filter, const gc_filter_step *step) {
+// Take a sample into the state. Returns false where gravity at rest contradicts the orientation, which then starts again.
+static bool advance(gc_orientation *filter, const gc_filter_step *step) {
   const gc_settings *s = filter->settings;
   gc_filter_state *state = &filter->state;
   bool resting = false;
@@ -185,7 +183,7 @@ static advance_result advance(gc_orientation *filter, const gc_filter_step *step
       gc_copy(mean, state->rest.mean_accel, sizeof mean);
       gc_covariance_set_bias(&state->errors, s->bias_initial);
       start(filter, step->gyro, mean, step->dt);
-      return CONTRADICTED;
+      return false;
     }
   } else {
     state->rest.started = false;
@@ -198,7 +196,7 @@ static advance_result advance(gc_orientation *filter, const gc_filter_step *step
   if (resting) {
     learn_gravity(state, s, step->dt);
   }
-  return resting ? RESTING : NOT_RESTING;
+  return true;
 }
 
 // Take a sensor's value through its gate; write what is decided into the undecided steps. Returns whether anything is.
@@ -264,8 +262,7 @@ static void without_spikes(gc_orientation *filter, gc_filter_step *step) {
   }
 }
 
-static void estimate_of(const gc_orientation *filter, const float *gyro, bool rest, gc_problem problem,
-                        gc_orientation_estimate *estimate) {
+static void estimate_of(const gc_orientation *filter, const float *gyro, gc_orientation_estimate *estimate) {
   const gc_filter_state *state = &filter->state;
   const float delay = filter->settings->delay;
   for (uint32_t i = 0; i < 3u; ++i) {
@@ -274,8 +271,6 @@ static void estimate_of(const gc_orientation *filter, const float *gyro, bool re
   estimate->orientation = gc_quaternion_normalised(
       gc_quaternion_product(state->orientation, gc_quaternion_exponential(estimate->rate[0] * delay, estimate->rate[1] * delay,
                                                                           estimate->rate[2] * delay)));
-  estimate->rest = rest;
-  estimate->problem = problem;
 }
 
 // Set which sensors of a sample can be used: repeated values can, unless they contradict each other.
@@ -289,14 +284,13 @@ static void set_usable(gc_orientation *filter, const gc_verdict *verdict, gc_fil
 bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyro, const float *accel,
                          gc_orientation_estimate *estimate) {
   const gc_verdict verdict = gc_sample_check_take(&filter->check, filter->settings, stamp, gyro, accel);
-  estimate->problem = verdict.problem;
   if (gc_problem_rejects(verdict.problem)) {
     return false;
   }
   if (!filter->started || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
     start(filter, gyro, accel, verdict.dt);
     forget_suspects(filter);
-    estimate_of(filter, gyro, false, verdict.problem, estimate);
+    estimate_of(filter, gyro, estimate);
     return true;
   }
   gc_filter_step step;
@@ -305,10 +299,9 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
   gc_copy(step.accel, accel, sizeof step.accel);
   set_usable(filter, &verdict, &step);
   without_spikes(filter, &step);
-  const advance_result result = advance(filter, &step);
-  if (result == CONTRADICTED) {
+  if (!advance(filter, &step)) {
     forget_suspects(filter);
-    estimate_of(filter, step.gyro, false, GC_PROBLEM_CONTRADICTED, estimate);
+    estimate_of(filter, step.gyro, estimate);
     return true;
   }
   if (filter->suspecting) {
@@ -318,6 +311,6 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
       filter->undecided[filter->undecided_count++] = step;
     }
   }
-  estimate_of(filter, step.gyro_usable ? step.gyro : filter->state.bias, result == RESTING, verdict.problem, estimate);
+  estimate_of(filter, step.gyro_usable ? step.gyro : filter->state.bias, estimate);
   return true;
 }

@@ -44,15 +44,13 @@ typedef struct {
 typedef struct {
   gc_quaternion orientation;  // at the stamp, the sensor's delay compensated
   float rate[3];              // rad/s, without bias
-  bool rest;
-  gc_problem problem;
 } gc_orientation_estimate;
 
 // Start without orientation; the first sample gives the inclination.
 void gc_orientation_reset(gc_orientation *filter, const gc_settings *settings);
 
-// Take a sample with the stamp in us, gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false where it cannot be used; only the
-// problem is written then.
+// Take a sample with the stamp in us, gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false where it cannot be used;
+// nothing is written then.
 bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyro, const float *accel,
                          gc_orientation_estimate *estimate);
 

@@ -1,11 +1,12 @@
 // A small dense quadratic programme with bounds on unknowns and rows, by a dual active set.
 //
-// min 1/2 y^T H y + g^T y   s.t.   box_lower <= y <= box_upper,   lower <= A y <= upper.
+// min 1/2 y^T H y + g^T y   s.t.   lower <= (y, A y) <= upper.
 //
 // With H = L L^T it is the least distance problem min |v| under M v <= d; the dual active set starts from no active bound
 // and adds the bound that is missed most, as DAQP (Arnstrom, Bemporad, Axehill, IEEE TAC 2022). The dual cost rises in every
 // step, so no active set comes back, and at most GC_QP_STEPS_MAX steps are taken: the time is bounded whatever the numbers
-// are. Where the bounds contradict one another the bounds of the rows become elastic.
+// are. Where these do not suffice, or the bounds contradict one another, the bounds of the rows become elastic, for as many
+// steps again.
 #ifndef GC_QUADRATIC_PROGRAMME_H
 #define GC_QUADRATIC_PROGRAMME_H
 

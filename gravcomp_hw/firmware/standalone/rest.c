@@ -8,14 +8,6 @@
 
 static float consistent_within(float bias_std) { return GC_CONSISTENT_SIGMAS * bias_std + GC_CONSISTENT_FLOOR; }
 
-bool gc_rest_agrees(const gc_rest *rest, const float *bias, const float *bias_std) {
-  bool agrees = true;
-  for (uint32_t i = 0; i < 3u; ++i) {
-    agrees = agrees && gc_abs(rest->mean_gyro[i] - bias[i]) <= consistent_within(bias_std[i]);
-  }
-  return agrees;
-}
-
 // Whether a time in us is at least that for which the conditions of rest must hold.
 static bool lasted(uint32_t time, const gc_settings *settings) {
   return (int32_t)time >= gc_round(1e6f * settings->rest_minimum_time);

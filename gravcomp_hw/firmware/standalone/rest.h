@@ -23,7 +23,4 @@ bool gc_rest_take(gc_rest *rest, const gc_settings *settings, float dt, const fl
 // Whether the sensor rests or turns slowly about the vertical.
 bool gc_rest_calm(const gc_rest *rest, const gc_settings *settings);
 
-// Whether the mean rate is that of a sensor at rest with this bias.
-bool gc_rest_agrees(const gc_rest *rest, const float *bias, const float *bias_std);
-
 #endif

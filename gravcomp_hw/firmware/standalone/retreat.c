@@ -19,13 +19,8 @@
 static const float SHARES[GC_TRIES] = {0.5f, 0.25f, 0.0f};  // of the tension at which a target is tried again
 
 void gc_retreat_reset(gc_retreat *retreat, const gc_settings *settings) {
-  const float z = retreat->tip_at_rest[2];
-  float rest[3] = {retreat->tip_at_rest[0], retreat->tip_at_rest[1], z};
-  if (!(z != 0.0f)) {
-    rest[0] = rest[1] = 0.0f, rest[2] = settings->length;
-  }
   gc_zero(retreat, sizeof *retreat);
-  gc_copy(retreat->tip_at_rest, rest, sizeof rest);
+  retreat->tip_at_rest[2] = settings->length;
   retreat->stride = 1.0f;
   retreat->until = -1.0f;
 }

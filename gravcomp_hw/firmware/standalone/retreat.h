@@ -16,7 +16,7 @@ typedef struct {
   float tip_at_rest[3];  // m
 } gc_retreat;
 
-// Forget all earlier steps.
+// Start from the straight robot.
 void gc_retreat_reset(gc_retreat *retreat, const gc_settings *settings);
 
 // Return the next move. followed: the model reached an equilibrium under the last command; tip (3,) in m and largest tension

@@ -79,12 +79,5 @@ gc_verdict gc_sample_check_take(gc_sample_check *check, const gc_settings *setti
   verdict.accel_stuck = check->accel_same >= settings->stuck_time;
   verdict.gyro_saturated = fastest >= GC_SATURATED_FROM * settings->gyro_range;
   verdict.accel_saturated = strongest >= GC_SATURATED_FROM * settings->accel_range;
-  if (verdict.problem == GC_PROBLEM_NONE) {
-    if (verdict.gyro_stuck || verdict.accel_stuck) {
-      verdict.problem = GC_PROBLEM_STUCK;
-    } else if (verdict.gyro_saturated || verdict.accel_saturated) {
-      verdict.problem = GC_PROBLEM_SATURATED;
-    }
-  }
   return verdict;
 }

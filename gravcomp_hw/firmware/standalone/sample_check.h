@@ -7,6 +7,7 @@
 
 #include "settings.h"
 
+// What is wrong with a sample as a whole; that of one sensor is in the verdict.
 typedef enum {
   GC_PROBLEM_NONE = 0,
   GC_PROBLEM_NOT_FINITE,
@@ -14,10 +15,7 @@ typedef enum {
   GC_PROBLEM_REPEATED_STAMP,
   GC_PROBLEM_REORDERED_STAMP,
   GC_PROBLEM_CLOCK_RESTARTED,
-  GC_PROBLEM_GAP,
-  GC_PROBLEM_CONTRADICTED,
-  GC_PROBLEM_SATURATED,
-  GC_PROBLEM_STUCK
+  GC_PROBLEM_GAP
 } gc_problem;
 
 typedef struct {

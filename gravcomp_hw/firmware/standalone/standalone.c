@@ -20,12 +20,9 @@ bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
   gc_zero(loop, sizeof *loop);
   loop->model = model;
   loop->loaded = true;
-  loop->target = gc_target_stored(model.settings);
   gc_gravity_reset(&loop->gravity, model.settings);
   gc_equilibrium_reset(&loop->equilibrium, &loop->model);
-  float zero[GC_CABLES_MAX];  // homing leaves the cables where the straight robot has them
-  gc_zero(zero, sizeof zero);
-  gc_inverse_reset(&loop->controller, &loop->model, zero);
+  gc_inverse_reset(&loop->controller, &loop->model);  // homing leaves the cables where the straight robot has them
   return true;
 }
 
@@ -84,14 +81,13 @@ bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float inter
   if (!loop->shape.loaded) {
     return false;
   }
-  loop->target = loop->joystick ? gc_target_joystick(loop->model.settings, loop->stick[0], loop->stick[1])
-                                : gc_target_stored(loop->model.settings);
-  gc_inverse_step(&loop->controller, &loop->shape, &loop->target, interval);
+  const gc_target target = loop->joystick ? gc_target_joystick(loop->model.settings, loop->stick[0], loop->stick[1])
+                                          : gc_target_stored(loop->model.settings);
+  gc_inverse_step(&loop->controller, &loop->shape, &target, interval);
   return true;
 }
 
-bool gc_standalone_step(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
-  gc_standalone *loop = (gc_standalone *)context;
+bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
   if (!loop->loaded) {
     return false;
   }

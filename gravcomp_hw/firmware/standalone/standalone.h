@@ -2,8 +2,8 @@
 //
 //     counts -> gravity -> equilibrium of the reduced model -> inverse problem -> displacements and tensions
 //
-// Every call does the same bounded work. Where the model has no usable equilibrium the motors hold their last targets while the
-// controller goes back to the last equilibrium and then pays the cables out (retreat.h).
+// Every call does the same bounded work. Where the model has no usable equilibrium the command goes back to the
+// last one, and then pays the cables out (retreat.h).
 #ifndef GC_STANDALONE_LOOP_H
 #define GC_STANDALONE_LOOP_H
 
@@ -24,7 +24,6 @@ typedef struct {
   gc_equilibrium equilibrium;
   gc_shape shape;
   gc_inverse_controller controller;
-  gc_target target;
   float down[3];      // m/s^2, gravity in soft_base
   bool has_gravity;
   bool has_sample;
@@ -42,9 +41,9 @@ bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size);
 // load rises after a start; the command, in loop->controller, is then the displacement 0.
 bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval);
 
-// Compute targets of the motors from a sample; a gc_controller. displacement (8,) in m, positive: pulled in, and tension (8,) in
-// N, both by the number of the motor less 1. Returns false while there is nothing to send: the motors hold.
-bool gc_standalone_step(void *context, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
+// Compute targets of the motors from a sample. motors: bits of those that exist; displacement (8,) in m, positive: pulled in,
+// and tension (8,) in N, both by the number of the motor less 1. Returns false while there is nothing to send: the motors hold.
+bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t motors, float *displacement, float *tension);
 
 // Take a frame of the host: the joystick's. Returns true with the reply, the loop's status. A gc_receiver.
 bool gc_standalone_receive(void *context, const gc_frame *frame, gc_frame *reply);

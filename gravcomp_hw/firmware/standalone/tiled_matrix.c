@@ -1,5 +1,6 @@
 #include "tiled_matrix.h"
 
+#include "../core/maths.h"
 #include "model.h"
 
 // Copy a matrix by tiles to its lower triangle row by row.
@@ -55,7 +56,7 @@ bool gc_factorise(const float *matrix, uint32_t r, float *factor) {
         if (a == c && !(left > 0.0f)) {  // also for NaN
           return false;
         }
-        rows[a][i + c] = a == c ? 1.0f / __builtin_sqrtf(left) : left * rows[c][i + c];
+        rows[a][i + c] = a == c ? 1.0f / gc_sqrt(left) : left * rows[c][i + c];
       }
     }
   }

@@ -64,7 +64,7 @@ static float largest_eigenvalue(matrix3 of) {
   return value;
 }
 
-// Replace the vector (3,) `from`, strided by `stride` numbers, by D times it.
+// Replace the vector (x, y, z) by D times it.
 static void apply(matrix3 d, float *x, float *y, float *z) {
   const float a = *x, b = *y, c = *z;
   *x = (d[0][0] * a + d[0][1] * b) + d[0][2] * c;

@@ -7,6 +7,7 @@ import numpy as np
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
 from gravcomp.firmware.cycles import Cycles, loop_cycles, sample_bytes
+from gravcomp.firmware.emulator.machine import STACK_SIZE
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.loop_on_host import APPROACH_STEPS, LOADING_STEPS, run_on_host, turning_gravity
 from gravcomp.firmware.model_fit import Fit, fit
@@ -90,7 +91,7 @@ def memory(progress: Progress, found: Fit) -> dict:
     stack = largest_stack(image)
     return {
         "flash_kb": round((image.flash + len(found.blob)) / 1024, 1),
-        "ram_kb": round((image.ram + image.ccm + 8192) / 1024, 1),  # what the linker script gives the stack
+        "ram_kb": round((image.ram + image.ccm + STACK_SIZE) / 1024, 1),
         "stack_kb": round(stack / 1024, 2),
     }
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import shutil
 import subprocess
 import tempfile
@@ -60,7 +61,7 @@ def build_fuzzer() -> Path:
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as name:
         objects = Path(name) / "board.o"
         compile_files(compiler, traced, objects, [*_SANITIZERS, _TRACE, "-r", "-nostdlib"])
-        partial = path.with_suffix(".partial")
+        partial = path.with_suffix(f".{os.getpid()}")
         compile_files(compiler, [*driver, objects], partial, [*_SANITIZERS])
         partial.replace(path)
     return path

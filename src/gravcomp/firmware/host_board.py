@@ -99,11 +99,6 @@ class HostBoard:
         return 1e-4 * self._library.gc_host_duty(self._at)
 
     @property
-    def state(self) -> int:
-        """State of the board (`gravcomp.firmware.settings.STATES`)."""
-        return self._library.gc_host_state(self._at)
-
-    @property
     def faults(self) -> int:
         """Bits of the present faults."""
         return self._library.gc_host_faults(self._at)

@@ -43,7 +43,6 @@ def load() -> ctypes.CDLL:
     u8, u32, flag, i16 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_bool, ctypes.c_int16
     for name, result, arguments in (
         ("size", ctypes.c_size_t, ()),
-        ("record_size", ctypes.c_size_t, ()),
         ("start", None, (memory, ctypes.POINTER(u32), u8)),
         ("attach", None, (memory,)),
         ("lose_supply_after", None, (memory, u32)),
@@ -55,7 +54,6 @@ def load() -> ctypes.CDLL:
         ("transmit", flag, (memory, u32, frame)),
         ("bus_off", None, (memory, u32, flag)),
         ("duty", u32, (memory,)),
-        ("state", u32, (memory,)),
         ("faults", u32, (memory,)),
     ):
         function = getattr(library, f"gc_host_{name}")

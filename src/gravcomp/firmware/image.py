@@ -13,11 +13,10 @@ from pathlib import Path
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.environment.errors import SetupError
-from gravcomp.firmware.elf import Elf, read_elf
+from gravcomp.firmware.elf import read_elf
 from gravcomp.firmware.sources import CHIP, CORE, EXACT, STANDALONE, WARNINGS, contents, firmware_folder, sources
 from gravcomp.firmware.toolchain import LOCK, zig
 
-BOARDS = ("stm32f407",)
 BOOT_START, CODE_START = 0x08000000, 0x08010000
 _TARGET = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
 _OPTIONS = (
@@ -30,7 +29,7 @@ _MAGIC = 0x474D4947
 
 @dataclasses.dataclass(frozen=True)
 class Image:
-    """A built image. `path`: the ELF file; frames: stack that each function takes, in bytes, by name."""
+    """A built image. `path`: the ELF file; frames: stack in bytes by function, the largest where several have one name."""
 
     path: Path
     boot: bytes
@@ -64,7 +63,9 @@ def build_image(*, standalone: bool = False, fresh: bool = False) -> Image:
         _build(parts, standalone, path, usage)
     elf = read_elf(path.read_bytes())
     boot, code = elf.flash(BOOT_START), elf.flash(CODE_START)
-    frames = {name: int(size) for name, size in (line.split() for line in usage.read_text().splitlines())}
+    frames: dict[str, int] = {}
+    for name, size in (line.split() for line in usage.read_text().splitlines()):
+        frames[name] = max(int(size), frames.get(name, 0))
     return Image(path, boot, code, elf.size("gc_data_start", "gc_bss_end"), elf.size("gc_ccm_start", "gc_ccm_end"), frames)
 
 
@@ -118,6 +119,3 @@ def _run(command: list[str], environment: dict[str, str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode != 0:
         raise SetupError(f"the firmware's image cannot be built:\n{done.stderr.strip()[-4000:]}")
-
-
-__all__ = ["BOARDS", "BOOT_START", "CODE_START", "Elf", "Image", "build_image"]

@@ -7,6 +7,7 @@ import numpy as np
 
 from gravcomp.cables.friction import Sliding
 from gravcomp.config import ConfigError
+from gravcomp.firmware.cycles import CLOCK_HZ
 from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, POINTS_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
 from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
@@ -19,7 +20,6 @@ from gravcomp.reduction.tracking import ReducedTracker
 SLOT_BYTES = 384 * 1024
 """Room for a blob in the flash of the STM32F407 (boards/stm32f407/image.ld)."""
 
-CLOCK_HZ = 168e6
 LONGEST_MS = 7.0
 """For a step, of the 10 ms between two samples; the rest is for interrupts, and for what the estimate may lack."""
 
@@ -71,14 +71,19 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
 
 
+def reduction_for(model: RobotModel, source: str) -> Reduction:
+    """Return the reduced model that is built for the robot of the file `source`. Raises ConfigError where there is none."""
+    reduction = load(model)
+    if reduction is None:
+        reason = why_not(model) or f"it is not built: run ./gravcomp model build {source}"
+        raise ConfigError(f"{source}: there is no reduced model for the board: {reason}")
+    return reduction
+
+
 def blob_for(parameters: LoopParameters) -> bytes:
     """Return the blob of a robot. Raises ConfigError where it does not fit, or its reduced model is not built."""
     model = RobotModel(parameters.robot)
-    reduction = load(model)
-    if reduction is None:
-        reason = why_not(model) or "it is not built: run ./gravcomp model build"
-        raise ConfigError(f"{parameters.source}: there is no reduced model for the board: {reason}")
-    return fit(model, reduction, parameters).blob
+    return fit(model, reduction_for(model, parameters.source), parameters).blob
 
 
 def cost(model: ReducedModel) -> tuple[int, float]:

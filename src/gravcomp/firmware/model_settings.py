@@ -69,15 +69,12 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
     return [numbers[name] for name in parameters.robot.cable_names]
 
 
-def settings(parameters: LoopParameters, reach: float, joystick_bend: float, target: Target | None = None) -> np.ndarray:
+def settings(parameters: LoopParameters, reach: float, joystick_bend: float) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
-    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; target: that is stored, default: the straight
-    robot. Raises ConfigError for a target that the board cannot keep.
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection. Raises ConfigError for motors that are shared.
     """
-    robot, wanted = parameters.robot, target or parameters.straight
-    if wanted.backbone_station.size:
-        raise ConfigError("the target has points of the backbone; the board keeps position and direction of the tip only")
+    robot, wanted = parameters.robot, parameters.straight
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
     calibration, prediction = parameters.estimator.calibration, parameters.estimator.prediction
     numbers = motor_numbers(parameters)

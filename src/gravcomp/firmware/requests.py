@@ -8,7 +8,7 @@ from gravcomp.canbus.codec import FrameError, decode, encode
 from gravcomp.config import ConfigError
 from gravcomp.firmware.settings import ACTIONS, ANY_BOARD, OPERATIONS, RESULTS, SAVE_WORD, keys, word_of
 
-REPLY_ID, STATE_ID, STATUS_ID = 0x314, 0x315, 0x313
+REPLY_ID, STATE_ID = 0x314, 0x315
 
 READINGS = {
     "id_0": 0x80, "id_1": 0x81, "id_2": 0x82, "version": 0x83, "image": 0x84, "reset": 0x85, "uptime": 0x86, "rejected": 0x87,

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from gravcomp.environment.errors import SetupError
 from gravcomp.firmware.elf import read_elf
-from gravcomp.firmware.image import CODE_START, Image
+from gravcomp.firmware.image import BOOT_START, CODE_START, Image
 from gravcomp.firmware.toolchain import provide
 
 INTERRUPT_FRAME = 108
@@ -56,7 +56,7 @@ def calls_of(image: Image) -> dict[str, set[str]]:
     ends = dict(zip(starts, [*starts[1:], CODE_START + len(image.code)]))
     for start in starts:
         name = functions[start]
-        part, base = (image.code, CODE_START) if start >= CODE_START else (image.boot, 0x08000000)
+        part, base = (image.code, CODE_START) if start >= CODE_START else (image.boot, BOOT_START)
         if not base <= start < base + len(part):
             result[name].update({"wait"} - {name})  # in RAM, while the flash is written
             continue

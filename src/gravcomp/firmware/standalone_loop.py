@@ -62,7 +62,7 @@ class StandaloneLoop:
             ("load", ctypes.c_uint32, (memory, memory, ctypes.c_size_t)),
             ("weigh", ctypes.c_bool, (memory, ctypes.c_int64, floats, floats)),
             ("follow", ctypes.c_bool, (memory, floats, ctypes.c_float)),
-            ("joystick", None, (memory, ctypes.c_bool, ctypes.c_float, ctypes.c_float)),
+            ("joystick", None, (memory, ctypes.c_float, ctypes.c_float)),
             ("read", None, (memory, ctypes.POINTER(_Result))),
         ):
             function = getattr(library, f"gc_loop_{name}")
@@ -99,7 +99,7 @@ class StandaloneLoop:
 
     def steer(self, x: float, y: float) -> None:
         """Bend toward (x, y), each from -1 to 1, in place of the stored target."""
-        self._library.gc_loop_joystick(self._at, True, x, y)
+        self._library.gc_loop_joystick(self._at, x, y)
 
     @property
     def address(self) -> int:

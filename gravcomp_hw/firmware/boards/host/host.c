@@ -5,8 +5,6 @@
 
 size_t gc_host_size(void) { return sizeof(gc_host); }
 
-size_t gc_host_record_size(void) { return sizeof(gc_parameter_record); }
-
 static bool erase(void *context, uint32_t place) {
   gc_host *host = (gc_host *)context;
   if (host->words_left == 0u) {
@@ -83,7 +81,5 @@ bool gc_host_transmit(gc_host *host, uint32_t bus, gc_frame *frame) {
 void gc_host_bus_off(gc_host *host, uint32_t bus, bool off) { gc_board_bus_off(&host->board, bus, off); }
 
 uint32_t gc_host_duty(const gc_host *host) { return host->board.heater.duty; }
-
-uint32_t gc_host_state(const gc_host *host) { return (uint32_t)host->board.state; }
 
 uint32_t gc_host_faults(const gc_host *host) { return gc_board_faults(&host->board); }

@@ -11,7 +11,6 @@ typedef struct {
 } gc_host;
 
 size_t gc_host_size(void);
-size_t gc_host_record_size(void);
 
 // Let a board that was copied to another place in memory use its own stored places.
 void gc_host_attach(gc_host *host);
@@ -38,7 +37,6 @@ bool gc_host_transmit(gc_host *host, uint32_t bus, gc_frame *frame);
 void gc_host_bus_off(gc_host *host, uint32_t bus, bool off);
 
 uint32_t gc_host_duty(const gc_host *host);
-uint32_t gc_host_state(const gc_host *host);
 uint32_t gc_host_faults(const gc_host *host);
 
 #endif

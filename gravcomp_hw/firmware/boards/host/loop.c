@@ -24,8 +24,8 @@ bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval) {
   return gc_standalone_follow(loop, gravity != NULL ? gravity : loop->down, interval);
 }
 
-void gc_loop_joystick(gc_standalone *loop, bool on, float x, float y) {
-  loop->joystick = on;
+void gc_loop_joystick(gc_standalone *loop, float x, float y) {
+  loop->joystick = true;
   loop->stick[0] = x;
   loop->stick[1] = y;
 }

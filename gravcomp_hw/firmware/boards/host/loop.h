@@ -29,8 +29,8 @@ bool gc_loop_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const 
 // Go to the gravity that was estimated last, or to `gravity` (3,) in m/s^2. Returns whether there is a command.
 bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval);
 
-// Set the joystick to x and y, -1 to 1; otherwise the stored target is kept.
-void gc_loop_joystick(gc_standalone *loop, bool on, float x, float y);
+// Set the joystick to x and y, -1 to 1, in place of the stored target.
+void gc_loop_joystick(gc_standalone *loop, float x, float y);
 
 // Read the last results.
 void gc_loop_read(const gc_standalone *loop, gc_loop_result *result);

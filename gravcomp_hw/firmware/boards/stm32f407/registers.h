@@ -38,7 +38,6 @@ typedef struct {
 #define RCC_APB2_TIM10 (1u << 17)
 #define RCC_CSR_RMVF (1u << 24)
 #define RCC_CSR_BORRSTF (1u << 25)
-#define RCC_CSR_PINRSTF (1u << 26)
 #define RCC_CSR_PORRSTF (1u << 27)
 #define RCC_CSR_SFTRSTF (1u << 28)
 #define RCC_CSR_IWDGRSTF (1u << 29)
@@ -79,7 +78,6 @@ typedef struct {
 } gc_gpio;
 #define GPIOA ((gc_gpio *)0x40020000u)
 #define GPIOB ((gc_gpio *)0x40020400u)
-#define GPIOC ((gc_gpio *)0x40020800u)
 #define GPIOD ((gc_gpio *)0x40020C00u)
 #define GPIOF ((gc_gpio *)0x40021400u)
 
@@ -133,7 +131,6 @@ typedef struct {
 #define CAN1 ((gc_can_registers *)0x40006400u)
 #define CAN2 ((gc_can_registers *)0x40006800u)
 #define CAN_MCR_INRQ (1u << 0)
-#define CAN_MCR_SLEEP (1u << 1)
 #define CAN_MCR_TXFP (1u << 2)
 #define CAN_MCR_ABOM (1u << 6)
 #define CAN_MSR_INAK (1u << 0)

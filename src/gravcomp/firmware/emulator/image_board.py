@@ -13,7 +13,6 @@ from gravcomp.firmware.settings import keys, word_of
 
 TICK = 1000  # us
 _CAUSES = ("power", "supply", "watchdog", "software", "pin")
-_MOST_AT_ONCE = 60  # frames; the ring of reception has 64
 _IDE, _RTR = 1 << 2, 1 << 1
 
 
@@ -64,11 +63,7 @@ class ImageBoard:
 
     def receive(self, message: can.Message, bus: int = HOST_BUS) -> None:
         """Take a frame from a bus."""
-        self.receive_all([message], bus)
-
-    def receive_all(self, messages: list[can.Message], bus: int = HOST_BUS) -> None:
-        """Take frames from a bus, at most _MOST_AT_ONCE in a tick."""
-        self.machine.receive(bus, [_wire(message) for message in messages[:_MOST_AT_ONCE]])
+        self.machine.receive(bus, [_wire(message)])
 
     def sample(self, counts: tuple[int, ...], temperature: int, time_us: int) -> None:
         """Let the IMU measure this, with its data-ready edge at `time_us`."""

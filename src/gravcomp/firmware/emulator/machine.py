@@ -15,7 +15,7 @@ from gravcomp.firmware.emulator.imu_device import ImuDevice
 from gravcomp.firmware.image import BOOT_START, CODE_START, Image
 from gravcomp.firmware.toolchain import provide
 
-PARAMETERS, MODELS, FLASH_END = 0x08008000, 0x08040000, 0x08100000
+PARAMETERS, FLASH_END = 0x08008000, 0x08100000
 RAM, RAM_SIZE, CCM, CCM_SIZE, STACK_SIZE = 0x20000000, 0x20000, 0x10000000, 0x10000, 0x2000
 WATCHDOG = 40_000
 """us that the watchdog waits."""
@@ -88,10 +88,6 @@ class Machine:
         self._uc.mem_write(CODE_START, code)
         self._uc.ctl_remove_cache(BOOT_START, PARAMETERS)
         self._uc.ctl_remove_cache(CODE_START, FLASH_END)
-
-    def write_memory(self, address: int, data: bytes) -> None:
-        """Write into memory or flash, as a debugger does."""
-        self._uc.mem_write(address, data)
 
     def read_memory(self, address: int, size: int) -> bytes:
         """Read memory."""
