@@ -121,11 +121,7 @@ def find_places(
             if near or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
                 chosen[k, s] = True
                 count += 1
-    result = Places(
-        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
-        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
-        np.zeros((count, 3)), np.zeros(count),
-    )  # fmt: skip
+    result = empty_places(count)
     i = 0
     for k in range(rows):
         for s in range(stations):
@@ -133,6 +129,16 @@ def find_places(
                 _write_place(scene, surface, sections, gap, own, normal, k, s, result, i)
                 i += 1
     return result
+
+
+@njit(cache=True)
+def empty_places(count: int) -> Places:
+    """Return arrays for `count` places, in which nothing is written yet."""
+    return Places(
+        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
+        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
+        np.zeros((count, 3)), np.zeros(count),
+    )  # fmt: skip
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from numba import njit
 
 from gravcomp.contact.condensed import contact_forces
 from gravcomp.contact.contacts import Contacts
-from gravcomp.contact.places import Places, find_places, forces_at, remember, remembered, rubbing, turning, yielding
+from gravcomp.contact.places import Places, empty_places, find_places, forces_at, remember, remembered, rubbing, turning, yielding
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import TOUCHED, FullContact
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
@@ -102,14 +102,7 @@ def tracked_touching(
     factor = np.zeros((r, r))
     forces, held = np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
     sections = rest + (change @ q).reshape(stations, 3, 3)
-    places = find_places(
-        touching.scene,
-        touching.surface,
-        sections,
-        np.zeros((stations, 3)),
-        -np.inf,
-        np.zeros_like(touching.force),
-    )
+    places = empty_places(0)
     for _ in range(iterations):
         stress = scale * point.strain + offset
         if not reuse:
