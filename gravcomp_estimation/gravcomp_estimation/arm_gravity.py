@@ -41,6 +41,7 @@ class ArmGravity(ManagedNode):
     def configure(self) -> None:
         """Read the URDF if the parameter gives one. Raises ConfigError when it is not usable."""
         self._chain: Chain | None = None
+        self._point: CarriedPoint | None = None
         if self.parameters.source == "joint_states" and self.parameters.urdf:
             try:
                 with open(self.parameters.urdf, encoding="utf-8") as file:
@@ -61,7 +62,6 @@ class ArmGravity(ManagedNode):
         p = self.parameters
         self._frames = FrameTree(p.base_frame, p.world_frame, STALE)
         self._fusion = GravityFusion(p.imu_std, p.arm_std, p.tolerance, p.patience, STALE)
-        self._point: CarriedPoint | None = None
         self._arm: tuple[float, np.ndarray] | None = None  # monotonic s, (3,)
         self._imu: tuple[float, np.ndarray] | None = None
         self._agreed = time.monotonic()
@@ -97,6 +97,11 @@ class ArmGravity(ManagedNode):
         for publisher in (getattr(self, "_gravity", None), getattr(self, "_acceleration", None)):
             if publisher is not None:
                 self.destroy_publisher(publisher)
+
+    def parameters_changed(self, old: ArmGravityParameters, new: ArmGravityParameters) -> None:
+        """Apply new deviations and limits to the fusion."""
+        if hasattr(self, "_fusion"):
+            self._fusion.trust(new.imu_std, new.arm_std, new.tolerance, new.patience)
 
     # The arm's pose.
 

@@ -76,11 +76,11 @@ class ImuEstimator(ManagedNode):
             SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability),
             SensorStream(self, Temperature, "imu/temperature", self._on_temperature, reliability),
         ]
-        # Steady clock: the status must be published also when the clock of a replay has stopped.
         self._known, self._known_stamp_ns = (0.0, 0.0, 0.0), 0
         self._known_input = None
         if self.parameters.arm_acceleration:
             self._known_input = self.create_subscription(Vector3Stamped, "arm/acceleration", self._on_acceleration, SENSOR)
+        # Steady clock: the status must be published also when the clock of a replay has stopped.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers_active = [
             self.create_timer(STATUS_PERIOD, self._on_status, clock=steady),

@@ -113,3 +113,9 @@ def test_missing_joints_are_named(bench):
     wanted = "joint_states does not bring left_j2; it has right_j1, right_j2: is a prefix missing?"
     names = ["right_j1", "left_j1", "right_j2"]
     bench.until(lambda: bench.sentences.get("/left/arm_gravity") == wanted, "not named", names=names)
+
+
+def test_the_acceleration_comes_with_a_urdf_file(bench):
+    bench.start("left", "feed_acceleration:=true", topic="arm/acceleration")
+    bench.until(lambda: "/left/arm/acceleration" in bench.heard, "no acceleration")
+    assert np.abs(bench.gravity("/left/arm/acceleration")).max() < 1e-6  # the arm is at rest

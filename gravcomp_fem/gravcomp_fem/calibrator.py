@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import OK, WARN
-from rclpy.time import Time
 from std_srvs.srv import SetBool
 
 from gravcomp.calibration.bag import direction_of_poses
@@ -19,6 +18,7 @@ from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan_file import load_plan
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.calibrator import CalibratorParameters
+from gravcomp_fem.conversion import seconds
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -68,7 +68,7 @@ class Calibrator(ManagedNode):
         self._present = np.array(message.displacement)
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
-        time = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        time = seconds(message.header)
         vector = message.vector
         self._session.on_gravity(time, np.array([vector.x, vector.y, vector.z]))
         if self._present is None or not self._stopped:
@@ -82,7 +82,7 @@ class Calibrator(ManagedNode):
             self._command.publish(command)
 
     def _on_tip(self, message: PoseStamped) -> None:
-        time = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        time = seconds(message.header)
         place, turn = message.pose.position, message.pose.orientation
         values = np.array([[place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]])
         if np.isfinite(values).all() and np.linalg.norm(values[0, 3:]) > 0.0:

@@ -4,6 +4,7 @@ from array import array
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseArray
+from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
@@ -11,6 +12,11 @@ from gravcomp.inverse import Target, TargetError, bend_target
 from gravcomp.simulation import Response, Shape
 from gravcomp.view.backbone import Backbone
 from gravcomp_msgs.msg import Deformation, ShapeTarget
+
+
+def seconds(header: Header) -> float:
+    """Return the stamp of a header in s."""
+    return Time.from_msg(header.stamp).nanoseconds * 1e-9
 
 
 def deformation_message(shape: Shape, header: Header) -> Deformation:

@@ -14,7 +14,6 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
-from rclpy.time import Time
 from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -29,7 +28,7 @@ from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
-from gravcomp_fem.conversion import deformation_message, pose_message
+from gravcomp_fem.conversion import deformation_message, pose_message, seconds
 from gravcomp_fem.load_inputs import LoadInputs
 from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
@@ -75,8 +74,8 @@ class FemSimulator(ManagedNode):
         self._markers = self.create_publisher(MarkerArray, "robot/markers", COMMAND)
         self._robot_markers = RobotMarkers(self.robot_file.robot)
         self._transforms = TransformPublisher(self)
-        robot = self.robot_file.robot
-        self._chain_names = joint_names(self.parameters.joint_prefix, len(robot.effectors.backbone_station))
+        points = len(self.robot_file.robot.effectors.backbone_station)
+        self._chain_names = joint_names(self.parameters.joint_prefix, points)
         self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
         self._loads = LoadInputs(self, self.robot_file.robot, self.parameters)
 
@@ -169,7 +168,7 @@ class FemSimulator(ManagedNode):
         if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
             return
-        stamp = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
+        stamp = seconds(message.header)
         last, self._last_stamp = self._last_stamp, stamp
         elapsed = None if last is None or stamp <= last else stamp - last
         interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
@@ -212,7 +211,7 @@ class FemSimulator(ManagedNode):
 
     def _show(self, shape: Shape, header: Header) -> None:
         rate = self.parameters.marker_rate
-        stamp = Time.from_msg(header.stamp).nanoseconds * 1e-9
+        stamp = seconds(header)
         # A stamp that goes back means that a replay has restarted.
         if rate == 0.0 or 0.0 <= stamp - self._last_markers < 1.0 / rate:
             return

@@ -22,8 +22,8 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
-from gravcomp_fem.conversion import doubles, pose_target, response_of, shape_target
-from gravcomp_fem.tracker_input import TrackerInput, seconds
+from gravcomp_fem.conversion import doubles, pose_target, response_of, seconds, shape_target
+from gravcomp_fem.tracker_input import TrackerInput
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 

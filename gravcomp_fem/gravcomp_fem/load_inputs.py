@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.lifecycle import LifecycleNode
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -21,7 +20,7 @@ from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.load_estimation import LoadEstimate, LoadObserver
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.simulation import DynamicSimulator, Shape, Simulator
-from gravcomp_fem.conversion import doubles
+from gravcomp_fem.conversion import doubles, seconds
 from gravcomp_msgs.msg import WrenchEstimate
 from gravcomp_node import SENSOR
 
@@ -89,7 +88,7 @@ class LoadInputs:
         """Compare a shape with what is measured, and publish the estimate."""
         if self._observer is None or not shape.is_equilibrium:
             return
-        stamp = _seconds(header)
+        stamp = seconds(header)
         if self._samples % _COMPLIANCE_EVERY == 0:
             try:
                 self._compliance = simulator.tip_compliance()
@@ -121,7 +120,7 @@ class LoadInputs:
     def _on_wrench(self, message: WrenchStamped) -> None:
         force, moment = message.wrench.force, message.wrench.torque
         used = self._wrenches.take(
-            _seconds(message.header),
+            seconds(message.header),
             self._now(),
             message.header.frame_id,
             np.array([force.x, force.y, force.z]),
@@ -133,11 +132,11 @@ class LoadInputs:
     def _on_tip(self, message: PoseStamped) -> None:
         p = message.pose.position
         if self._observer is not None and message.header.frame_id == self._frames[0]:
-            self._observer.measure_tip(_seconds(message.header), np.array([p.x, p.y, p.z]))
+            self._observer.measure_tip(seconds(message.header), np.array([p.x, p.y, p.z]))
 
     def _on_tension(self, message: JointState) -> None:
         if self._observer is not None:
-            self._observer.measure_tensions(_seconds(message.header), np.array(message.effort, dtype=float))
+            self._observer.measure_tensions(seconds(message.header), np.array(message.effort, dtype=float))
 
     def _on_zero(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._observer is None:
@@ -147,10 +146,6 @@ class LoadInputs:
         response.success = True
         response.message = f"learning the errors of model and sensors for {self._observer.options.zero_time:g} s without load"
         return response
-
-
-def _seconds(header: Header) -> float:
-    return Time.from_msg(header.stamp).nanoseconds * 1e-9
 
 
 def _message(header: Header, estimate: LoadEstimate) -> WrenchEstimate:

@@ -6,14 +6,13 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode
 from rclpy.subscription import Subscription
-from rclpy.time import Time
 from std_msgs.msg import Header
 
 from gravcomp.description import Robot
 from gravcomp.inverse import Target
 from gravcomp.simulation import Response
 from gravcomp.tip_observer import TipObserver, TipObserverOptions
-from gravcomp_fem.conversion import doubles
+from gravcomp_fem.conversion import doubles, seconds
 from gravcomp_msgs.msg import Deformation
 from gravcomp_node import SENSOR
 
@@ -76,8 +75,3 @@ class TrackerInput:
             log.warning(after.sentence)
         else:
             log.info(f"measured/tip: {after.state.value}")
-
-
-def seconds(header: Header) -> float:
-    """Return the stamp of a header in s."""
-    return Time.from_msg(header.stamp).nanoseconds * 1e-9

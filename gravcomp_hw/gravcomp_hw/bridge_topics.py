@@ -1,6 +1,8 @@
-"""Messages and services that all bridges have: the state of the cables, IMU samples, and requests."""
+"""Messages and services that all bridges have: commands, the state of the cables, IMU samples, and requests."""
 
 import array
+import math
+import time
 from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
@@ -11,12 +13,10 @@ from std_srvs.srv import Trigger
 
 from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.motors.state import CableSnapshot, State
-from gravcomp_msgs.msg import CableState
+from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import SENSOR
 
-LOG_PERIOD = 1.0
-"""s, between two log messages about refused commands."""
-
+_LOG_PERIOD = 1.0  # s, between two log messages about refused commands
 _TEMPERATURE_EVERY = 10  # samples; the chip updates its temperature every 1.28 s
 _LEVELS = {State.ACTIVE: OK, State.HOLDING: OK, State.HOMING: OK, State.FAULT: ERROR}
 
@@ -48,6 +48,22 @@ def trigger(request: Callable, action: Callable) -> Callable[[Trigger.Request, T
         return response
 
     return serve
+
+
+def follow(node: LifecycleNode, command: Callable) -> Callable[[CableCommand], None]:
+    """Return the callback of cable/command that gives the driver's `command` each message, and logs why one is refused."""
+    logged = -math.inf
+
+    def take(message: CableCommand) -> None:
+        nonlocal logged
+        stamp = message.header.stamp
+        reason = command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
+        # The logger's own throttle is not used: it looks up its caller's source each time, which takes longer than the command.
+        if reason and time.monotonic() - logged > _LOG_PERIOD:
+            logged = time.monotonic()
+            node.get_logger().warning(f"command refused: {reason}")
+
+    return take
 
 
 class ImuTopics:

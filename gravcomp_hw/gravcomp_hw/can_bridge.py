@@ -4,10 +4,8 @@ A separate thread publishes the samples and states from the driver's queue, so t
 (a thread of the driver) nor the commands (the executor).
 """
 
-import math
 import sys
 import threading
-import time
 
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import QoSProfile
@@ -24,7 +22,7 @@ from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
 from gravcomp.motors.state import CableSnapshot
-from gravcomp_hw.bridge_topics import LOG_PERIOD, ImuTopics, cable_state, level, trigger
+from gravcomp_hw.bridge_topics import ImuTopics, cable_state, follow, level, trigger
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -49,7 +47,7 @@ class CanBridge(ManagedNode):
         self._imu = ImuTopics(self, p.imu_frame)
         self._state = self.create_publisher(CableState, "cable/state", COMMAND)
         self._joints = self.create_publisher(JointState, "joint_states", QoSProfile(depth=10))
-        self._logged, self._refusal_logged = "", -math.inf
+        self._logged = ""
         self._publishing = False
         self._publisher = threading.Thread(target=self._publish, name="publisher", daemon=True)
         self._publisher.start()
@@ -62,7 +60,7 @@ class CanBridge(ManagedNode):
             raise ConfigError(str(error)) from error
         self._publishing = True
         self._active_entities = [
-            self.create_subscription(CableCommand, "cable/command", self._command, COMMAND),
+            self.create_subscription(CableCommand, "cable/command", follow(self, self._driver.command), COMMAND),
             # A best-effort subscription also receives from reliable publishers.
             self.create_subscription(Float32, "imu/heater", lambda m: self._driver.heater(m.data), SENSOR),
             self.create_service(Trigger, "~/home", trigger(self._driver.request, lambda bridge, now: bridge.home(now))),
@@ -104,14 +102,6 @@ class CanBridge(ManagedNode):
         for bus in hardware.all_buses:
             file.require_motors(bus.interface)
         return hardware
-
-    def _command(self, message: CableCommand) -> None:
-        stamp = message.header.stamp
-        reason = self._driver.command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
-        # The logger's own throttle is not used: it looks up its caller's source each time, which takes longer than the command.
-        if reason and time.monotonic() - self._refusal_logged > LOG_PERIOD:
-            self._refusal_logged = time.monotonic()
-            self.get_logger().warning(f"command refused: {reason}")
 
     def _publish(self) -> None:
         """Publish the entries of the driver's queue until the queue ends."""

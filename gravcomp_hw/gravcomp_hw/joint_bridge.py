@@ -25,7 +25,7 @@ from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.joint_bridge import JointBridgeParameters
 from gravcomp.motors.joint_driver import JointDriver, JointDriverOptions
 from gravcomp.motors.state import CableSnapshot
-from gravcomp_hw.bridge_topics import LOG_PERIOD, cable_state, level, trigger
+from gravcomp_hw.bridge_topics import cable_state, follow, level, trigger
 from gravcomp_hw.joint_guard_client import JointGuardClient, JointGuardError
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
@@ -49,7 +49,7 @@ class JointBridgeNode(ManagedNode):
         kind = JointTrajectory if self._joints.command == "trajectory" else Float64MultiArray
         self._commands = self.create_publisher(kind, self._joints.topic, _STATES)
         self._state = self.create_publisher(CableState, "cable/state", COMMAND)
-        self._logged, self._refusal_logged = "", -math.inf
+        self._logged = ""
         self._looked, self._controller_missing = -math.inf, None
         self._publishing = False
         options = JointDriverOptions(p.control_rate, p.state_rate, p.require_imu)
@@ -71,7 +71,7 @@ class JointBridgeNode(ManagedNode):
         request = self._driver.request
         self._subscriptions_here = [
             self.create_subscription(JointState, "joint_states", self._on_joint_states, _STATES),
-            self.create_subscription(CableCommand, "cable/command", self._command, COMMAND),
+            self.create_subscription(CableCommand, "cable/command", follow(self, self._driver.command), COMMAND),
         ]
         if self.parameters.require_imu:
             self._subscriptions_here.append(self.create_subscription(Imu, "imu/data_raw", self._on_imu, SENSOR))
@@ -139,13 +139,6 @@ class JointBridgeNode(ManagedNode):
 
     def _on_imu(self, _: Imu) -> None:
         self._driver.bridge.on_imu_sample(time.monotonic())
-
-    def _command(self, message: CableCommand) -> None:
-        stamp = message.header.stamp
-        reason = self._driver.command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
-        if reason and time.monotonic() - self._refusal_logged > LOG_PERIOD:
-            self._refusal_logged = time.monotonic()
-            self.get_logger().warning(f"command refused: {reason}")
 
     def _publish_state(self, snapshot: CableSnapshot) -> None:
         if self._publishing:

@@ -1,6 +1,7 @@
 """The bridge's end of the connection to the guard process of joint_bridge, which it starts."""
 
 import contextlib
+import os
 import select
 import subprocess
 import sys
@@ -29,9 +30,10 @@ class JointGuardClient:
         if not ready or self._process.stdout.readline().strip() != b"ready":
             self._process.kill()
             raise JointGuardError(f"the guard of {topic} did not start within {_READY_TIMEOUT:.0f} s")
+        os.set_blocking(self._process.stdin.fileno(), False)  # a guard that hangs must not block the control
 
     def beat(self) -> bool:
-        """Send a heartbeat; return whether the guard runs."""
+        """Send a heartbeat; return whether the guard runs. One that hangs counts as gone when its pipe is full."""
         return self._write(BEAT)
 
     def close(self) -> None:

@@ -14,7 +14,6 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
-from gravcomp.trials.calibration_run import joined
 from gravcomp.trials.free_fall import free_fall
 from gravcomp.trials.known_robot import DAMPING_TIME, known_setup, known_windows
 
@@ -50,6 +49,15 @@ def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
             )
         )
     return trials
+
+
+def joined(trials: list[Measured]) -> Measured:
+    """Concatenate trials to one measurement."""
+    columns = {
+        name: np.concatenate([getattr(trial, name) for trial in trials])
+        for name in ("trial", "time", "gravity", "displacement", "tip_position", "tip_direction")
+    }
+    return Measured(source=trials[0].source, **columns)
 
 
 @pytest.fixture(scope="module")

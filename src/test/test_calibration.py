@@ -145,7 +145,7 @@ def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
         np.array([0.7512e6, 0.81e6]), np.array([0.1e-3, 0, 0, 0, 0, -0.2e-3]), np.array([0.2e-3] * 3 + [0.0] * 3)
     )
     path = tmp_path / "mine.yaml"
-    fitted = calibrated_robot(robot, parameters, 0.031)
+    fitted = calibrated_robot(robot, parameters).with_material(damping_time=0.031)
     write_calibrated(source.source, path, robot, fitted, calibrated_hardware(hardware, parameters))
     mine = load_robot_file(path)
     motors = parse_hardware(mine.section("hardware"), source=mine.source).motors

@@ -33,7 +33,7 @@ class Joint:
         if self.kind == "prismatic":
             result[:3, 3] += self.origin[:3, :3] @ (self.axis * position)
         elif self.kind != "fixed":
-            result[:3, :3] = self.origin[:3, :3] @ _turn(self.axis, position)
+            result[:3, :3] = self.origin[:3, :3] @ turn(self.axis, position)
         return result
 
 
@@ -109,7 +109,7 @@ def _joint(element: xml.Element, source: str) -> Joint:
         origin[:3, 3] = numbers(given, "xyz", "0 0 0")
         roll, pitch, yaw = numbers(given, "rpy", "0 0 0")
         x, y, z = np.eye(3)
-        origin[:3, :3] = _turn(z, yaw) @ _turn(y, pitch) @ _turn(x, roll)
+        origin[:3, :3] = turn(z, yaw) @ turn(y, pitch) @ turn(x, roll)
     axis = element.find("axis")
     direction = np.array(numbers(axis, "xyz", "1 0 0"))
     length = float(np.linalg.norm(direction))
@@ -153,7 +153,7 @@ def _link(joint: xml.Element, end: str, source: str) -> str:
     return name
 
 
-def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     """Return the rotation (3, 3) about a unit axis by an angle (rad), by Rodrigues' formula."""
     x, y, z = axis
     k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -28,14 +28,19 @@ class GravityFusion:
     """
 
     def __init__(self, imu_std: float, arm_std: float, tolerance: float, patience: float, stale: float):
-        self._share = imu_std**2 / (imu_std**2 + arm_std**2)
-        self._tolerance, self._patience, self._stale = tolerance, patience, stale
+        self._stale = stale
+        self.trust(imu_std, arm_std, tolerance, patience)
         self._arm: tuple[float, np.ndarray] | None = None
         self._imu_time = -math.inf
         self._mean: np.ndarray | None = None
         self._agreed = -math.inf
         self.angle: float | None = None
         self.disagrees = False
+
+    def trust(self, imu_std: float, arm_std: float, tolerance: float, patience: float) -> None:
+        """Set how far each is trusted; what was measured so far stays."""
+        self._share = imu_std**2 / (imu_std**2 + arm_std**2)
+        self._tolerance, self._patience = tolerance, patience
 
     def imu(self, time: float, gravity: np.ndarray) -> np.ndarray:
         """Take the IMU's gravity; return the fused one."""

@@ -9,13 +9,15 @@ import math
 
 import numpy as np
 
-AXES = ("x", "y", "z")
-"""Ends of the names of the joints of a piece."""
+from gravcomp.arm.chain import turn
+
+_AXES = ("x", "y", "z")  # ends of the names of the joints of a piece
+_X, _Y, _ = np.eye(3)
 
 
 def joint_names(prefix: str, points: int) -> list[str]:
     """Return the names of the joints of a backbone with this number of points."""
-    return [f"{prefix}chain_{i}_{axis}" for i in range(1, points) for axis in AXES]
+    return [f"{prefix}chain_{i}_{axis}" for i in range(1, points) for axis in _AXES]
 
 
 def joint_positions(backbone: np.ndarray, length: float) -> list[float]:
@@ -29,15 +31,5 @@ def joint_positions(backbone: np.ndarray, length: float) -> list[float]:
         size = math.sqrt(dx * dx + dy * dy + dz * dz)
         bend_x, bend_y = math.atan2(-dy, dz), math.asin(min(1.0, max(-1.0, dx / size))) if size > 0.0 else 0.0
         result += [bend_x, bend_y, size - rest]
-        rotation = rotation @ _about_x(bend_x) @ _about_y(bend_y)
+        rotation = rotation @ turn(_X, bend_x) @ turn(_Y, bend_y)
     return result
-
-
-def _about_x(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def _about_y(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])

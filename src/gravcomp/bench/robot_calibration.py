@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import StaticFit
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.sweep import Sweep
@@ -54,8 +55,9 @@ def compliance_error(setup: Setup, fit: StaticFit) -> float:
     lines, nominal = setup.true_robot.cables, setup.nominal
     inside = np.array([nominal.line_length(cable) - (cable.free_length or 0.0) for cable in nominal.cables])
     true = (lines.free_length + inside) / lines.axial_stiffness
+    _, factor = edge_unit("compliance")
     errors = [
-        100.0 * abs(1e-3 * e.value / true[e.index] - 1.0)
+        100.0 * abs(e.value / (factor * true[e.index]) - 1.0)
         for e in fit.estimates
         if e.kind == "compliance" and e.seen and e.interval <= _TOLD * e.value
     ]

@@ -24,12 +24,9 @@ FIGURES = (
     "settle_s",
     "unholdable",
     "similarity_pct",
-    "calibrated_pct",
-    "modulus_error_pct",
-    "compliance_error_pct",
-    "calibrate_s",
+    *robot_calibration.FIGURES,
 )
-"""Keys of the result. The last four are those of a calibration, see `robot_calibration`."""
+"""Keys of the result."""
 
 SEEDS = (1, 2, 3)
 _ORIENTATIONS = 20

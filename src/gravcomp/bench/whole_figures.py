@@ -63,8 +63,8 @@ def _coverage(progress: Progress, every: int) -> dict[str, Any]:
     if len(files) < 1 + len(_COVERED):
         logging.getLogger(__name__).warning("%s: not all of %s are there; fewer robots are covered", folder, ", ".join(_COVERED))
     found = coverage_of_robots(files[:1] if every > 1 else files, range(1, 1 + max(3, _SEEDS // every)), progress)
-    shares = {f"{name} {kind}": one for name, kinds in found.items() for kind, one in kinds.items()}
+    covered = [one for kinds in found.values() for one in kinds.values()]
     return {
-        "coverage_pct": round(100.0 * min(one.share for one in shares.values()), 1),
-        "coverage_width": round(max(one.width for one in shares.values()), 2),
+        "coverage_pct": round(100.0 * min(one.share for one in covered), 1),
+        "coverage_width": round(max(one.width for one in covered), 2),
     }

@@ -28,10 +28,9 @@ _NO_CREEP = 1e-4  # ratio of a branch that is not described
 def calibrated_robot(
     robot: Robot,
     parameters: StaticParameters,
-    damping_time: float | None = None,
     creep_times: tuple[float, ...] = (),
 ) -> Robot:
-    """Return the robot with the fitted parameters and, if given, damping time in s; creep_times: of its branches in s."""
+    """Return the robot with the fitted parameters; creep_times: of its branches in s."""
     robot = with_cable_places(robot, parameters.radius, parameters.angle)
     cables = tuple(
         dataclasses.replace(
@@ -40,8 +39,6 @@ def calibrated_robot(
         )
         for cable, compliance in zip(robot.cables, parameters.compliance)
     )
-    if damping_time is not None:
-        robot = robot.with_material(damping_time=damping_time)
     if creep_times:
         robot = robot.with_material(prony=_terms(parameters.creep, creep_times), creep_ratio=0.0)
     moduli = np.broadcast_to(parameters.youngs_modulus, len(robot.materials))
@@ -216,15 +213,20 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
     if bias_model is not None:
         estimator["bias_model_file"] = str(bias_model.resolve())
     if found.mount is not None:
-        _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in found.mount]
+        _set_mount(document, found.mount)
     _write(document, target)
 
 
 def write_mount(source: str | Path, target: str | Path, rpy: tuple[float, float, float]) -> None:
     """Write the robot's file `source` to `target` with the mount of the IMU: roll, pitch, yaw in rad. Raises ConfigError."""
     document = _document(source)
-    _section(document["robot"], "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
+    _set_mount(document, rpy)
     _write(document, target)
+
+
+def _set_mount(document: dict, rpy: tuple[float, float, float]) -> None:
+    """Write roll, pitch, yaw in rad into the document; one on a base may have no section `robot` yet."""
+    _section(_section(document, "robot"), "imu_mount")["rpy_deg"] = [round(math.degrees(angle), 4) for angle in rpy]
 
 
 def _section(mapping: dict, key: str) -> dict:

@@ -21,6 +21,11 @@ _UNITS = {
 }  # fmt: skip
 
 
+def edge_unit(kind: str) -> tuple[str, float]:
+    """Return the unit of a kind in its estimates, and the factor to it from that in `StaticParameters`."""
+    return _UNITS.get(kind, ("", 1.0))
+
+
 @dataclass(frozen=True)
 class Estimate:
     """One fitted parameter in its edge unit.
@@ -103,7 +108,7 @@ def estimate(
     times: tuple[float, ...] = (),
 ) -> Estimate:
     """Return the estimate of an unknown; half width of its interval and standard deviation sigma are in x."""
-    first, (unit, factor) = unknown.index[0], _UNITS.get(unknown.kind, ("", 1.0))
+    first, (unit, factor) = unknown.index[0], edge_unit(unknown.kind)
     before, value = (float(factor * p.values(unknown.kind)[first]) for p in (initial, final))
     name = name_of(robot, unknown, times)
     if unknown.kind == "modulus":

@@ -47,9 +47,9 @@ class Phase(enum.StrEnum):
 class LiveSession:
     """One calibration. Times in s of any clock that does not jump; all else in SI and soft_base."""
 
-    def __init__(self, robot: Robot, plan: Plan, path: Path, options: LiveOptions | None = None):
+    def __init__(self, robot: Robot, plan: Plan, path: Path):
         """Begin, or go on with the file at `path`. Raises MeasurementError for a file of another robot or plan."""
-        self._robot, self._plan, self._path, self._options = robot, plan, path, options or LiveOptions()
+        self._robot, self._plan, self._path, self._options = robot, plan, path, LiveOptions()
         self._pose, self._trial = self._progress()
         self.phase = Phase.TURN if self._pose < len(plan.poses) else Phase.DONE
         self._gravities: list[tuple[float, np.ndarray]] = []

@@ -126,12 +126,10 @@ def make_plan(
     period: float,
     transmission: Transmission | None = None,
     options: PlanOptions | None = None,
-    priors: Priors | None = None,
-    noise: TipNoise | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> Plan:
     """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose."""
-    options, priors, noise = options or PlanOptions(), priors or Priors(), noise or TipNoise()
+    options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
     candidates = _candidates(robot, transmission, options, progress)
     if not candidates:
@@ -154,18 +152,19 @@ def make_plan(
     rows = np.stack([unknown.derivative(derivatives) for unknown in unknowns], axis=2) * scale[:, None]
     prior = np.vstack([prior_rows(unknowns, priors), [(u.kind == "modulus") / _WIDEST for u in unknowns]])
     longest = options.budget / options.fewest
-    held = float(np.clip(options.periods * period, options.budget / options.most, longest))
+    wanted = float(np.clip(options.periods * period, options.budget / options.most, longest))
     pull = _pull_time(candidates, robot)
-    rest = max(held - pull, _LEAST_REST * longest)
-    chosen = _chosen(candidates, rows, prior, rest, robot, options)
+    rest = max(wanted - pull, _LEAST_REST * longest)
+    held = rest + pull
+    chosen = _chosen(candidates, rows, prior, held, options)
     poses = _ordered([candidates[k] for k in chosen])
     if not poses:
         raise ConfigError(
-            f"robot '{robot.name}': no pose of {rest + pull:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
+            f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
         )
     free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
     poses.append(free)  # let go at the end, it swings: the damping
-    return Plan(tuple(poses), (rest + pull,) * len(poses), rest, options.rate)
+    return Plan(tuple(poses), (held,) * len(poses), rest, options.rate)
 
 
 def _candidates(
@@ -215,13 +214,10 @@ def _pose(
     return PlannedPose(inclination, roll, displacement, pulled, tension, shape.tip_position)
 
 
-def _chosen(
-    candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, rest: float, robot: Robot, options: PlanOptions
-) -> list[int]:
-    """Return the chosen candidates. rows (k, 6, u): derivatives over the noise."""
+def _chosen(candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, held: float, options: PlanOptions) -> list[int]:
+    """Return the chosen candidates. rows (k, 6, u): derivatives over the noise; held: time in s of each pose."""
     information = prior.T @ prior
     chosen: list[int] = []
-    held = rest + _pull_time(candidates, robot)
     turn = _MEAN_TURN / options.rate
     spent, stations = held, set()  # the last pose, released
     while True:

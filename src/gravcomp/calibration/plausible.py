@@ -80,13 +80,12 @@ def check_frame(
     windows: StillWindows,
     tip: np.ndarray,
     swapped: Callable[[StillWindows], np.ndarray],
-    options: PlausibilityOptions | None = None,
 ) -> None:
     """Raise MeasurementError where exchanged axes or cables explain the data much better than the data as they are.
 
     tip (k, 6): as the described robot has it; swapped(windows): the same for windows with other displacements.
     """
-    options = options or PlausibilityOptions()
+    options = PlausibilityOptions()
     own = _distance(robot, windows, tip)
     if own < options.suspicious:
         return
@@ -118,9 +117,9 @@ def check_frame(
         )
 
 
-def check_explained(robot: Robot, rms_after: float, options: PlausibilityOptions | None = None) -> None:
+def check_explained(robot: Robot, rms_after: float) -> None:
     """Raise MeasurementError where even the fitted robot misses the tips by rms_after (m), as no robot like this one does."""
-    options = options or PlausibilityOptions()
+    options = PlausibilityOptions()
     if rms_after > options.unexplained * robot.length:
         raise MeasurementError(
             f"no values describe these data: a tip error of {1e3 * rms_after:.2f} mm remains ({rms_after / robot.length:.1%} of"

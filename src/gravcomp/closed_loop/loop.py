@@ -55,13 +55,10 @@ _BUS_STEP = 0.002  # s: the motors' feedback
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _HEATER_PERIOD = 0.1  # s
 _COMPLIANCE_STEPS = 50  # bus steps between two computations of the tip's compliance
+_STANDALONE = "standalone"  # the board on which the firmware's loop runs
 _IDLE = 4e-4  # of the largest tension, below which a cable counts as idle
 _RELEASE_SLACK = 0.05
 """Of the robot's length: released cables are paid out so far beyond their paths that no motion of the robot makes them taut."""
-
-
-STANDALONE = "standalone"
-"""Board on which the firmware's loop runs."""
 
 
 class ClosedLoop:
@@ -95,10 +92,10 @@ class ClosedLoop:
             setup.virtual_hardware,
             seed=setup.seed,
             motion=motion,
-            board="virtual" if board == STANDALONE else board,
+            board="virtual" if board == _STANDALONE else board,
             scene=setup.scene,
         )
-        self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == STANDALONE else None
+        self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == _STANDALONE else None
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
@@ -258,7 +255,7 @@ class ClosedLoop:
         """Pass the shape, its wrench, the winches' displacements (m,) and the load cells' tensions to the observer."""
         if self._load is None or not shape.is_equilibrium:
             return
-        if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < 5:
+        if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < SAMPLE_PERIOD / _BUS_STEP:
             try:
                 self._tip_compliance = self._simulator.tip_compliance()
             except NotPositiveDefinite:  # the next shape may be stable
@@ -313,7 +310,7 @@ class ClosedLoop:
                 shape.tip_direction,
                 self._sent,
                 truth.base_position,
-                float(np.linalg.norm(truth.contact_force, axis=1).sum()),
+                truth.wall_force,
                 float(truth.contact_depth.max(initial=0.0)),
             )
         )

@@ -148,10 +148,10 @@ def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     from gravcomp.full_model.modes import first_period
     from gravcomp.mesh import MeshError
 
-    transmission = Setup.of(file).hardware.transmission
+    setup = Setup.of(file)
     with _progress("planning") as show:
         try:
-            return make_plan(file.robot, first_period(file.robot), transmission, _options(args), progress=show)
+            return make_plan(setup.robot, first_period(setup.robot), setup.hardware.transmission, _options(args), progress=show)
         except MeshError as error:
             raise ConfigError(str(error)) from error
 

@@ -8,7 +8,6 @@ import numpy as np
 from gravcomp.experiments.reaching import reaching
 from gravcomp.experiments.steering import add_steering
 from gravcomp.report.result import Result
-from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
 from gravcomp.trials.lumen import Lumen, Reach
 
@@ -26,6 +25,5 @@ def run(context: Context) -> Result:
     """Run the experiment."""
     question = "Does the robot follow the same path through the colon when the patient is turned on the side?"
     result = reaching(context, "colonoscopy", TITLE, question, REACHES)
-    setup = context.once(calibrate_on_virtual_robot).setup
-    add_steering(result, context, setup, [(reach.name, reach.lumen, reach.inclination, reach.roll) for reach in REACHES])
+    add_steering(result, context, REACHES)
     return result

@@ -5,7 +5,6 @@ import numpy as np
 from gravcomp.experiments.reaching import reaching
 from gravcomp.experiments.steering import add_steering
 from gravcomp.report.result import Result
-from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
 from gravcomp.trials.lumen import Lumen, Reach
 
@@ -39,6 +38,5 @@ def run(context: Context) -> Result:
     """Run the experiment."""
     question = "Can a user reach through a tube without touching it, straight and around a bend?"
     result = reaching(context, "hand-held", TITLE, question, REACHES)
-    setup = context.once(calibrate_on_virtual_robot).setup
-    add_steering(result, context, setup, [(reach.name, reach.lumen, reach.inclination, reach.roll) for reach in REACHES])
+    add_steering(result, context, REACHES)
     return result

@@ -6,9 +6,10 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.report.drawing import REAL, TARGET, Drawing, draw_robot
 from gravcomp.report.drawing import WITHOUT as WITHOUT_COLOUR
 from gravcomp.report.result import Figure, Plot, Result, Table
+from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.lumen import Lumen
-from gravcomp.trials.steered import Passage, Steered, steer
+from gravcomp.trials.lumen import Reach
+from gravcomp.trials.steered import DEPTH, Passage, Steered, steer
 
 _SEEDS = 20
 _SECONDS = 20.0  # until a run is given up
@@ -17,10 +18,11 @@ _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0
 
 
-def add_steering(result: Result, context: Context, setup: Setup, places: list[tuple[str, Lumen, float, float]]) -> None:
-    """Add to `result` what a person reaches in `places`: name, lumen, inclination and roll in deg; seeds take turns."""
+def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -> None:
+    """Add to `result` what a person reaches in the lumens of `reaches`, with the calibrated controller; seeds take turns."""
+    setup = context.once(calibrate_on_virtual_robot).setup
     seeds = range(1, 2 if context.brief else 1 + _SEEDS)
-    passages = [_passage(setup, places[seed % len(places)], seed) for seed in seeds]
+    passages = [_passage(setup, reaches[seed % len(reaches)], seed) for seed in seeds]
     jobs = [(setup, passage, way, seed) for passage, seed in zip(passages, seeds) for way in (True, False)]
     runs = context.map(steer, jobs, "a person steers through lumens")
     held, without = runs[::2], runs[1::2]
@@ -33,7 +35,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
         Figure("steered: peak force of the wall, without / with compensation, median of the seeds", ratio, "", limit=_FORCE_RATIO,
                at_least=True),
         Figure("steered: peak force of the wall with compensation, median", float(np.median([r.peak for r in held])), "N"),
-        Figure("steered: deepest place in a wall, all runs", 1e3 * max(r.worst for r in runs), "mm", limit=0.02),
+        Figure("steered: deepest place in a wall, all runs", 1e3 * max(r.worst for r in runs), "mm", limit=1e3 * DEPTH),
     ]  # fmt: skip
     header = ("seed", "lumen", "compensation", "reached", "time, s", "peak force, N", "mean force, N", "path of the tip, mm",
               "time at pain, %", "deepest in the wall, mm")  # fmt: skip
@@ -45,7 +47,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
     result.parts += [
         Plot(
             "A person steers: the lumen and the path of the tip",
-            _lumens(held[: len(places)], without[: len(places)]),
+            _lumens(held[: len(reaches)], without[: len(reaches)]),
             "Section in the plane of bending. Vermilion with compensation, pink without; dot: the target on the wall.",
         ),
         Plot("A person steers: force of the wall", _forces(held, without), "Sum of the sizes of all contact forces; every seed."),
@@ -54,7 +56,7 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
             header,
             rows,
             "Reached: the target near the middle of the picture, and in reach of a tool, for half a second, no wall entered by"
-            " more than 0.02 mm. A run that does not reach it is given up.",
+            f" more than {1e3 * DEPTH:g} mm. A run that does not reach it is given up.",
         ),
     ]
     result.notes += [
@@ -64,12 +66,11 @@ def add_steering(result: Result, context: Context, setup: Setup, places: list[tu
     ]
 
 
-def _passage(setup: Setup, place: tuple[str, Lumen, float, float], seed: int) -> Passage:
-    name, lumen, inclination, roll = place
+def _passage(setup: Setup, reach: Reach, seed: int) -> Passage:
     length, random = setup.robot.length, np.random.default_rng([seed, 11])
     return Passage(
-        name, lumen, inclination, roll, first=_FIRST * length, depth=random.uniform(*_DEPTHS) * length,
-        angle=random.uniform(0.0, 2.0 * np.pi), seconds=_SECONDS,
+        reach.name, reach.lumen, reach.inclination, reach.roll, first=_FIRST * length,
+        depth=random.uniform(*_DEPTHS) * length, angle=random.uniform(0.0, 2.0 * np.pi), seconds=_SECONDS,
     )  # fmt: skip
 
 
@@ -101,7 +102,7 @@ def _forces(held: list[Steered], without: list[Steered]) -> str:
     with Drawing(1, 2, width=9.0, height=3.0, sharey=True) as drawing:
         for axes, runs, colour, title in zip(drawing.axes, (without, held), (WITHOUT_COLOUR, REAL), ("without", "with")):
             for run in runs:
-                axes.plot(0.01 * np.arange(len(run.force)), run.force, color=colour, linewidth=0.7, alpha=0.6)
+                axes.plot(run.samples, run.force, color=colour, linewidth=0.7, alpha=0.6)
             axes.set_title(f"{title} compensation")
             axes.set_xlabel("time in s")
         drawing.axes[0].set_ylabel("force of the wall in N")

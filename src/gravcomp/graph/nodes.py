@@ -7,6 +7,20 @@ from gravcomp.graph.interface import Node, Port
 
 _PARAMETERS = "gravcomp.graph.parameters"
 _DIAGNOSTICS = Port("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "state of the node, 1 Hz")
+_CONTROLLER = (
+    Port(
+        "CONTROLLER/joint_trajectory",
+        "trajectory_msgs/msg/JointTrajectory",
+        "angles in rad (command: trajectory)",
+        optional=True,
+    ),
+    Port(
+        "CONTROLLER/commands",
+        "std_msgs/msg/Float64MultiArray",
+        "angles in rad or efforts in N m (position, effort)",
+        optional=True,
+    ),
+)
 
 NODES = (
     Node(
@@ -40,14 +54,7 @@ NODES = (
         ),
         publishes=(
             Port("cable/state", "gravcomp_msgs/msg/CableState", "bridge state, measured displacements (m) and tensions (N)"),
-            Port(
-                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
-                optional=True,
-            ),
-            Port(
-                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
-                optional=True,
-            ),
+            *_CONTROLLER,
             _DIAGNOSTICS,
         ),
         services=(
@@ -59,16 +66,7 @@ NODES = (
     Node(
         "gravcomp_hw", "joint_robot", "stands in for a ros2_control robot: its controller, its joint_states and an IMU",
         f"{_PARAMETERS}.joint_robot:JointRobotParameters",
-        subscribes=(
-            Port(
-                "CONTROLLER/joint_trajectory", "trajectory_msgs/msg/JointTrajectory", "angles in rad (command: trajectory)",
-                optional=True,
-            ),
-            Port(
-                "CONTROLLER/commands", "std_msgs/msg/Float64MultiArray", "angles in rad or efforts in N m (position, effort)",
-                optional=True,
-            ),
-        ),
+        subscribes=_CONTROLLER,
         publishes=(
             Port("joint_states", "sensor_msgs/msg/JointState", "angles (rad), speeds (rad/s), efforts (N m) of the joints"),
             Port(
@@ -111,7 +109,7 @@ NODES = (
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
             Port("external/wrench", "geometry_msgs/msg/WrenchStamped", "known force (N) and moment (N m); the frame says where"),
-            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m (load.kind)"),
+            Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip measured by a tracker, m"),
             Port("measured/tension", "sensor_msgs/msg/JointState", "tensions of the cables in effort, N (load.kind)"),
         ),
         publishes=(

@@ -174,8 +174,8 @@ class Bridge(Supervisor):
     # Changes of the state.
 
     @property
-    def _can_pay_out(self) -> bool:
-        return self._rotors.zeros.known and not self._lost
+    def _zeros_known(self) -> bool:
+        return self._rotors.zeros.known
 
     @property
     def _can_follow(self) -> bool:

@@ -101,7 +101,7 @@ class JointBridge(Supervisor):
     # What Supervisor asks.
 
     @property
-    def _can_pay_out(self) -> bool:
+    def _zeros_known(self) -> bool:
         return self.joints.zeros_known
 
     def _missing(self, now: float) -> str | None:

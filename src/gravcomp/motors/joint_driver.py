@@ -68,8 +68,9 @@ class JointDriver:
         with self._lock:
             self.bridge.deactivate()
             last = self.bridge.last()
-            for _ in range(_LAST_TIMES if last is not None else 0):
-                self._send(last or [])
+            if last is not None:
+                for _ in range(_LAST_TIMES):
+                    self._send(last)
 
     def close(self) -> None:
         """Stop driving and end the thread."""

@@ -78,7 +78,6 @@ class JointLoops:
     def no_current(self) -> None:
         """Command no effort; joints away from their setpoints are led to where they are, if that is near, and left there."""
         if self._by_effort or self._resting:
-            self._resting = True
             return
         self._resting = True
         near = self._watchdog.following_error

@@ -78,9 +78,9 @@ class Supervisor(abc.ABC):
 
     # Requests. Those of the user return whether they succeeded, and a sentence for the user.
 
-    def unconfigure(self, why: str = "no bus") -> None:
+    def unconfigure(self) -> None:
         """Enter UNCONFIGURED: there is no way to the motors."""
-        self._enter(State.UNCONFIGURED, why)
+        self._enter(State.UNCONFIGURED, "no bus")
 
     def activate(self, now: float) -> None:
         """Wait for the feedback of all motors, then drive them."""
@@ -112,7 +112,7 @@ class Supervisor(abc.ABC):
 
     def release(self, now: float) -> tuple[bool, str]:
         """Pay all cables out to `displacement_min`, then stop. Stop immediately when the zero position is unknown."""
-        if self.state not in DRIVING or not self._can_pay_out:
+        if self.state not in DRIVING or not (self._zeros_known and self._can_follow):
             done, _ = self.stop("release requested")
             return done, f"{self._idle}; the cables were not paid out because the motors were not driving or have no zero"
         self._enter(State.HOLDING, "paying the cables out")
@@ -170,9 +170,9 @@ class Supervisor(abc.ABC):
     # What a bridge says about its motors.
 
     @property
-    def _can_pay_out(self) -> bool:
-        """Whether the zero positions are known and every motor can be driven."""
-        return self._can_follow
+    @abc.abstractmethod
+    def _zeros_known(self) -> bool:
+        """Whether the zero positions of all motors are known."""
 
     @property
     def _can_follow(self) -> bool:

@@ -33,11 +33,10 @@ class FollowedPath:
         """Return the shape with the tip at the arc length `depth` m, in soft_base."""
         first = int((depth - self._tip_length + self._length) / self._step)
         self._curvature[max(0, first) :] = self.lever
-        begin = depth
         count = round(self._length / self._step)
         points, rotation, place = [np.zeros(3)], np.eye(3), np.zeros(3)
         for k in range(count):
-            s = begin + (k + 0.5) * self._step  # of the path, from -length on
+            s = depth + (k + 0.5) * self._step  # of the path, from -length on
             x, y = self._curvature[min(max(int(s / self._step), 0), len(self._curvature) - 1)]
             half = turned(np.array([-y, x, 0.0]) * 0.5 * self._step)
             rotation = rotation @ half

@@ -35,27 +35,30 @@ class Camera:
 
     def look(self, tip: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> Picture:
         """Return the picture at the tip (3,) m with the axes `rotation` (3, 3); target (3,) m: a place next to a wall."""
-        seen = self._seen(tip, rotation, np.concatenate([target[None], self._line]))
-        angles = self._angles(tip, rotation, np.concatenate([target[None], self._line]))
+        points = np.concatenate([target[None], self._line])
+        angles = _angles(tip, rotation, points)
+        seen = self._seen(tip, points, angles)
         ahead = np.flatnonzero(seen[1:])
         return Picture(
             angles[0] if seen[0] else None,
             angles[1 + ahead[-1]] if len(ahead) else None,
         )
 
-    def _angles(self, tip: np.ndarray, rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
-        own = (points - tip) @ rotation
-        across = np.linalg.norm(own[:, :2], axis=1)
-        angle = np.arctan2(across, own[:, 2])
-        direction = np.where(across[:, None] > 0.0, own[:, :2] / np.maximum(across, 1e-300)[:, None], [1.0, 0.0])
-        return angle[:, None] * direction
-
-    def _seen(self, tip: np.ndarray, rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Whether each point (k, 3) is in the picture and nothing hides it."""
-        within = np.linalg.norm(self._angles(tip, rotation, points), axis=1) < self._half_view
+    def _seen(self, tip: np.ndarray, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Whether each point (k, 3), at these angles (k, 2) in the picture, is within it and nothing hides it."""
+        within = np.linalg.norm(angles, axis=1) < self._half_view
         chosen = np.flatnonzero(within)
         share = np.linspace(0.0, 1.0, _SIGHTS, endpoint=False)[1:]
         sights = tip + share[None, :, None] * (points[chosen] - tip)[:, None]
         gap = self._scene.nearest(sights.reshape(-1, 3))[0].reshape(len(chosen), -1)
         within[chosen] = (gap > 0.0).all(axis=1)
         return within
+
+
+def _angles(tip: np.ndarray, rotation: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the places (k, 2) in the picture of points (k, 3)."""
+    own = (points - tip) @ rotation
+    across = np.linalg.norm(own[:, :2], axis=1)
+    angle = np.arctan2(across, own[:, 2])
+    direction = np.where(across[:, None] > 0.0, own[:, :2] / np.maximum(across, 1e-300)[:, None], [1.0, 0.0])
+    return angle[:, None] * direction

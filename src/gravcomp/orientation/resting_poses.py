@@ -79,7 +79,6 @@ def _joined(poses: list[RestingPose]) -> list[RestingPose]:
                     (pose.accel * pose.count + other.accel * other.count) / count,
                     (pose.gyro * pose.count + other.gyro * other.count) / count,
                     count,
-                    pose.alongside,
                 )
                 break
         else:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import can
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
 from gravcomp.calibration.data import WINDOWS
@@ -67,11 +68,10 @@ def measure(context: Context, plan: Plan) -> Measured:
     return context.map(run_plan, [(context.setup, plan)], stage)[0]
 
 
-def weighed(setup: Setup, noise: TipNoise | None = None) -> float:
+def weighed(setup: Setup) -> float:
     """Return the mass in kg of the virtual robot's body and payload, as a balance shows it."""
-    noise = noise or TipNoise()
     true = RobotModel(with_coarse_elements(_with_true_densities(setup))).mass
-    return true * float(1.0 + noise.balance * np.random.default_rng([setup.seed, 1]).standard_normal())
+    return true * float(1.0 + TipNoise().balance * np.random.default_rng([setup.seed, 1]).standard_normal())
 
 
 def calibrate_on_virtual_robot(context: Context) -> Calibration:
@@ -104,15 +104,6 @@ def run_plan(job: tuple[Setup, Plan]) -> Measured:
     time, gravity, displacement, tip, direction = (np.array(column)[rows] for column in zip(*rig.rows))
     tip, direction = Tracker().seen(setup.nominal.length, tip, direction, np.random.default_rng([setup.seed, 0]))
     return Measured("virtual robot", np.zeros(len(time), int), time, gravity, displacement, tip, direction)
-
-
-def joined(trials: list[Measured]) -> Measured:
-    """Concatenate trials to one measurement."""
-    columns = {
-        name: np.concatenate([getattr(trial, name) for trial in trials])
-        for name in ("trial", "time", "gravity", "displacement", "tip_position", "tip_direction")
-    }
-    return Measured(source=trials[0].source, **columns)
 
 
 def _stops(plan: Plan) -> tuple[list[tuple[np.ndarray, float]], float]:
@@ -193,14 +184,8 @@ class _Rig:
         if refused:
             raise RuntimeError(f"the bridge refused a command at {now:.2f} s: {refused}")
         truth = self._virtual.truth
-        orientation = quat_axis(truth.tip_orientation)
-        self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, orientation))
-
-
-def quat_axis(orientation: np.ndarray) -> np.ndarray:
-    """Return the z axis (3,) of an orientation x y z w."""
-    x, y, z, w = orientation
-    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+        direction = Rotation.from_quat(truth.tip_orientation).apply((0.0, 0.0, 1.0))
+        self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, direction))
 
 
 def _with_true_densities(setup: Setup) -> Robot:

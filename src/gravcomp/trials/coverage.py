@@ -11,13 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics, starting_parameters
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import StaticParameters
-from gravcomp.calibration.plan import PlannedPose
+from gravcomp.calibration.plan import PlannedPose, make_plan
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import GROUPS
-from gravcomp.description import Robot
+from gravcomp.closed_loop.setup import Setup
+from gravcomp.description import Robot, load_robot_file
+from gravcomp.full_model.modes import first_period
 from gravcomp.mesh.tube import with_coarse_elements
 
 _GROUPS = set(GROUPS) - {"creep"}  # of poses without a history
@@ -37,14 +40,12 @@ class Covered:
     count: int
 
 
-def coverage(
-    robot: Robot, poses: Sequence[PlannedPose], seeds: Sequence[int], noise: TipNoise | None = None
-) -> dict[str, Covered]:
+def coverage(robot: Robot, poses: Sequence[PlannedPose], seeds: Sequence[int]) -> dict[str, Covered]:
     """Return for each kind of parameter how its intervals cover the truth over the seeds; kinds never seen are left out.
 
     Raises MeshError, RuntimeError where a pose has no equilibrium.
     """
-    noise = noise or TipNoise()
+    noise = TipNoise()
     robot = with_coarse_elements(robot)
     linear = _Linear(robot, poses)
     body, payload, rest = body_mass(robot)
@@ -60,8 +61,8 @@ def coverage(
         fit = fit_statics(robot, linear.windows, groups=_GROUPS, mass=mass, noise=noise, predictor=linear)
         for estimate in fit.estimates:
             if estimate.seen:
-                unit = estimate.value / float(fit.parameters.values(estimate.kind)[estimate.index]) if estimate.value else 1.0
-                error = estimate.value - unit * float(true.values(estimate.kind)[estimate.index])
+                _, factor = edge_unit(estimate.kind)
+                error = estimate.value - factor * float(true.values(estimate.kind)[estimate.index])
                 errors.setdefault(estimate.kind, []).append(error)
                 halves.setdefault(estimate.kind, []).append(estimate.interval)
     return {
@@ -117,20 +118,10 @@ class _Linear:
         return self._slopes
 
 
-def worst(covered: dict[str, Covered]) -> tuple[float, float]:
-    """Return the smallest share and the largest width of all kinds."""
-    return min(one.share for one in covered.values()), max(one.width for one in covered.values())
-
-
 def coverage_of_robots(
     files: Sequence[str], seeds: Sequence[int], progress: Callable[[str], None]
 ) -> dict[str, dict[str, Covered]]:
     """Return the coverage of robots, each in its own plan. Raises ConfigError, MeshError."""
-    from gravcomp.calibration.plan import make_plan
-    from gravcomp.closed_loop.setup import Setup
-    from gravcomp.description import load_robot_file
-    from gravcomp.full_model.modes import first_period
-
     found = {}
     for file in files:
         setup = Setup.of(load_robot_file(file))

@@ -28,7 +28,7 @@ _HALF_VIEW = np.radians(70.0)  # of the camera, as of colonoscopes
 _NEAR, _CENTRED, _MOMENT = 2.0, np.radians(15.0), 0.5  # robot's widths from the tip, off the middle, s
 _RAISED = 0.25  # of the robot's width, by which the middle of the target stands out of the wall, as a polyp does
 _BEND = 2.0  # of the robot's length is the tightest circle's circumference that the lever commands
-_INTO = 3  # robot's lengths that the tube goes on behind the target
+_INTO = 0.3  # of the robot's length: the tube goes on behind the target
 _SPACING = 0.1  # of the robot's length: points that describe the tube
 
 
@@ -65,7 +65,7 @@ class Passage:
 
     def scene(self, length: float) -> Scene:
         """Return the lumen as a rigid tube in the world, for a robot of `length` m."""
-        way = np.arange(0.0, self.depth + _INTO * length * 0.1, _SPACING * length)
+        way = np.arange(0.0, self.depth + _INTO * length, _SPACING * length)
         points = tuple(map(tuple, (self.lumen.point(way) @ self.orientation.T).tolist()))
         wall = TubeWall(name=self.name, frame="world", friction=self.friction, points=points, radius=(self.lumen.diameter / 2,))
         return Scene(SceneSection(tubes=(wall,)), self.name)
@@ -73,7 +73,7 @@ class Passage:
 
 @dataclass(frozen=True)
 class Steered:
-    """What came of it; t samples, b backbone points, in SI units and the lumen's frame.
+    """What came of it; t samples, of which every fifth gives b backbone points; in SI units and the lumen's frame.
 
     reached; time (s) until then or until it was given up; path (m): way of the tip; worst (m): depth in a wall; hurt: share of
     the time at pain.
@@ -88,8 +88,8 @@ class Steered:
     worst: float
     hurt: float
     samples: np.ndarray  # (t,) s
-    tip: np.ndarray  # (t, 3)
-    body: np.ndarray  # (t, b, 3)
+    tip: np.ndarray  # (t / 5, 3)
+    body: np.ndarray  # (t / 5, b, 3)
     force: np.ndarray  # (t,) N, of the wall
 
     @property
@@ -126,7 +126,7 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
         base = Rotation.from_quat(truth.base_orientation).as_matrix()
         tip = truth.base_position + base @ truth.tip_position
         picture = camera.look(tip, base @ Rotation.from_quat(truth.tip_orientation).as_matrix(), target)
-        does = hand.act(picture, float(np.linalg.norm(truth.contact_force, axis=1).sum()))
+        does = hand.act(picture, truth.wall_force)
         hurt += does.hurt
         near = float(np.linalg.norm(target - tip)) < _NEAR * width
         held = held + _PERIOD if near and picture.off_middle < _CENTRED else 0.0
@@ -151,7 +151,7 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
         path=float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum()),
         worst=worst,
         hurt=hurt * _PERIOD / max(loop.time - start, _PERIOD),
-        samples=trace.time[::5] - start,
+        samples=trace.time - start,
         tip=tips[::5],
         body=body[::5],
         force=trace.wall_force,

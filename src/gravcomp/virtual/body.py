@@ -17,7 +17,7 @@ from gravcomp.rest_axis import RestAxis
 from gravcomp.virtual.law_curve import curve_of_law, filaments
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel
-from gravcomp.virtual.stretches import Stretch, stretches_of
+from gravcomp.virtual.stretches import Stretch, stretch_at, stretches_of
 from gravcomp.virtual.tendon_friction import TendonFriction
 from gravcomp.virtual.true_robot import TrueRobot
 from gravcomp.virtual.ways import element_marks, routing_of
@@ -43,7 +43,7 @@ def build_rod(true: TrueRobot) -> RodModel:
     stiffness, rest_strain = np.empty((n, 6, 6)), np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (n, 1))
     mass, moment, inertia = np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
     for e, z in enumerate(middle):
-        stretch = _at(stretches, z)
+        stretch = stretch_at(stretches, z)
         section, material = stretch.section(z), stretch.material
         stiffness[e] = section.stiffness(material.youngs_modulus, material.poissons_ratio, stretch.axial_modulus)
         filament[e], curve[e] = filaments(stiffness[e][2:5, 2:5]), curve_of_law(material)
@@ -59,15 +59,12 @@ def build_rod(true: TrueRobot) -> RodModel:
         k = _nearest(ends, s)
         mass[k] += one
         inertia[k] += np.diag([about_diameter, about_diameter, about_axis])
-    for load, s, offset in loads:
-        k = _nearest(ends, s)
-        mass[k] += load.mass
-        moment[k] += load.mass * offset
-        inertia[k] += load.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    payload, at = robot.payload, np.array(robot.payload.centre)
-    mass[-1] += payload.mass
-    moment[-1] += payload.mass * at
-    inertia[-1] += payload.mass * (at @ at * np.eye(3) - np.outer(at, at))
+    carried = [(_nearest(ends, s), load.mass, offset) for load, s, offset in loads]
+    carried.append((n, robot.payload.mass, np.array(robot.payload.centre)))
+    for k, one, offset in carried:
+        mass[k] += one
+        moment[k] += one * offset
+        inertia[k] += one * (offset @ offset * np.eye(3) - np.outer(offset, offset))
     centre = moment / np.maximum(mass, 1e-300)[:, None]
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
@@ -84,7 +81,7 @@ def build_material(model: RodModel, true: TrueRobot) -> RodMaterial:
     stretches = stretches_of(true.robot)
     ends = model.station * true.robot.length
     middle = (ends[1:] + ends[:-1]) / 2
-    found = [_at(stretches, z) for z in middle]
+    found = [stretch_at(stretches, z) for z in middle]
     materials = [true.materials[stretch.index] for stretch in found]
     branches = max(len(material.creep_ratio) for material in materials)
     ratio, time = np.zeros((model.elements, branches)), np.ones((model.elements, branches))
@@ -126,10 +123,6 @@ def _curvature(axis: RestAxis, s: float) -> tuple[float, float]:
             bend = arc.angle / arc.length
             return -bend * math.sin(arc.plane), bend * math.cos(arc.plane)
     return 0.0, 0.0
-
-
-def _at(stretches: list[Stretch], z: float) -> Stretch:
-    return next((stretch for stretch in stretches if z < stretch.start + stretch.length), stretches[-1])
 
 
 def _nearest(ends: np.ndarray, z: float) -> int:

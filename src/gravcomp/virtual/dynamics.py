@@ -26,13 +26,13 @@ class MovingRod:
     ):
         """Start unloaded and at rest, the base at the origin, the tendons slack. Without `surroundings` nothing is around it."""
         self.model, self.material, self.friction = model, material, friction
-        self._around = around = surroundings or RodSurroundings.none(model)
+        self._around = around = surroundings or RodSurroundings.none()
         self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
         self._rim = np.zeros((len(around.walls.moving), 3))
         self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
         n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
         self.orientation, self.position = model.unloaded()
-        self.mass, self.centre, self.inertia = model.mass, model.centre, model.inertia  # with what is attached
+        self.mass, self.centre = model.mass, model.centre  # with what is attached
         self.load = np.zeros((n + 1, 3))  # N, in the fixed frame, at the centre of mass of each cross-section
         self.velocity = np.zeros((n + 1, 6))
         self._acceleration, self._velocity_rate = np.zeros((n + 1, 6)), np.zeros((n + 1, 6))
@@ -73,7 +73,7 @@ class MovingRod:
     @property
     def touches(self) -> Touches:
         """The places where the rod touches walls at present."""
-        return touches_of(self._touching, self._around.walls, self.orientation, self.position)
+        return touches_of(self._touching)
 
     def place_free_of_walls(self, shape: RodShape, base_orientation: np.ndarray, base_position: np.ndarray) -> tuple[float, int]:
         """Set the rod to `shape` as `rest` does; return by how much (m) it is then in a wall, and that obstacle's number."""
@@ -195,7 +195,7 @@ class MovingRod:
             model.rest_strain,
             self.mass,
             self.centre,
-            self.inertia,
+            model.inertia,
             model.routing,
             model.tendon_length,
             self.tendon_stiffness,
@@ -226,13 +226,12 @@ class MovingRod:
             return False
         return converged
 
-    def attach(self, mass: float, centre: np.ndarray) -> None:
-        """Fix a mass in kg to the tip, in place of what was attached before; centre (3,) m: in the axes of the tip's section."""
+    def attach(self, mass: float) -> None:
+        """Fix a point mass in kg to the axis at the tip, in place of what was attached before."""
         model = self.model
-        self.mass, self.centre, self.inertia = model.mass.copy(), model.centre.copy(), model.inertia.copy()
-        before, self.mass[-1] = model.mass[-1], model.mass[-1] + mass
-        self.centre[-1] = (before * model.centre[-1] + mass * centre) / max(self.mass[-1], 1e-300)
-        self.inertia[-1] += mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        self.mass, self.centre = model.mass.copy(), model.centre.copy()
+        self.mass[-1] += mass
+        self.centre[-1] = model.mass[-1] * model.centre[-1] / max(self.mass[-1], 1e-300)
 
     def carry(self, base_orientation: np.ndarray, base_position: np.ndarray) -> None:
         """Move the rod rigidly with its base to the given pose; shape, strains and body velocities do not change."""

@@ -155,23 +155,9 @@ def _settle(
     turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     strains(orientation, position, length, strain)
     tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
-    energy = _energy(
-        orientation,
-        position,
-        strain,
-        length,
-        stiffness,
-        filament,
-        curve,
-        rest_strain,
-        path,
-        tendon_rest,
-        spring,
-        wound,
-        preload,
-        force,
-        centre,
-    )
+    law = length, stiffness, filament, curve, rest_strain
+    loads = tendon_rest, spring, wound, preload, force, centre
+    energy = _energy(orientation, position, strain, path, *law, *loads)
     for iteration in range(_MOST_ITERATIONS):
         for c in range(m):
             shortened[c] = tendon_rest[c] - np.sum(path[c])
@@ -233,23 +219,7 @@ def _settle(
                 advance(orientation[k + 1], position[k + 1], turn, shift, work)
             strains(orientation, position, length, strain)
             tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
-            energy = _energy(
-                orientation,
-                position,
-                strain,
-                length,
-                stiffness,
-                filament,
-                curve,
-                rest_strain,
-                path,
-                tendon_rest,
-                spring,
-                wound,
-                preload,
-                force,
-                centre,
-            )
+            energy = _energy(orientation, position, strain, path, *law, *loads)
             if energy <= start_energy + 1e-4 * factor * slope + _ROUNDING * tolerances[1]:
                 break
             factor *= 0.5
@@ -261,12 +231,12 @@ def _energy(
     orientation: np.ndarray,
     position: np.ndarray,
     strain: np.ndarray,
+    path: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
     filament: np.ndarray,
     curve: np.ndarray,
     rest_strain: np.ndarray,
-    path: np.ndarray,
     tendon_rest: np.ndarray,
     spring: np.ndarray,
     wound: np.ndarray,

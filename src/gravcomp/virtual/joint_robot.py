@@ -8,6 +8,8 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
+import can
+
 from gravcomp.canbus import c610
 from gravcomp.canbus.buses import CanBuses
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
@@ -115,7 +117,7 @@ class JointRobot:
                 next_state = max(next_state + self._period, now)
                 self._on_state(state)
 
-    def _take(self, frame) -> None:  # type: ignore[no-untyped-def]
+    def _take(self, frame: can.Message) -> None:
         if frame.arbitration_id not in IMU_FRAMES:
             with self._lock:
                 assert self._servos is not None

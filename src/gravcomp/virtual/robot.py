@@ -88,7 +88,7 @@ class VirtualRobot:
             _ROD_TICKS * TICK,
             _SAMPLE_TICKS // _ROD_TICKS,
         )
-        self._pushes: dict[int, np.ndarray] = {}  # N in soft_base, by the cross-section
+        self._push = np.zeros(3)  # N in soft_base, at the tip
         self._outward, self._inward = FrameFaults(faults), FrameFaults(faults)
         self._faults = ActiveFaults(hardware)
         self._tick = 0
@@ -130,14 +130,13 @@ class VirtualRobot:
         """Turn the base to `orientation` (3, 3), world from soft_base, and keep it there; this ends the motion that it had."""
         self._base.turn(orientation, self.time)
 
-    def push(self, force: np.ndarray, station: float = 1.0) -> None:
-        """Let a force (3,) in N, constant in soft_base, act at the cross-section nearest to `station`, from now on; 0: none."""
-        section = int(np.argmin(np.abs(self._model.station - station)))
-        self._pushes[section] = np.asarray(force, dtype=float)
+    def push(self, force: np.ndarray) -> None:
+        """Let a force (3,) in N, constant in soft_base, act at the tip from now on; 0: none."""
+        self._push = np.asarray(force, dtype=float)
 
-    def attach(self, mass: float, centre: np.ndarray | None = None) -> None:
-        """Fix a payload of `mass` kg to the tip, in addition to the described one; centre (3,) m: in the axes of the tip."""
-        self._rod.attach(mass, np.zeros(3) if centre is None else np.asarray(centre, dtype=float))
+    def attach(self, mass: float) -> None:
+        """Fix a payload of `mass` kg to the middle of the tip, in addition to the described one."""
+        self._rod.attach(mass)
 
     def inject(self, fault: Fault) -> None:
         """Begin `fault`. Raises ConfigError for an unknown cable."""
@@ -216,7 +215,6 @@ class VirtualRobot:
             temperature=self._board.temperature,
             recorded=self._base.recorded,
             base_position=self._rod.position[0].copy(),
-            contact_position=(touches.place - self._rod.position[0]) @ base,
             contact_force=touches.force @ base,
             contact_depth=touches.depth,
         )
@@ -247,8 +245,7 @@ class VirtualRobot:
         sent: list[can.Message] = []
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
-            for section, force in self._pushes.items():
-                self._rod.load[section] = orientation @ force
+            self._rod.load[-1] = orientation @ self._push
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
         behind: list[can.Message] = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:

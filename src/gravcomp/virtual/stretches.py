@@ -39,6 +39,11 @@ class Stretch:
         return self.material.youngs_modulus * (1.0 + along)
 
 
+def stretch_at(stretches: list[Stretch], s: float) -> Stretch:
+    """Return the stretch at the arc length s (m); beyond the tip the last one."""
+    return next((stretch for stretch in stretches if s < stretch.start + stretch.length), stretches[-1])
+
+
 def stretches_of(robot: Robot) -> list[Stretch]:
     """Return the stretches from base to tip."""
     if robot.body is not None:

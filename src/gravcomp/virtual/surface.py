@@ -15,7 +15,7 @@ from numba import njit
 from gravcomp.description import MeshBody, Outline
 from gravcomp.virtual.rod import RodModel
 from gravcomp.virtual.sliced_body import slice_boundary
-from gravcomp.virtual.stretches import Stretch, stretches_of
+from gravcomp.virtual.stretches import Stretch, stretch_at, stretches_of
 from gravcomp.virtual.true_robot import TrueRobot
 
 _WITHIN = 0.9  # of the way from its middle to an outline: nearer to the middle a point is not part of the outline
@@ -46,7 +46,7 @@ def rod_surface(model: RodModel, true: TrueRobot) -> RodSurface:
     ends = model.station * true.robot.length
     base, tip = [], []
     for a, b in zip(ends, ends[1:]):
-        stretch = next((s for s in stretches if (a + b) / 2 < s.start + s.length), stretches[-1])
+        stretch = stretch_at(stretches, (a + b) / 2)
         base.append(_outline(stretch, a))
         tip.append(_outline(stretch, b))
     sections = [max(pair, key=_size) for pair in zip([base[0], *tip], [*base, tip[-1]])]

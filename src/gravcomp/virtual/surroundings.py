@@ -1,4 +1,4 @@
-"""What is around the rod: walls, the surface that touches them, and the places where it does."""
+"""What is around the rod: walls, the surface that touches them, and what pushes it where it does."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 from gravcomp.scene import SceneSection
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.contact import Walls
-from gravcomp.virtual.contact_force import Touching, rigid_stiffness, surface_point
+from gravcomp.virtual.contact_force import Touching, rigid_stiffness
 from gravcomp.virtual.rod import RodModel
 from gravcomp.virtual.surface import RodSurface, rod_surface
 from gravcomp.virtual.true_robot import TrueRobot
@@ -31,7 +31,7 @@ class RodSurroundings:
         return cls(walls, rod_surface(model, true), rigid_stiffness(model.stiffness, model.length), _DEPTH * model.length.sum())
 
     @classmethod
-    def none(cls, model: RodModel) -> "RodSurroundings":
+    def none(cls) -> "RodSurroundings":
         """Return surroundings without walls."""
         scene = Scene(SceneSection())
         return cls(Walls(scene.arrays, ~scene.in_world), RodSurface.none(), 1.0, 1.0)
@@ -39,34 +39,13 @@ class RodSurroundings:
 
 @dataclass(frozen=True)
 class Touches:
-    """Places where a rod touches walls: t of them, in the fixed frame.
+    """Places where walls push a rod, t of them: force (t, 3) N on the rod, in the fixed frame; depth (t,) m in the wall."""
 
-    place (t, 3) m; force (t, 3) N, on the rod; depth (t,) m in the wall; obstacle (t,) int: its number in the scene; element (t,)
-    int: the element that it is on.
-    """
-
-    place: np.ndarray
     force: np.ndarray
     depth: np.ndarray
-    obstacle: np.ndarray
-    element: np.ndarray
-
-    @property
-    def total(self) -> float:
-        """Sum of the sizes of the forces, N."""
-        return float(np.linalg.norm(self.force, axis=1).sum())
 
 
-def touches_of(touching: Touching, walls: Walls, orientation: np.ndarray, position: np.ndarray) -> Touches:
-    """Return the points of `touching` that a wall pushes, with the rod at orientation (n + 1, 3, 3) and position (n + 1, 3)."""
+def touches_of(touching: Touching) -> Touches:
+    """Return the points of `touching` that a wall pushes."""
     used = np.flatnonzero(touching.force[: touching.count[0]].any(axis=1))
-    place = np.empty((len(used), 3))
-    for row, c in enumerate(used):
-        surface_point(orientation, position, touching.section[c], touching.weight[c, 0], touching.arm[c], place[row])
-    return Touches(
-        place,
-        touching.force[used].copy(),
-        -touching.gap[used],
-        walls.scene.obstacle[touching.row[used]],
-        touching.section[used].copy(),
-    )
+    return Touches(touching.force[used], -touching.gap[used])

@@ -23,6 +23,10 @@ class Truth:
     temperature: float  # degC, of the chip
     recorded: bool  # whether the last IMU sample came from a recording
     base_position: np.ndarray  # (3,) m in the world
-    contact_position: np.ndarray  # (t, 3) m, where walls touch the robot
     contact_force: np.ndarray  # (t, 3) N, of the walls on the robot
     contact_depth: np.ndarray  # (t,) m, in the wall
+
+    @property
+    def wall_force(self) -> float:
+        """Sum of the sizes of the walls' forces, N."""
+        return float(np.linalg.norm(self.contact_force, axis=1).sum())

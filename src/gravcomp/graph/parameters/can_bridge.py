@@ -3,21 +3,14 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.parameters.shared import CanBusParameters
 from gravcomp.motors.bridge import ZERO_POLICIES
 
 
 @dataclasses.dataclass(frozen=True)
-class CanBridgeParameters:
+class CanBridgeParameters(CanBusParameters):
     """Parameters of the node; the motors are described in the robot file under `hardware`."""
 
-    interface: str = parameter(
-        "", description="python-can interface; empty: hardware.can.interface of the robot file", read_only=True
-    )
-    channel: str = parameter(
-        "",
-        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
-        read_only=True,
-    )
     control_rate: float = parameter(
         250.0, unit="Hz", minimum=200, maximum=1000, description="rate of the position loops", read_only=True
     )

@@ -3,20 +3,13 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.parameters.shared import CanBusParameters
 
 
 @dataclasses.dataclass(frozen=True)
-class JointRobotParameters:
+class JointRobotParameters(CanBusParameters):
     """Parameters of the node; the joints are described in the robot file under `hardware.joints`."""
 
-    interface: str = parameter(
-        "", description="python-can interface; empty: hardware.can.interface of the robot file", read_only=True
-    )
-    channel: str = parameter(
-        "",
-        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
-        read_only=True,
-    )
     joints: str = parameter(
         "virtual_robot",
         choices=("virtual_robot", "mock"),

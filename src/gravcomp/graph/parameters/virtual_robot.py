@@ -3,6 +3,7 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.parameters.shared import CanBusParameters
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 
@@ -13,17 +14,9 @@ MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 
 
 @dataclasses.dataclass(frozen=True)
-class VirtualRobotNodeParameters:
+class VirtualRobotNodeParameters(CanBusParameters):
     """Parameters of the node; the virtual robot is described in the robot file under `virtual_robot`."""
 
-    interface: str = parameter(
-        "", description="python-can interface; empty: hardware.can.interface of the robot file", read_only=True
-    )
-    channel: str = parameter(
-        "",
-        description="CAN channel, with several buses one each, by commas; empty: as in hardware of the robot file",
-        read_only=True,
-    )
     seed: int = parameter(
         -1, minimum=-1, maximum=2**31 - 1, description="seed of all random numbers; -1: the one of the robot file", read_only=True
     )
