@@ -18,11 +18,10 @@ G = np.array([-9.81, 0.0, 0.0])
 
 def forces(compliance, free, gap, friction=(), wound=(), tension=(), given=(), bend=()):
     c = len(gap)
-    state = np.full(c, OPEN)
-    found, change, settled = contact_forces(
+    found, change, state, settled = contact_forces(
         np.asarray(compliance, dtype=float), np.asarray(free, dtype=float), np.asarray(wound, dtype=float),
         np.asarray(given, dtype=float), np.asarray(tension, dtype=float), np.asarray(gap, dtype=float), np.zeros(c),
-        np.asarray(friction, dtype=float), np.asarray(bend, dtype=float), np.zeros(c), np.zeros((c, 2)), state,
+        np.asarray(friction, dtype=float), np.asarray(bend, dtype=float), np.zeros(c), np.zeros((c, 2)),
     )  # fmt: skip
     assert settled
     return found, change, state

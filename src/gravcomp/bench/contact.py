@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gravcomp.config import from_mapping
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
@@ -117,7 +118,7 @@ def motion(progress: Progress, every: int = 1) -> dict:
             continue
         moved, net, whole = simulator.displacements.copy(), model.elements.energy(simulator.displacements), 0.0
         for angle in angles:
-            gravity = _turned(start, axis, angle)
+            gravity = Rotation.from_rotvec(angle * axis).apply(start)
             shape = simulator.step(gravity)
             steps += 1
             lost += not shape.is_equilibrium
@@ -171,13 +172,8 @@ def seeded_gravity(seed: int) -> np.ndarray:
     return _GRAVITY * np.array([-np.cos(tilt), 0.0, np.sin(tilt)])
 
 
-def _turned(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
-    along = axis * (axis @ vector)
-    return along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector)
-
-
 def step_time(progress: Progress) -> dict:
-    """Return `contact_step_ms`: a closed-loop step of the reduced model with the inverse problem in contact, median.
+    """Return `contact_step_ms`: a step of the reduced model in contact, cables released, and of the inverse problem, median.
 
     `contact_full_step_ms`: the same of the full model; `contact_places`: median number of places; `contact_reduced_share`: share
     of the steps for which the reduced model was used.
@@ -194,7 +190,7 @@ def step_time(progress: Progress) -> dict:
             angle = 0.3 * np.sin(0.02 * step)
             gravity = _GRAVITY * np.array([-np.cos(angle), np.sin(angle), 0.0])
             started = time.process_time()
-            shape = simulator.step(gravity, None)
+            shape = simulator.step(gravity)
             controller.step(
                 shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=_INTERVAL
             )

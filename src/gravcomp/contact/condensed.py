@@ -41,15 +41,15 @@ _ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their c
 @njit(cache=True)
 def contact_forces(
     compliance: np.ndarray, free: np.ndarray, wound: np.ndarray, given: np.ndarray, tension: np.ndarray, gap: np.ndarray,
-    yielding: np.ndarray, friction: np.ndarray, bend: np.ndarray, pressed: np.ndarray, rub: np.ndarray, state: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, bool]:  # fmt: skip
-    """Return the forces (k,) of all rows, their changes (k, m) by the tensions, and whether all conditions hold.
+    yielding: np.ndarray, friction: np.ndarray, bend: np.ndarray, pressed: np.ndarray, rub: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:  # fmt: skip
+    """Return the forces (k,) of all rows, their changes (k, m) by the tensions, states (c,), and whether all conditions hold.
 
     compliance S (k, k) and free (k,): of the response. wound (m,): displacement to which each cable is pulled in, NaN: released;
     given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of walls;
     friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; pressed (c,) and rub (c, 2):
-    normal forces and friction in N, first guesses; state (c,): the result. The changes by the tensions hold the places that
-    touch in contact, and those that stick at rest.
+    normal forces and friction in N, first guesses. The changes by the tensions hold the places that touch in contact, and those
+    that stick at rest.
     """
     m, c = len(wound), len(gap)
     rubbing = len(friction) > 0
@@ -88,6 +88,7 @@ def contact_forces(
     for i in range(c):
         low[m + i], force[m + i] = 0.0, pressed[i]
     settled = _rub(w, q, m, c, friction, rub, low, high, force) if rubbing else _bounded(w, q, low, high, force)
+    state = np.empty(c, dtype=np.int64)
     for i in range(c):
         k = m + c + 2 * i
         if force[m + i] <= 0.0:
@@ -117,7 +118,7 @@ def contact_forces(
         part = np.ascontiguousarray(turned[:, :rows])
         whole[rows:] = part @ force + turned[:, rows]
         changes[rows:] = part @ change
-    return whole, changes, settled
+    return whole, changes, state, settled
 
 
 @njit(cache=True)

@@ -121,11 +121,7 @@ def find_places(
             if near or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
                 chosen[k, s] = True
                 count += 1
-    result = Places(
-        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
-        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
-        np.zeros((count, 3)), np.zeros(count),
-    )  # fmt: skip
+    result = empty_places(count)
     i = 0
     for k in range(rows):
         for s in range(stations):
@@ -133,6 +129,16 @@ def find_places(
                 _write_place(scene, surface, sections, gap, own, normal, k, s, result, i)
                 i += 1
     return result
+
+
+@njit(cache=True)
+def empty_places(count: int) -> Places:
+    """Return arrays for `count` places, in which nothing is written yet."""
+    return Places(
+        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
+        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
+        np.zeros((count, 3)), np.zeros(count),
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -260,29 +266,23 @@ def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray
 
 
 @njit(cache=True)
-def remembered(places: Places, force: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return normal forces (c,), forces along both tangents (c, 2) and states (c,) of last time, by obstacle and station.
-
-    force (k, s, 3) in N and state (k, s): of `remember`.
-    """
+def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, s, 3) in N: of `remember`."""
     count = len(places.row)
-    pressed, rub, held = np.empty(count), np.empty((count, 2)), np.empty(count, dtype=np.int64)
+    pressed, rub = np.empty(count), np.empty((count, 2))
     for i in range(count):
         last = force[places.row[i], places.station[i]]
         pressed[i] = max(places.normal[i] @ last, 0.0)
         rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
-        held[i] = state[places.row[i], places.station[i]]
-    return pressed, rub, held
+    return pressed, rub
 
 
 @njit(cache=True)
-def remember(places: Places, forces: np.ndarray, held: np.ndarray, force: np.ndarray, state: np.ndarray) -> None:
-    """Write the forces (c, 3) and states (c,) of the places to force (k, s, 3) and state (k, s); 0 elsewhere."""
+def remember(places: Places, forces: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces (c, 3) of the places to force (k, s, 3), by obstacle and station; 0 elsewhere."""
     force[:] = 0.0
-    state[:] = 0
     for i in range(len(places.row)):
         force[places.row[i], places.station[i]] = forces[i]
-        state[places.row[i], places.station[i]] = held[i]
 
 
 @njit(cache=True)

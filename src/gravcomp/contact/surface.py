@@ -41,5 +41,5 @@ def contact_surface(robot: Robot) -> ContactSurface:
     size = np.array([max(outline.half_width, outline.half_height) for outline in outlines])
     if all(outline.round for outline in outlines):
         return ContactSurface(place, length, size, np.zeros((count, 0, 2)))
-    angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS + np.pi / _CORNERS * 0.0
+    angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
     return ContactSurface(place, length, size, np.array([outline.boundary(angle) for outline in outlines]))

@@ -7,7 +7,7 @@ dense: the compliance S of cables and places, from which forces and states follo
 
 import numpy as np
 
-from gravcomp.contact.condensed import OPEN, SLIDING, contact_forces
+from gravcomp.contact.condensed import SLIDING, contact_forces
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.places import (
     Places,
@@ -36,7 +36,7 @@ NEAR, TOUCHED = 0.02, 1e-3
 
 
 class FullContact:
-    """Contact of a model with a scene. Remembers the forces and states of the places as guesses for the next solution.
+    """Contact of a model with a scene. Remembers the forces at the places as guesses for the next solution.
 
     Attributes: scene; surface; sections_at_rest (s, 3, 3); margin: m, nearer places are candidates; rubbing: whether any obstacle
     has friction; allowed: depth in m by which obstacles are lowered, for loads applied in steps; of the last
@@ -60,12 +60,11 @@ class FullContact:
 
     def reset(self) -> None:
         """Forget the forces: nothing touches."""
-        shape = len(self.scene.arrays.kind), len(self.surface.place)
-        self._force, self._state = np.zeros((*shape, 3)), np.zeros(shape, dtype=np.int64)
+        self._force = np.zeros((len(self.scene.arrays.kind), len(self.surface.place), 3))
         self._start = self.sections_at_rest
         self.longest = np.inf
         self.pull, self.settled = np.zeros(3 * self._model.n_free), True
-        self._last: tuple[Places, np.ndarray] | None = None
+        self._last: tuple[Places, np.ndarray, np.ndarray] | None = None
 
     def sections(self, u: np.ndarray) -> np.ndarray:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
@@ -82,13 +81,11 @@ class FullContact:
 
     def depth(self, u: np.ndarray) -> float:
         """Return in m how deep the robot is in an obstacle at the displacements u (n, 3); 0 outside."""
-        return max(0.0, -float(self.gaps(u).min(initial=0.0)))
-
-    def gaps(self, u: np.ndarray) -> np.ndarray:
-        """Return the gaps (k, s) in m of all stations to all rows of the scene; those far away are underestimated."""
-        sections, shape = self.sections(u), self._state.shape
+        shape = self._force.shape[:2]
         reach = np.full(shape[1], self.margin)
-        return all_gaps(self.scene.arrays, self.surface, sections, reach, np.zeros((*shape, 2)), np.zeros((*shape, 3)))
+        own, normal = np.zeros((*shape, 2)), np.zeros((*shape, 3))
+        gaps = all_gaps(self.scene.arrays, self.surface, self.sections(u), reach, own, normal)
+        return max(0.0, -float(gaps.min(initial=0.0)))
 
     def respond(
         self, state: Equilibrium, factor: BlockCholesky | TurningFactor, out: np.ndarray, cables: CableInput
@@ -109,9 +106,9 @@ class FullContact:
         places = find_places(self.scene.arrays, self.surface, sections, moved, self.margin + self.allowed, self._force)
         if not len(places.row):
             state.compliance, state.answer = compliance, answer
-            self._keep(places, np.zeros((0, 3)), np.zeros(len(y)))
+            self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(len(y)))
             return y + answer @ tension, tension
-        pressed, rub, held = remembered(places, self._force, self._state)
+        pressed, rub = remembered(places, self._force)
         rocks, bend = turning(places, pressed)
         directions, friction, slid = self._directions(places, rocks), np.zeros(0), np.zeros(0)
         arrays, count = self.scene.arrays, len(places.row)
@@ -124,29 +121,29 @@ class FullContact:
         free = rows @ y
         free[:m] += state.tendons.displacement
         free[m + count : m + count + len(slid)] += slid
-        force, change, self.settled = contact_forces(
+        force, change, held, self.settled = contact_forces(
             whole, free, wound, given, state.tension, places.gap + self.allowed,
-            yielding(arrays, self.surface, places), friction, bend, pressed, rub, held,
+            yielding(arrays, self.surface, places), friction, bend, pressed, rub,
         )  # fmt: skip
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
-        remember(places, forces, held, self._force, self._state)
-        self._keep(places, forces, force[m:] @ directions)
+        remember(places, forces, self._force)
+        self._keep(places, forces, held, force[m:] @ directions)
         return y + columns @ force, force[:m]
 
     def contacts(self, u: np.ndarray) -> Contacts:
         """Return what touched in the last solution, with the gaps at the displacements u (n, 3)."""
         if self._last is None:
             return Contacts.none()
-        return self.described(*self._last, self.sections(u), self._state)
+        return self.described(*self._last, self.sections(u))
 
-    def described(self, places: Places, forces: np.ndarray, sections: np.ndarray, state: np.ndarray) -> Contacts:
+    def described(self, places: Places, forces: np.ndarray, held: np.ndarray, sections: np.ndarray) -> Contacts:
         """Return the places that are pressed by forces (c, 3), where the stations are at `sections` (s, 3, 3).
 
-        state (k, s): states of `contact.condensed`.
+        held (c,): states of `contact.condensed`.
         """
         pressed = np.flatnonzero((forces * places.normal).sum(axis=1) > 0.0)
-        position, row, station = positions(places, sections)[pressed], places.row[pressed], places.station[pressed]
+        position, row = positions(places, sections)[pressed], places.row[pressed]
         along, normal = self.surface.place / self._model.length, np.zeros(3)
         return Contacts(
             obstacle=self.scene.arrays.obstacle[row],
@@ -155,14 +152,14 @@ class FullContact:
             normal=places.normal[pressed],
             force=forces[pressed],
             gap=np.array([gap_to(self.scene.arrays, k, point, normal) for k, point in zip(row, position)]),
-            sliding=state[row, station] == SLIDING,
+            sliding=held[pressed] == SLIDING,
             names=tuple(self.scene.names[self.scene.arrays.obstacle[k]] for k in row),
         )
 
-    def _keep(self, places: Places, forces: np.ndarray, pull: np.ndarray) -> None:
+    def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, pull: np.ndarray) -> None:
         if not len(places.row):
-            self._force[:], self._state[:], self.settled = 0.0, OPEN, True
-        self._last, self.pull = (places, forces), pull
+            self._force[:], self.settled = 0.0, True
+        self._last, self.pull = (places, forces, held), pull
         self.longest = float(self.surface.radius.min()) if len(places.row) else np.inf
 
     def _directions(self, places: Places, rocks: np.ndarray) -> np.ndarray:

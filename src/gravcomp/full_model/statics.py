@@ -15,6 +15,8 @@ from gravcomp.full_model.wrench import PointLoads, Wrench
 
 # Parts of the load in which it is applied where an obstacle has friction.
 _RUBBING_PART = 0.1
+# Smallest part of a change of load that continues an equilibrium.
+_LEAST_PART = 1.0 / 16
 
 
 class StaticSolver(StaticTracker):
@@ -30,16 +32,16 @@ class StaticSolver(StaticTracker):
         last equilibrium is returned with `load_fraction` below 1 and `converged` False, and the solver keeps its state.
         """
         start, loads = self.state, PointLoads.of(self.model, wrench)
-        depth, rubs = self._obstacles(gravity)
-        if not depth and not rubs and self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
+        depth = self._depth(gravity)
+        if not depth and not self._rubs and self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
             return self.state
         self.reset()
         origin = self.state.tendons.displacement
-        part = _RUBBING_PART if rubs else 0.25  # friction depends on the way: the whole load at once is none
+        part = _RUBBING_PART if self._rubs else 0.25  # friction depends on the way: the whole load at once is none
         ends = np.zeros(3), np.asarray(gravity)
-        return self._in_parts(ends, origin, cables, part, 1.0 / parts, start, loads, 15, exact=True, depth=depth, rubs=rubs)
+        return self._in_parts(ends, origin, cables, part, 1.0 / parts, start, loads, 15, exact=True, depth=depth)
 
-    def approach(self, before: np.ndarray, gravity: np.ndarray, cables: CableInput, parts: int = 16) -> Equilibrium:
+    def approach(self, before: np.ndarray, gravity: np.ndarray, cables: CableInput) -> Equilibrium:
         """Return the equilibrium that continues the current state, which balances the gravity `before` (3,), to a new load.
 
         The load changes in steps, which are halved where they fail, as in `solve`. This follows a large change in less time than
@@ -47,9 +49,8 @@ class StaticSolver(StaticTracker):
         """
         here = self.state
         origin = here.tendons.displacement + self.model.tendons.stretch(here.tendons) * here.tension
-        rubs = self.contact is not None and self.contact.rubbing
-        part, ends = _RUBBING_PART if rubs else 0.5, (np.asarray(before), np.asarray(gravity))
-        return self._in_parts(ends, origin, cables, part, 1.0 / parts, here, None, 6, exact=False, depth=0.0, rubs=rubs)
+        part, ends = _RUBBING_PART if self._rubs else 0.5, (np.asarray(before), np.asarray(gravity))
+        return self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, exact=False, depth=0.0)
 
     def _in_parts(
         self,
@@ -64,13 +65,12 @@ class StaticSolver(StaticTracker):
         *,
         exact: bool,
         depth: float,
-        rubs: bool,
     ) -> Equilibrium:
         """Change gravity from one of its `ends` (3,) to the other, and the cables' displacements from `origin` (m,), in steps.
 
         part: the first step's share of the load; a step that fails is halved, down to `least`. Then the last equilibrium is
         returned, not converged, with the fraction of the load that it balances, and the solver keeps the state `kept`.
-        iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first; rubs: an obstacle has friction.
+        iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first.
         """
         (before, gravity), here, done = ends, self.state, 0.0
         while done < 1.0:
@@ -80,7 +80,7 @@ class StaticSolver(StaticTracker):
                 self.contact.allowed = (1.0 - fraction) * depth
             state = self.track(force, cables.part(origin, fraction), iterations, exact=exact, loads=loads, fraction=fraction)
             if state.converged:
-                here, done, part = self.state, fraction, part if rubs else 2.0 * part
+                here, done, part = self.state, fraction, part if self._rubs else 2.0 * part
                 continue
             self.state = here
             part /= 2.0
@@ -91,9 +91,14 @@ class StaticSolver(StaticTracker):
                 return dataclasses.replace(here, converged=False, load_fraction=done)
         return self.state
 
-    def _obstacles(self, gravity: np.ndarray) -> tuple[float, bool]:
-        """Return how deep in m the straight robot is in an obstacle under gravity (3,), and whether any obstacle has friction."""
+    @property
+    def _rubs(self) -> bool:
+        """Whether any obstacle has friction."""
+        return self.contact is not None and self.contact.rubbing
+
+    def _depth(self, gravity: np.ndarray) -> float:
+        """Return how deep in m the straight robot is in an obstacle under gravity (3,)."""
         if self.contact is None:
-            return 0.0, False
+            return 0.0
         self.contact.begin(np.zeros_like(self.state.u), gravity)
-        return self.contact.depth(np.zeros_like(self.state.u)), self.contact.rubbing
+        return self.contact.depth(np.zeros_like(self.state.u))

@@ -11,7 +11,7 @@ from numba import njit
 
 from gravcomp.contact.condensed import contact_forces
 from gravcomp.contact.contacts import Contacts
-from gravcomp.contact.places import Places, find_places, forces_at, remember, remembered, rubbing, turning, yielding
+from gravcomp.contact.places import Places, empty_places, find_places, forces_at, remember, remembered, rubbing, turning, yielding
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import TOUCHED, FullContact
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
@@ -28,8 +28,8 @@ _SHORT = 0.05
 class Touching(NamedTuple):
     """What contact needs: scene, surface, rest (s, 3, 3) and change (9 s, r) of the stations' p, f_1, f_2; and the memory.
 
-    start (s, 3, 3): stations at the last equilibrium; force (k, s, 3) in N and state (k, s): of `places.remember`; pull (1, r):
-    force of contact on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer places are candidates.
+    start (s, 3, 3): stations at the last equilibrium; force (k, s, 3) in N: of `places.remember`; pull (1, r): force of contact
+    on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer places are candidates.
     """
 
     scene: SceneArrays
@@ -38,14 +38,13 @@ class Touching(NamedTuple):
     change: np.ndarray
     start: np.ndarray
     force: np.ndarray
-    state: np.ndarray
     pull: np.ndarray
     rubs: bool
     margin: float
 
 
 class ReducedContact:
-    """Contact of a reduced model. Remembers forces and states of the places as guesses for the next solution."""
+    """Contact of a reduced model. Remembers the forces at the places as guesses for the next solution."""
 
     def __init__(self, full: FullContact, section_change: np.ndarray):
         """full: contact of the full model; section_change (s, 3, 3, r): changes of its stations' p, f_1, f_2."""
@@ -54,11 +53,10 @@ class ReducedContact:
         self.forget()
 
     def forget(self) -> None:
-        """Forget forces and states, for a start from another shape."""
-        shape = len(self._full.scene.arrays.kind), len(self._full.surface.place)
-        self._force, self._state = np.zeros((*shape, 3)), np.zeros(shape, dtype=np.int64)
+        """Forget the forces, for a start from another shape."""
+        self._force = np.zeros((len(self._full.scene.arrays.kind), len(self._full.surface.place), 3))
         self._pull = np.zeros((1, self._change.shape[1]))
-        self._last: tuple[Places, np.ndarray] | None = None
+        self._last: tuple[Places, np.ndarray, np.ndarray] | None = None
 
     def sections(self, q: np.ndarray) -> np.ndarray:
         """Return p, f_1, f_2 (s, 3, 3) of the stations at q (r,)."""
@@ -69,21 +67,20 @@ class ReducedContact:
         full = self._full
         scene = full.scene.under_gravity(gravity)
         return Touching(
-            scene, full.surface, self._rest, self._change, self.sections(q), self._force.copy(), self._state.copy(),
-            self._pull.copy(), full.rubbing, full.margin,
+            scene, full.surface, self._rest, self._change, self.sections(q), self._force.copy(), self._pull.copy(),
+            full.rubbing, full.margin,
         )  # fmt: skip
 
-    def keep(self, touching: Touching, places: Places, forces: np.ndarray) -> None:
+    def keep(self, touching: Touching, places: Places, forces: np.ndarray, held: np.ndarray) -> None:
         """Keep what a step has found."""
-        self._force, self._state, self._pull = touching.force, touching.state, touching.pull
-        self._last = places, forces
+        self._force, self._pull = touching.force, touching.pull
+        self._last = places, forces, held
 
     def contacts(self, q: np.ndarray) -> Contacts:
         """Return what touched in the last solution, with gaps at q (r,)."""
         if self._last is None:
             return Contacts.none()
-        places, forces = self._last
-        return self._full.described(places, forces, self.sections(q), self._state)
+        return self._full.described(*self._last, self.sections(q))
 
 
 @njit(cache=True, fastmath=REORDERED)
@@ -91,23 +88,21 @@ def tracked_touching(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
     pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
     iterations: int, longest_step: float, tolerance: float, touching: Touching,
-) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray]:  # fmt: skip
-    """Return what `tracking._tracked` returns, then the places and the forces (c, 3) there. Writes the memory of `touching`."""
+) -> tuple[
+    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray,
+]:  # fmt: skip
+    """Return what `tracking._tracked` returns, then the places, and the forces (c, 3) and states (c,) there.
+
+    Writes the memory of `touching`.
+    """
     m, r, start, cables = len(tension), len(q), point, body.cables
     rest, change, stations = touching.rest, touching.change, len(touching.rest)
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual, reuse = False, np.inf, False
     factor = np.zeros((r, r))
-    forces = np.zeros((0, 3))
+    forces, held = np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
     sections = rest + (change @ q).reshape(stations, 3, 3)
-    places = find_places(
-        touching.scene,
-        touching.surface,
-        sections,
-        np.zeros((stations, 3)),
-        -np.inf,
-        np.zeros_like(touching.force),
-    )
+    places = empty_places(0)
     for _ in range(iterations):
         stress = scale * point.strain + offset
         if not reuse:
@@ -133,7 +128,7 @@ def tracked_touching(
             touching.force,
         )
         count = len(places.row)
-        pressed, rub, held = remembered(places, touching.force, touching.state)
+        pressed, rub = remembered(places, touching.force)
         rocks, bend = turning(places, pressed)
         friction, slid = np.zeros(0), np.zeros(0)
         if touching.rubs:
@@ -151,13 +146,13 @@ def tracked_touching(
             whole[a, a] += own[a]
             free[a] += point.tendons.displacement[a]
         free[m + count : m + count + len(slid)] += slid
-        force, by_tension, settled = contact_forces(
+        force, by_tension, held, settled = contact_forces(
             whole, free, wound, given, tension, places.gap, yielding(touching.scene, touching.surface, places), friction,
-            bend, pressed, rub, held,
+            bend, pressed, rub,
         )  # fmt: skip
         touching.pull[0] = force[m:] @ directions
         forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + count + len(slid)].copy())
-        remember(places, forces, held, touching.force, touching.state)
+        remember(places, forces, touching.force)
         compliance = np.ascontiguousarray(whole[:m]) @ by_tension
         answer = np.ascontiguousarray((answers @ by_tension).T)
         step = y + answers @ force
@@ -178,7 +173,7 @@ def tracked_touching(
     if not converged:
         point = start
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
-    return converged, point, q, tension, displacement, compliance, answer, residual, places, forces
+    return converged, point, q, tension, displacement, compliance, answer, residual, places, forces, held
 
 
 @njit(cache=True)

@@ -15,10 +15,10 @@ class ReducedLoads:
         self._fields = basis.reshape(model.n_free, 3, -1)
         self._sections: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
-    def at(self, loads: PointLoads | None, q: np.ndarray) -> np.ndarray:
+    def at(self, loads: PointLoads, q: np.ndarray) -> np.ndarray:
         """Return the forces (r,) of the loads at q (r,)."""
         force = np.zeros_like(q)
-        for wrench in loads.wrenches if loads else ():
+        for wrench in loads.wrenches:
             rest, change = self._section(wrench.station)
             _, one, two = rest + change @ q
             force += np.einsum("vi,vir->r", wrench.pulls(one, two), change)

@@ -37,9 +37,8 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
-    to those of the modes; decomposed: largest number of snapshots to
-    decompose; integrated: number of shapes to choose the cubature of the law's deviation with, and cubature its tolerance;
-    training and test: motions to train and to test with.
+    to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose the
+    cubature of the law's deviation with, and cubature its tolerance; training and test: motions to train and to test with.
     """
 
     modes: int = 44
@@ -144,9 +143,8 @@ def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) ->
             sample.tension,
             Sliding(sample.pulling, np.full_like(sample.pulling, np.nan)),
         )
-        q = tracker.state.q
         loads = with_payload(model, sample.gravity, PointLoads.of(model, wrench_of(sample.load)))
-        force = None if loads is None else projected.at(loads, q)
+        force = None if loads is None else projected.at(loads, tracker.state.q)
         state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10, force=force)
         if state.converged:
             model.free(u)[:] = sample.unknowns
