@@ -8,9 +8,6 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.full_model.wrench import Wrench
 
-# A robot whose payload is heavier than this multiple of what its cables pull breaks or hangs down long before.
-_BREAKING = 1.0
-
 
 class LivePayload:
     """Mass at the tip of one robot."""
@@ -29,12 +26,12 @@ class LivePayload:
     def check(self, mass: float) -> None:
         """Raise ConfigError for a mass in kg that the robot cannot carry.
 
-        The cables cannot lift more than they pull, nor carries a robot without cables more than ten times its own weight.
+        The cables cannot lift more than they pull; a robot without cables counts as one with a single cable.
         """
         if not math.isfinite(mass) or mass < 0.0:
             raise ConfigError(f"payload.mass_g is {1e3 * mass:g}; 0 or more is allowed")
         limits = self._robot.limits
-        most = _BREAKING * limits.tension_max * max(len(self._robot.cables), 1) / 9.81
+        most = limits.tension_max * max(len(self._robot.cables), 1) / 9.81
         if mass > most:
             raise ConfigError(
                 f"payload.mass_g is {1e3 * mass:.4g}; all cables at limits.tension_max = {limits.tension_max:g} N lift"
