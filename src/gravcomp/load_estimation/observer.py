@@ -107,7 +107,7 @@ class LoadObserver:
         while self._history[0].stamp < stamp - _KEPT:
             self._history.popleft()
         if self._filter is None:
-            sag = float(np.linalg.norm(tip_compliance @ shape.gravity)) * self._weight_of(shape, tip_compliance)
+            sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
             self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
         if not self._scale and (shape.cable_tension > 0.0).any():
             strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
@@ -218,11 +218,6 @@ class LoadObserver:
 
     def _direction(self, gravity: np.ndarray) -> np.ndarray:
         return gravity[:, None] if self.options.kind == "payload" else np.eye(3)
-
-    def _weight_of(self, shape: Shape, tip_compliance: np.ndarray) -> float:
-        """Return the mass in kg at the tip that would displace it as far as the robot's weight does."""
-        sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
-        return sag / max(float(np.linalg.norm(tip_compliance @ shape.gravity)), 1e-30)
 
     def _at(self, stamp: float) -> _Prediction | None:
         """Return the prediction nearest to a stamp; None for a stamp before the first one or far ahead."""
