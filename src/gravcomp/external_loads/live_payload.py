@@ -6,6 +6,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.wrench import Wrench
 
 
@@ -45,9 +46,7 @@ class LivePayload:
 
     def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
         """Return what the robot file's payload lacks, at `now` (s) under gravity (3,); None: nothing."""
-        interval = max(0.0, now - self._at) if math.isfinite(self._at) else 0.0
+        self._mass += lag_share(self._at, now, self.ramp_time) * (self._wanted - self._mass)
         self._at = now
-        share = interval / (interval + self.ramp_time) if interval + self.ramp_time > 0.0 else 1.0
-        self._mass += share * (self._wanted - self._mass)
         more = self._mass - self._robot.payload.mass
         return Wrench(more * gravity, lever=np.array(self._robot.payload.centre)) if more else None

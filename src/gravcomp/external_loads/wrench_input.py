@@ -11,6 +11,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.external_loads.options import ExternalLoadOptions
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.wrench import Wrench
 
 
@@ -60,10 +61,9 @@ class WrenchInput:
 
     def wrenches(self, now: float) -> tuple[Wrench, ...]:
         """Return the loads that the model carries at `now` (s), ramped since the last call."""
-        interval = max(0.0, now - self._at) if math.isfinite(self._at) else 0.0
-        self._at = now
         time = self.options.ramp_time
-        share = interval / (interval + time) if interval + time > 0.0 else 1.0
+        share = lag_share(self._at, now, time)
+        self._at = now
         found, self._stale = [], ""
         for frame, load in list(self._loads.items()):
             stale = now - load.arrival > self.options.stale_after

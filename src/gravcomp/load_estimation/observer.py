@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.load_estimation.load_filter import LoadFilter
@@ -161,12 +162,11 @@ class LoadObserver:
         """Return the load that the model has to carry from `now` (s) on under gravity (3,) m/s^2; None: none."""
         if self._filter is None or not self.options.compensate or not self._released:
             return None
-        interval = max(0.0, now - self._applied_at) if np.isfinite(self._applied_at) else 0.0
-        share = interval / (interval + self.options.response) if interval + self.options.response > 0.0 else 1.0
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
+        share = lag_share(self._applied_at, now, self.options.response)
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
         self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
