@@ -55,6 +55,9 @@ def on_base(document: dict, base: dict, folder: Path) -> dict:
             for mesh in meshes
         ]
         base = {**base, "scene": {**base["scene"], "meshes": whole}}
+    origin = (base.get("virtual_robot") or {}).get("description")
+    if isinstance(origin, str) and (folder / origin).is_file():
+        base = {**base, "virtual_robot": {**base["virtual_robot"], "description": str(folder / origin)}}
     virtual = change.get("virtual_robot")
     if isinstance(virtual, dict) and "description" in virtual:
         base = {key: value for key, value in base.items() if key != "virtual_robot"}
