@@ -13,6 +13,7 @@ from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
 from gravcomp.description.overlay import merged
+from gravcomp.virtual.described import described
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +101,14 @@ def test_a_file_stands_on_another_one(tmp_path):
     assert [m.youngs_modulus for m in mine.robot.materials] == pytest.approx([0.8e6, 0.7e6])
     assert mine.robot.cables[1].axial_stiffness == 500.0
     assert mine.robot.cables[0] == base.robot.cables[0] and mine.section("hardware") == base.section("hardware")
+
+
+def test_the_virtual_robot_of_a_base_in_another_folder_is_found(tmp_path):
+    (tmp_path / "measured").mkdir()
+    (tmp_path / "measured" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n")
+    (tmp_path / "measured" / "fitted.yaml").write_text("base: first.yaml\nvirtual_robot: {description: first.yaml}\n")
+    (tmp_path / "mine.yaml").write_text("base: measured/fitted.yaml\n")
+    assert described(load_robot_file(tmp_path / "mine.yaml")).seed == 7
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gravcomp.canbus.imu_stream import IMU_FRAMES
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
-from gravcomp.experiments.measured import default_folder
+from gravcomp.experiments.measured import default_folder, rod_wrench
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
@@ -48,10 +49,8 @@ def run(progress: Callable[[str], None], *, files: Sequence[str] = (), seeds: in
     return found | {"cases": cases}
 
 
-def wrenches(progress: Callable[[str], None], count: int = 60) -> dict[str, Any]:
+def wrenches(progress: Callable[[str], None], count: int) -> dict[str, Any]:
     """Return `wrench_error_pct` against SoRoSim's first `count` shapes; nothing where its data are not on this machine."""
-    from gravcomp.experiments.measured import rod_wrench
-
     folder = default_folder() / "rod_wrench"
     if not folder.is_dir():
         return {}
@@ -86,10 +85,10 @@ def _of(file: RobotFile, seeds: int, sweep: Sweep, progress: Callable[[str], Non
     outcomes = sweep.map(
         run_loaded, [job for *_, job in jobs], lambda done, total: progress(f"{file.robot.name} ({done} of {total})")
     )
-    figures: dict[str, Any] = {name: {} for name in SENSORS}
+    figures: dict[str, Any] = {}
     for name in SENSORS:
-        own = [(job[1], o) for (key, size, job), o in zip(jobs, outcomes) if key == name and size == 0.0]
-        figures[name] |= _payload(PAYLOAD_SHARE * mass, [outcome for _, outcome in own])
+        own = [outcome for (key, size, _), outcome in zip(jobs, outcomes) if key == name and size == 0.0]
+        figures[name] = _payload(PAYLOAD_SHARE * mass, own)
     by_size = {
         f"{size:g}": _forces([(job[1], o) for (key, one, job), o in zip(jobs, outcomes) if key == "both" and one == size])
         for size in FORCES
@@ -146,6 +145,6 @@ def imu_frames(setup: Setup, mass: float, duration: float = 0.5) -> int:
         motion = RotationMotion(base_orientation(0.0), np.array([0.0, 1.0, 0.0]), np.radians(90.0), 0.0)
         robot = VirtualRobot(setup.truth, setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion)
         robot.attach(payload)
-        return [bytes(frame.data) for frame in robot.step(duration) if 0x310 <= frame.arbitration_id <= 0x312]
+        return [bytes(frame.data) for frame in robot.step(duration) if frame.arbitration_id in IMU_FRAMES]
 
     return sum(one != other for one, other in zip(frames(0.0), frames(mass), strict=True))

@@ -14,10 +14,8 @@ _NAMES = ("name", "cable", "can_id")
 def merged(base: Any, change: Any) -> Any:
     """Return the value `base` with `change`; neither is altered."""
     if isinstance(base, dict) and isinstance(change, dict):
-        result = {key: value for key, value in base.items() if key not in change}
-        order = [*base, *(key for key in change if key not in base)]
-        found = {key: merged(base.get(key), value) for key, value in change.items() if value is not None}
-        return {key: found[key] if key in found else result[key] for key in order if key in found or key in result}
+        result = {key: value for key, value in base.items() if key not in change or change[key] is not None}
+        return result | {key: merged(base.get(key), value) for key, value in change.items() if value is not None}
     if isinstance(base, list) and isinstance(change, list):
         key = _key_of(base, change)
         if key is not None:
@@ -37,12 +35,19 @@ def _key_of(*lists: list) -> str | None:
     return None
 
 
+def with_whole_path(section: Any, folder: Path) -> Any:
+    """Return the section `robot` with the path of the body's file, which is relative to the robot file's folder."""
+    body = section.get("body") if isinstance(section, dict) else None
+    if not isinstance(body, dict) or not isinstance(body.get("file"), str):
+        return section
+    return {**section, "body": {**body, "file": str(folder / body["file"])}}
+
+
 def on_base(document: dict, base: dict, folder: Path) -> dict:
     """Return the whole document of a file with the key `base`; base: that file's document; folder: where its paths begin."""
     change = {key: value for key, value in document.items() if key != "base"}
-    body = (base.get("robot") or {}).get("body")
-    if isinstance(body, dict) and isinstance(body.get("file"), str):
-        base = merged(base, {"robot": {"body": {"file": str(folder / body["file"])}}})
+    if "robot" in base:
+        base = {**base, "robot": with_whole_path(base["robot"], folder)}
     meshes = (base.get("scene") or {}).get("meshes")
     if isinstance(meshes, list):
         whole = [
@@ -50,6 +55,9 @@ def on_base(document: dict, base: dict, folder: Path) -> dict:
             for mesh in meshes
         ]
         base = {**base, "scene": {**base["scene"], "meshes": whole}}
+    origin = (base.get("virtual_robot") or {}).get("description")
+    if isinstance(origin, str) and (folder / origin).is_file():
+        base = {**base, "virtual_robot": {**base["virtual_robot"], "description": str(folder / origin)}}
     virtual = change.get("virtual_robot")
     if isinstance(virtual, dict) and "description" in virtual:
         base = {key: value for key, value in base.items() if key != "virtual_robot"}

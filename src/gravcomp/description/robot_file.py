@@ -4,11 +4,11 @@ import dataclasses
 import functools
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.default_hardware import has_motors, with_motors
-from gravcomp.description.overlay import on_base
+from gravcomp.description.overlay import on_base, with_whole_path
 from gravcomp.description.robot import Robot
 from gravcomp.scene import SceneSection
 
@@ -86,7 +86,7 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
     document = _document(path, ())
     if "robot" not in document:
         raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
-    robot = from_mapping(Robot, _with_whole_path(document["robot"], path), source=str(path), key="robot")
+    robot = from_mapping(Robot, with_whole_path(document["robot"], path.resolve().parent), source=str(path), key="robot")
     _scene_section(document, str(path))
     return RobotFile(str(path), robot, document)
 
@@ -120,14 +120,6 @@ def _document(path: Path, above: tuple[Path, ...]) -> dict:
 def _scene_section(document: dict, source: str) -> SceneSection:
     """Return the section `scene` of a robot file. Raises ConfigError."""
     return from_mapping(SceneSection, document.get("scene"), source=source, key="scene")
-
-
-def _with_whole_path(section: Any, path: Path) -> Any:
-    """Return the section `robot` with the path of the body's file, which is relative to the robot file at `path`."""
-    body = section.get("body") if isinstance(section, dict) else None
-    if not isinstance(body, dict) or not isinstance(body.get("file"), str):
-        return section
-    return {**section, "body": {**body, "file": str(path.resolve().parent / body["file"])}}
 
 
 def _resolve(name_or_path: str | Path) -> Path:

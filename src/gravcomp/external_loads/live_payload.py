@@ -6,10 +6,8 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.wrench import Wrench
-
-# A robot whose payload is heavier than this multiple of what its cables pull breaks or hangs down long before.
-_BREAKING = 1.0
 
 
 class LivePayload:
@@ -29,12 +27,12 @@ class LivePayload:
     def check(self, mass: float) -> None:
         """Raise ConfigError for a mass in kg that the robot cannot carry.
 
-        The cables cannot lift more than they pull, nor carries a robot without cables more than ten times its own weight.
+        The cables cannot lift more than they pull; a robot without cables counts as one with a single cable.
         """
         if not math.isfinite(mass) or mass < 0.0:
             raise ConfigError(f"payload.mass_g is {1e3 * mass:g}; 0 or more is allowed")
         limits = self._robot.limits
-        most = _BREAKING * limits.tension_max * max(len(self._robot.cables), 1) / 9.81
+        most = limits.tension_max * max(len(self._robot.cables), 1) / 9.81
         if mass > most:
             raise ConfigError(
                 f"payload.mass_g is {1e3 * mass:.4g}; all cables at limits.tension_max = {limits.tension_max:g} N lift"
@@ -48,9 +46,7 @@ class LivePayload:
 
     def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
         """Return what the robot file's payload lacks, at `now` (s) under gravity (3,); None: nothing."""
-        interval = max(0.0, now - self._at) if math.isfinite(self._at) else 0.0
+        self._mass += lag_share(self._at, now, self.ramp_time) * (self._wanted - self._mass)
         self._at = now
-        share = interval / (interval + self.ramp_time) if interval + self.ramp_time > 0.0 else 1.0
-        self._mass += share * (self._wanted - self._mass)
         more = self._mass - self._robot.payload.mass
         return Wrench(more * gravity, lever=np.array(self._robot.payload.centre)) if more else None

@@ -1,7 +1,7 @@
 """Wrenches on the robot as another node knows them: checked against frame, time and the robot's limits, ramped, and dropped.
 
 The frame says both the axes and the section: in that of the tip or of a backbone point the wrench acts there and turns with it;
-in soft_base it acts on the tip in fixed axes. Any other frame is refused, unless its orientation is known (`orient`).
+in soft_base it acts on the tip in fixed axes. Any other frame is refused.
 """
 
 import dataclasses
@@ -11,6 +11,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.external_loads.options import ExternalLoadOptions
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.wrench import Wrench
 
 
@@ -29,11 +30,9 @@ class WrenchInput:
 
     def __init__(self, robot: Robot, options: ExternalLoadOptions, base_frame: str = "soft_base", tip_frame: str = "soft_tip"):
         self._limit, self.options = robot.max_wrench, options
-        self._base_frame = base_frame
         self._stations: dict[str, tuple[float, bool]] = {base_frame: (1.0, False), tip_frame: (1.0, True)}
         for index, station in enumerate(robot.effectors.backbone_station):
             self._stations[f"{base_frame}_backbone_{index}"] = float(station), True
-        self._oriented: dict[str, np.ndarray] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -42,10 +41,6 @@ class WrenchInput:
         self._last, self.used, self.refused, self.refusal = -math.inf, 0, 0, ""
         self._stale = ""
         self._at = -math.inf
-
-    def orient(self, frame: str, rotation: np.ndarray) -> None:
-        """Let wrenches in another frame act on the tip; rotation (3, 3): soft_base from that frame."""
-        self._oriented[frame] = rotation
 
     def take(self, stamp: float, now: float, frame: str, force: np.ndarray, moment: np.ndarray) -> bool:
         """Take a wrench: stamp and now in s, force (3,) in N and moment (3,) in N m; return whether it is used.
@@ -57,12 +52,7 @@ class WrenchInput:
             self.refused += 1
             return False
         self.used += 1
-        if frame in self._stations:
-            station, follower = self._stations[frame]
-        else:
-            force, moment = self._oriented[frame] @ force, self._oriented[frame] @ moment
-            station, follower = 1.0, False
-        wanted = Wrench(force, moment, station, follower)
+        wanted = Wrench(force, moment, *self._stations[frame])
         if frame in self._loads:
             self._loads[frame].wanted, self._loads[frame].arrival = wanted, now
         else:
@@ -71,10 +61,9 @@ class WrenchInput:
 
     def wrenches(self, now: float) -> tuple[Wrench, ...]:
         """Return the loads that the model carries at `now` (s), ramped since the last call."""
-        interval = max(0.0, now - self._at) if math.isfinite(self._at) else 0.0
-        self._at = now
         time = self.options.ramp_time
-        share = interval / (interval + time) if interval + time > 0.0 else 1.0
+        share = lag_share(self._at, now, time)
+        self._at = now
         found, self._stale = [], ""
         for frame, load in list(self._loads.items()):
             stale = now - load.arrival > self.options.stale_after
@@ -98,9 +87,8 @@ class WrenchInput:
         """Return what is wrong with a wrench, empty for nothing."""
         if self._limit is None:
             return "the robot file has no robot.max_wrench: the robot carries no external load"
-        if frame not in self._stations and frame not in self._oriented:
-            known = ", ".join([*self._stations, *self._oriented])
-            return f"it is in the frame '{frame}', which is not known; allowed: {known}"
+        if frame not in self._stations:
+            return f"it is in the frame '{frame}', which is not known; allowed: {', '.join(self._stations)}"
         if not (np.isfinite(force).all() and np.isfinite(moment).all()):
             numbers = ", ".join(f"{value:g}" for value in [*force, *moment])
             return f"it has the numbers {numbers}; finite numbers are needed"

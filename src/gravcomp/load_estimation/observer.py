@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.load_estimation.load_filter import LoadFilter
@@ -107,7 +108,7 @@ class LoadObserver:
         while self._history[0].stamp < stamp - _KEPT:
             self._history.popleft()
         if self._filter is None:
-            sag = float(np.linalg.norm(tip_compliance @ shape.gravity)) * self._weight_of(shape, tip_compliance)
+            sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
             self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
         if not self._scale and (shape.cable_tension > 0.0).any():
             strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
@@ -161,12 +162,11 @@ class LoadObserver:
         """Return the load that the model has to carry from `now` (s) on under gravity (3,) m/s^2; None: none."""
         if self._filter is None or not self.options.compensate or not self._released:
             return None
-        interval = max(0.0, now - self._applied_at) if np.isfinite(self._applied_at) else 0.0
-        share = interval / (interval + self.options.response) if interval + self.options.response > 0.0 else 1.0
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
+        share = lag_share(self._applied_at, now, self.options.response)
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
         self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
@@ -218,11 +218,6 @@ class LoadObserver:
 
     def _direction(self, gravity: np.ndarray) -> np.ndarray:
         return gravity[:, None] if self.options.kind == "payload" else np.eye(3)
-
-    def _weight_of(self, shape: Shape, tip_compliance: np.ndarray) -> float:
-        """Return the mass in kg at the tip that would displace it as far as the robot's weight does."""
-        sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
-        return sag / max(float(np.linalg.norm(tip_compliance @ shape.gravity)), 1e-30)
 
     def _at(self, stamp: float) -> _Prediction | None:
         """Return the prediction nearest to a stamp; None for a stamp before the first one or far ahead."""

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.description import Robot
+from gravcomp.first_order_lag import lag_share
 from gravcomp.inverse import Target
 from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.tip_observer.causes import wild, wrong_axes, wrong_stamp
@@ -138,8 +139,7 @@ class TipObserver:
         if size > self._allowed:
             wanted = wanted * (self._allowed / size)
         # Steps of the estimate reach the motors no faster than the robot follows.
-        interval = max(0.0, now - self._applied_at) if np.isfinite(self._applied_at) else 0.0
-        share = interval / (interval + self.options.response) if interval + self.options.response > 0.0 else 1.0
+        share = lag_share(self._applied_at, now, self.options.response)
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
         return dataclasses.replace(target, tip_position=target.tip_position - self._applied)
