@@ -252,6 +252,9 @@ def test_homing_on_the_board_fails_without_motors_and_stops_when_a_cable_never_g
     assert b.ask(requests.act("home")).done
     b.run(400)  # the rotors do not move: lag or stall
     assert state_of(b) == "fault" and b.board.faults & fault("a motor stalled") and b.currents(1)[-1][1] == 0
+    assert not b.ask(requests.act("home")).done and b.ask(requests.act("stop")).done and not b.ask(requests.act("run")).done
+    b.run(120)
+    assert state_of(b) == "fault" and b.currents(1)[-1][1] == 0  # only resume ends it
     assert b.ask(requests.act("resume")).done
     b.run(120)
     assert state_of(b) == "released"
@@ -367,6 +370,7 @@ def test_the_image_sets_the_bit_rate_and_lets_go_when_the_supply_falls():
     b.board.machine.supply_low = True
     b.run(20, {1: 0.3})
     assert b.board.duty == 0.0 and b.currents(1)[-1][1] == 0 and b.board.faults & fault("the supply is too low")
+    assert not b.ask(requests.act("home")).done and b.currents(1)[-1][1] == 0
 
 
 def test_the_stack_that_is_used_is_within_the_bound():

@@ -261,7 +261,6 @@ bool gc_board_transmit(gc_board *board, uint32_t bus, gc_frame *frame) {
 }
 
 void gc_board_home(gc_board *board) {
-  board->faults &= (uint16_t)~GC_FAULT_HOMING;
   gc_homing_start(&board->homing, board->motors, &board->parameters, motors_present(board));
   board->next_drive = board->now;
   gc_board_enter(board, GC_HOMING);

@@ -2,7 +2,7 @@
 // frames and the heater's duty.
 //
 //   IDLE --currents of the host--> FOLLOWING --host silent--> HOLDING --still silent--> RELEASED --currents--> FOLLOWING
-//   IDLE, RELEASED, FAULT, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
+//   IDLE, RELEASED, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
 //   any --stall, runaway, a silent motor while the board drives--> FAULT --resume--> RELEASED
 #ifndef GC_BOARD_H
 #define GC_BOARD_H

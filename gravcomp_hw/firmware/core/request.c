@@ -117,8 +117,11 @@ static bool all_have_zeros(const gc_board *board) {
   return true;
 }
 
+// Whether the board may begin to drive by itself: a fault ends by resume first.
+static bool may_begin(const gc_board *board) { return board->state != GC_FAULT && !board->supply_low; }
+
 static uint8_t home(gc_board *board) {
-  if (drives(board) && board->state != GC_STANDALONE) {
+  if (!may_begin(board) || (drives(board) && board->state != GC_STANDALONE)) {
     return GC_WRONG_STATE;
   }
   if (!gc_board_motors_answer(board)) {
@@ -132,7 +135,7 @@ static uint8_t run(gc_board *board) {
   if ((board->state != GC_HOLDING || board->homing.phase != GC_HOMED) && drives(board)) {
     return GC_WRONG_STATE;
   }
-  if (!board->has_controller || !all_have_zeros(board)) {
+  if (!may_begin(board) || !board->has_controller || !all_have_zeros(board)) {
     return GC_WRONG_STATE;
   }
   if (!gc_board_motors_answer(board)) {
@@ -145,7 +148,9 @@ static uint8_t run(gc_board *board) {
 static uint8_t act(gc_board *board, uint32_t action) {
   switch (action) {
     case GC_ACT_STOP:
-      gc_board_enter(board, GC_RELEASED);
+      if (board->state != GC_FAULT) {
+        gc_board_enter(board, GC_RELEASED);
+      }
       return GC_DONE;
     case GC_ACT_RESUME:
       board->faults &= (uint16_t)~(GC_FAULT_MOTOR | GC_FAULT_HOMING | GC_FAULT_MOTOR_SILENT);
