@@ -8,7 +8,6 @@
 #define STATUS_PERIOD 100000u  // us
 #define STATE_OFFSET 50000u    // us; BoardState half a period after BoardStatus
 #define DRIVE_PERIOD 2000u     // us, of the board's own loops
-#define ZERO_PERIOD 10000u     // us between two frames of zeros
 #define ZERO_TIME 1000000u     // us for which a board on the motors' bus sends zeros after its host has died
 #define START_TIME 1000000u    // us; the motors' controllers start meanwhile
 #define TWIN_FRAMES 3u         // whole frames of another board
@@ -19,41 +18,9 @@ enum { STATUS_SILENT_IMU = 1, STATUS_HOT = 2, STATUS_NO_COMMAND = 4 };
 
 static const uint16_t current_ids[2] = {GC_ID_CURRENTS_1_TO_4, GC_ID_CURRENTS_5_TO_8};
 
-static uint8_t motors_present(const gc_board *board) {
-  return (uint8_t)gc_parameter_int(&board->parameters, GC_MOTORS);
-}
-
-bool gc_board_has_motor(const gc_board *board, uint32_t index) {
-  return index < GC_MOTORS_MOST && ((uint32_t)motors_present(board) >> index & 1u) != 0u;
-}
-
-bool gc_board_motors_answer(const gc_board *board) {
-  bool all = motors_present(board) != 0u;
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    all = all && (!gc_board_has_motor(board, index) || gc_rotor_answers(&board->motors[index].rotor, board->now));
-  }
-  return all;
-}
-
-static bool is_between(const gc_board *board) { return gc_parameter_int(&board->parameters, GC_WIRING) == 1; }
-
 // Whether the board's own loops drive the motors.
 static bool drives_itself(const gc_board *board) {
   return board->state == GC_HOLDING || board->state == GC_HOMING || board->state == GC_STANDALONE;
-}
-
-uint32_t gc_board_motor_bus(const gc_board *board) { return is_between(board) ? 1u : 0u; }
-
-void gc_board_enter(gc_board *board, gc_state state) {
-  board->state = state;
-  board->state_since = board->now;
-  board->pending = false;
-  if (state == GC_RELEASED || state == GC_FAULT) {
-    board->sent = board->now - ZERO_PERIOD;  // zeros with the next tick
-    for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-      board->motors[index].wanted = 0;
-    }
-  }
 }
 
 void gc_board_start(gc_board *board) {
@@ -121,7 +88,7 @@ static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *
   if (free && !board->supply_low) {
     gc_board_enter(board, GC_FOLLOWING);
   }
-  if (board->state == GC_FOLLOWING && is_between(board)) {
+  if (board->state == GC_FOLLOWING && gc_board_is_between(board)) {
     board->pending = true;
   }
 }
@@ -138,7 +105,7 @@ static void take_feedback(gc_board *board, uint32_t index, const gc_frame *frame
   if (!knew && motor->rotor.seen) {
     motor->zero_known = false;  // it counts from another turn
   }
-  if (is_between(board)) {
+  if (gc_board_is_between(board)) {
     gc_queue_put(&board->queues[0], frame);
   }
 }
@@ -260,23 +227,6 @@ bool gc_board_transmit(gc_board *board, uint32_t bus, gc_frame *frame) {
   return bus < GC_BUSES && gc_queue_take(&board->queues[bus], frame);
 }
 
-void gc_board_home(gc_board *board) {
-  gc_homing_start(&board->homing, board->motors, &board->parameters, motors_present(board));
-  board->next_drive = board->now;
-  gc_board_enter(board, GC_HOMING);
-}
-
-// Enter a state in which the board drives, from where the cables are.
-static void hold_in(gc_board *board, gc_state state) {
-  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    gc_motor_hold(&board->motors[index], &board->parameters, index);
-  }
-  board->next_drive = board->now;
-  gc_board_enter(board, state);
-}
-
-void gc_board_run(gc_board *board) { hold_in(board, GC_STANDALONE); }
-
 static bool has_current(const gc_board *board) {
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     if (board->motors[index].current != 0 || board->motors[index].wanted != 0) {
@@ -294,8 +244,8 @@ static void watch_host(gc_board *board) {
   if (board->state == GC_FOLLOWING && board->now - board->host_time >= timeout) {
     board->went_silent = true;
     const bool current = has_current(board);
-    if (current && is_between(board)) {
-      hold_in(board, GC_HOLDING);
+    if (current && gc_board_is_between(board)) {
+      gc_board_hold_in(board, GC_HOLDING);
     } else if (!current || board->now - board->host_time >= timeout + holding) {
       gc_board_enter(board, GC_RELEASED);
     } else {
@@ -311,7 +261,7 @@ static void watch_host(gc_board *board) {
 // Whether zeros meet no currents of a host on the same bus.
 static bool host_is_away(const gc_board *board) {
   const uint32_t timeout = 1000u * (uint32_t)gc_parameter_int(&board->parameters, GC_HOST_TIMEOUT);
-  return is_between(board) || (board->now - board->host_time >= timeout && board->now >= timeout);
+  return gc_board_is_between(board) || (board->now - board->host_time >= timeout && board->now >= timeout);
 }
 
 static void watch_motors(gc_board *board) {
@@ -343,7 +293,7 @@ static void finish_homing(gc_board *board) {
       gc_board_run(board);
     } else {
       board->went_silent = false;  // held until the host takes over
-      hold_in(board, GC_HOLDING);
+      gc_board_hold_in(board, GC_HOLDING);
     }
   } else {
     // It goes on.
@@ -357,7 +307,7 @@ static void drive(gc_board *board) {
   const uint32_t limit = homing ? (uint32_t)GC_HOMING_VELOCITY : (uint32_t)GC_VELOCITY_LIMIT;
   const float fastest = gc_parameter_real(&board->parameters, limit);
   if (homing) {
-    gc_homing_step(&board->homing, board->motors, &board->parameters, motors_present(board), dt);
+    gc_homing_step(&board->homing, board->motors, &board->parameters, gc_board_motors(board), dt);
   }
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     if (!gc_board_has_motor(board, index)) {
@@ -461,9 +411,9 @@ void gc_board_tick(gc_board *board, uint32_t now) {
     send_currents(board);
   }
   const bool still = board->state == GC_RELEASED || board->state == GC_FAULT;
-  if (still && host_is_away(board) && now - board->sent >= ZERO_PERIOD) {
+  if (still && host_is_away(board) && now - board->sent >= GC_ZERO_PERIOD) {
     send_currents(board);
-    if (!is_between(board) && board->state == GC_RELEASED && now - board->state_since >= ZERO_TIME) {
+    if (!gc_board_is_between(board) && board->state == GC_RELEASED && now - board->state_since >= ZERO_TIME) {
       gc_board_enter(board, GC_IDLE);
     }
   }

@@ -2,7 +2,7 @@
 #ifndef GC_REQUEST_H
 #define GC_REQUEST_H
 
-#include "board.h"
+#include "board_state.h"
 
 enum { GC_READ = 1, GC_WRITE, GC_SAVE, GC_DEFAULTS, GC_ZERO, GC_FORGET, GC_ACT };
 
