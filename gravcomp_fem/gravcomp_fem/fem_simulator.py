@@ -121,7 +121,7 @@ class FemSimulator(ManagedNode):
     def parameters_changed(self, old: FemSimulatorParameters, new: FemSimulatorParameters) -> None:
         """Apply a new payload and new options of the loads."""
         if hasattr(self, "_loads"):
-            self._loads.change(new)
+            self._loads.change(old, new)
 
     def _start_builder(self) -> None:
         """Build the reduced model in a process of low priority, when no launcher does."""

@@ -36,14 +36,27 @@ class LoadInputs:
         self.payload = LivePayload(robot, parameters.external.ramp_time)
         self._publisher = node.create_publisher(WrenchEstimate, "estimated/wrench", SENSOR)
         self._service = node.create_service(Trigger, "~/zero_load", self._on_zero)
-        self.change(parameters)
+        self._begin_wrenches(parameters)
+        self._begin_observer(parameters)
+        self._set_payload(parameters)
 
-    def change(self, parameters: FemSimulatorParameters) -> None:
-        """Begin again with these parameters. Raises ConfigError for a payload that the robot cannot carry."""
+    def change(self, old: FemSimulatorParameters, new: FemSimulatorParameters) -> None:
+        """Apply new parameters; what they do not concern goes on. Raises ConfigError for a payload that is too heavy."""
+        self._set_payload(new)
+        if new.external != old.external:
+            self._begin_wrenches(new)
+        if new.load != old.load:
+            self._begin_observer(new)
+
+    def _set_payload(self, parameters: FemSimulatorParameters) -> None:
         wanted = self._robot.payload.mass if parameters.payload_mass < 0.0 else parameters.payload_mass
         self.payload.ramp_time = parameters.external.ramp_time
         self.payload.set(wanted)
+
+    def _begin_wrenches(self, parameters: FemSimulatorParameters) -> None:
         self._wrenches = WrenchInput(self._robot, parameters.external, *self._frames)
+
+    def _begin_observer(self, parameters: FemSimulatorParameters) -> None:
         self._observer = None if parameters.load.kind == "none" else LoadObserver(self._robot, parameters.load)
         self._samples, self._compliance = 0, np.zeros((3, 3))
 
@@ -127,16 +140,28 @@ class LoadInputs:
             np.array([moment.x, moment.y, moment.z]),
         )
         if not used:
-            self._node.get_logger().warning(f"external/wrench refused: {self._wrenches.refusal}", throttle_duration_sec=1.0)
+            self._refuse("external/wrench", self._wrenches.refusal)
 
     def _on_tip(self, message: PoseStamped) -> None:
+        if self._observer is None:
+            return
+        if message.header.frame_id != self._frames[0]:
+            self._refuse("measured/tip", f"its frame is '{message.header.frame_id}'; '{self._frames[0]}' is needed")
+            return
         p = message.pose.position
-        if self._observer is not None and message.header.frame_id == self._frames[0]:
-            self._observer.measure_tip(seconds(message.header), np.array([p.x, p.y, p.z]))
+        self._observer.measure_tip(seconds(message.header), np.array([p.x, p.y, p.z]))
 
     def _on_tension(self, message: JointState) -> None:
-        if self._observer is not None:
-            self._observer.measure_tensions(seconds(message.header), np.array(message.effort, dtype=float))
+        if self._observer is None:
+            return
+        tension, cables = dict(zip(message.name, message.effort)), self._robot.cable_names
+        if set(tension) != set(cables) or len(message.effort) != len(cables):
+            self._refuse("measured/tension", f"it names {', '.join(message.name) or 'nothing'}; needed: {', '.join(cables)}")
+            return
+        self._observer.measure_tensions(seconds(message.header), np.array([tension[name] for name in cables]))
+
+    def _refuse(self, topic: str, reason: str) -> None:
+        self._node.get_logger().warning(f"{topic} refused: {reason}", throttle_duration_sec=1.0)
 
     def _on_zero(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._observer is None:
