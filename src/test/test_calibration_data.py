@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gravcomp.calibration.apply import write_mount
 from gravcomp.calibration.fit import starting_parameters
 from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import gravity_of
@@ -109,6 +110,16 @@ def test_the_virtual_robot_of_a_base_in_another_folder_is_found(tmp_path):
     (tmp_path / "measured" / "fitted.yaml").write_text("base: first.yaml\nvirtual_robot: {description: first.yaml}\n")
     (tmp_path / "mine.yaml").write_text("base: measured/fitted.yaml\n")
     assert described(load_robot_file(tmp_path / "mine.yaml")).seed == 7
+
+
+def test_a_mount_that_is_written_into_another_folder_leads_to_the_same_files(tmp_path):
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n")
+    (tmp_path / "robots" / "mine.yaml").write_text("# mine\nbase: first.yaml\nvirtual_robot: {description: first.yaml}\n")
+    write_mount(tmp_path / "robots" / "mine.yaml", tmp_path / "mounted.yaml", (0.0, 0.1, 0.0))
+    mounted = load_robot_file(tmp_path / "mounted.yaml")
+    assert mounted.robot.imu_mount.rpy[1] == pytest.approx(0.1, abs=1e-6) and described(mounted).seed == 7
+    assert (tmp_path / "mounted.yaml").read_text().startswith("# mine")
 
 
 @pytest.mark.parametrize(

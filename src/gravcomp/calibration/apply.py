@@ -16,6 +16,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Cable, PronyTerm, Robot, load_robot_file, shipped_robots
 from gravcomp.description.default_hardware import has_motors
 from gravcomp.description.hardware import Hardware
+from gravcomp.description.overlay import make_paths_whole
 from gravcomp.orientation.calibration import RestCalibration
 
 if TYPE_CHECKING:
@@ -214,13 +215,21 @@ def write_imu_calibration(source: str | Path, target: str | Path, found: RestCal
         estimator["bias_model_file"] = str(bias_model.resolve())
     if found.mount is not None:
         _set_mount(document, found.mount)
-    _write(document, target)
+    _write_copy(document, source, target)
 
 
 def write_mount(source: str | Path, target: str | Path, rpy: tuple[float, float, float]) -> None:
     """Write the robot's file `source` to `target` with the mount of the IMU: roll, pitch, yaw in rad. Raises ConfigError."""
     document = _document(source)
     _set_mount(document, rpy)
+    _write_copy(document, source, target)
+
+
+def _write_copy(document: dict, source: str | Path, target: str | Path) -> None:
+    """Write the changed document of the file `source` to `target`; in another folder its paths still lead to the same files."""
+    folder = Path(source).resolve().parent
+    if Path(target).resolve().parent != folder:
+        make_paths_whole(document, folder)
     _write(document, target)
 
 

@@ -4,6 +4,7 @@ Mappings are merged key by key; lists of mappings by the entries' `name`, `cable
 empty value (null) removes the key. A section `virtual_robot` with a `description` replaces that of the base as a whole.
 """
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -43,21 +44,24 @@ def with_whole_path(section: Any, folder: Path) -> Any:
     return {**section, "body": {**body, "file": str(folder / body["file"])}}
 
 
+def make_paths_whole(document: dict, folder: Path) -> None:
+    """Put `folder`, in which the document's relative paths begin, before each of them: body, walls, base, virtual robot."""
+    if isinstance(document.get("robot"), dict):
+        document["robot"].update(with_whole_path(document["robot"], folder))
+    meshes = (document.get("scene") or {}).get("meshes")
+    for mesh in meshes if isinstance(meshes, list) else []:
+        if isinstance(mesh, dict) and isinstance(mesh.get("file"), str):
+            mesh["file"] = str(folder / mesh["file"])
+    for mapping, key in ((document, "base"), (document.get("virtual_robot") or {}, "description")):
+        if isinstance(mapping.get(key), str) and (folder / mapping[key]).is_file():  # else the name of a shipped robot
+            mapping[key] = str(folder / mapping[key])
+
+
 def on_base(document: dict, base: dict, folder: Path) -> dict:
     """Return the whole document of a file with the key `base`; base: that file's document; folder: where its paths begin."""
     change = {key: value for key, value in document.items() if key != "base"}
-    if "robot" in base:
-        base = {**base, "robot": with_whole_path(base["robot"], folder)}
-    meshes = (base.get("scene") or {}).get("meshes")
-    if isinstance(meshes, list):
-        whole = [
-            {**mesh, "file": str(folder / mesh["file"])} if isinstance(mesh, dict) and isinstance(mesh.get("file"), str) else mesh
-            for mesh in meshes
-        ]
-        base = {**base, "scene": {**base["scene"], "meshes": whole}}
-    origin = (base.get("virtual_robot") or {}).get("description")
-    if isinstance(origin, str) and (folder / origin).is_file():
-        base = {**base, "virtual_robot": {**base["virtual_robot"], "description": str(folder / origin)}}
+    base = copy.deepcopy(base)
+    make_paths_whole(base, folder)
     virtual = change.get("virtual_robot")
     if isinstance(virtual, dict) and "description" in virtual:
         base = {key: value for key, value in base.items() if key != "virtual_robot"}
