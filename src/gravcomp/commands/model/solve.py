@@ -41,6 +41,8 @@ def run(args: argparse.Namespace) -> int:
         "solve_time_ms": 1e3 * shape.solve_time,
     }
     if simulator.scene:
+        for note in simulator.scene.notes:
+            output.note(note)
         contacts = shape.contacts
         figures["contacts"] = [
             {
