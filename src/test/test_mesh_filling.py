@@ -1,5 +1,6 @@
 """Bodies from surfaces and STEP files, filled by the optional meshers; and what is said without them."""
 
+import subprocess
 import sys
 
 import numpy as np
@@ -74,6 +75,18 @@ def test_a_step_file_is_read_in_its_unit(tmp_path, meshers):
     body = placed_body(path, Placement(axis="auto"))
     assert body.length == pytest.approx(0.07, rel=1e-6)
     assert any("the thicker end" in note for note in body.notes) and any("fixed by the format" in note for note in body.notes)
+
+
+def test_a_process_that_has_filled_a_mesh_does_not_end_by_a_closed_pipe(meshers):
+    fill = (
+        "import socket; from gravcomp.mesh_files.gmsh_library import gmsh_session\n"
+        "with gmsh_session('body.stl', 'fails'): pass\n"
+        "ours, theirs = socket.socketpair(); theirs.close()\n"
+        "try: ours.send(b'x')\n"
+        "except BrokenPipeError: print('refused')"
+    )
+    done = subprocess.run([sys.executable, "-c", fill], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "refused\n")
 
 
 def test_nothing_is_printed_on_stdout(tmp_path, meshers, capfd):

@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -50,7 +51,8 @@ def gmsh_session(name: str, failure: str) -> Iterator[Any]:
     """
     gmsh = _provided(name)
     with _silent():
-        gmsh.initialize(interruptible=False)
+        with _same_reaction_to_closed_pipes():
+            gmsh.initialize(interruptible=False)
         try:
             gmsh.option.setNumber("General.Terminal", 0)
             yield gmsh
@@ -87,6 +89,21 @@ def _silent() -> Iterator[None]:
         ctypes.CDLL(None).fflush(None)
         os.dup2(kept, 1)
         os.close(kept)
+
+
+@contextlib.contextmanager
+def _same_reaction_to_closed_pipes() -> Iterator[None]:
+    """Keep the process's reaction to SIGPIPE, which Python ignores: Gmsh resets it, and a peer that closes would end the process.
+
+    By the C library, because Python sets signals in its main thread only.
+    """
+    react = ctypes.CDLL(None).signal
+    react.argtypes, react.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
+    before = react(signal.SIGPIPE, int(signal.SIG_IGN))
+    try:
+        yield
+    finally:
+        react(signal.SIGPIPE, before)
 
 
 def _provided(name: str) -> Any:
