@@ -47,6 +47,9 @@ def run(args: argparse.Namespace) -> int:
     if targets:
         # A module's tests share a process, because they share what takes long to make: a graph, a model, a browser.
         how += ["-n", str(_WORKERS), "--dist", "loadgroup", "--no-loadscope-reorder"]
+        # pytest-xdist 3.8 waits for ever after it has replaced a process that crashed: it then hands out tests that are done (its
+        # issue 1378). Without a replacement the run ends, and names the test that crashed.
+        how += ["--max-worker-restart", "0"]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
     if not args.json:
         return _exit_code(subprocess.run(command, cwd=root).returncode)
