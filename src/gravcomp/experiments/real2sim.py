@@ -18,7 +18,7 @@ from gravcomp.virtual.motion import base_orientation
 TITLE = "Real to simulation: free fall"
 
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
-_DURATION, _BRIEF_DURATION = 4.0, 1.2  # s, of a fall
+_DURATION, _BRIEF_DURATION = 4.0, 0.6  # s, of a fall
 _REST = 1.0  # s: the last part of a fall, which counts as rest
 _SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after the start of the fall at which shapes are drawn
 
