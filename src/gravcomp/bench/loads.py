@@ -75,7 +75,9 @@ def _of(file: RobotFile, seeds: int, brief: bool, sweep: Sweep, progress: Callab
     """Return the figures of one robot by the sensors."""
     setups = [Setup.of(file, seed) for seed in range(1, seeds + 1)]
     mass = RobotModel(file.robot).mass
-    random, forces = np.random.default_rng(1), FORCES[-1:] if brief else FORCES
+    random = np.random.default_rng(1)
+    # The reduced model carries the smallest force, in a tenth of the time that the full one takes.
+    forces, along = (FORCES[:1], FORCES[0]) if brief else (FORCES, _ALONG)
     jobs: list[tuple[str, float, tuple[Setup, LoadedCase]]] = []
     for name, sensors in SENSORS.items():
         jobs += [(name, 0.0, (setup, LoadedCase(payload=PAYLOAD_SHARE * mass, brief=brief, **sensors))) for setup in setups]
@@ -84,7 +86,7 @@ def _of(file: RobotFile, seeds: int, brief: bool, sweep: Sweep, progress: Callab
             angle = random.uniform(0.0, 2.0 * np.pi)
             force = (size * np.cos(angle), size * np.sin(angle), 0.0)
             jobs.append(("both", size, (setup, LoadedCase(force=force, brief=brief, **SENSORS["both"]))))
-    jobs.append(("along", _ALONG, (setups[0], LoadedCase(force=(0.0, 0.0, -_ALONG), brief=brief, **SENSORS["both"]))))
+    jobs.append(("along", along, (setups[0], LoadedCase(force=(0.0, 0.0, -along), brief=brief, **SENSORS["both"]))))
     outcomes = sweep.map(
         run_loaded, [job for *_, job in jobs], lambda done, total: progress(f"{file.robot.name} ({done} of {total})")
     )
