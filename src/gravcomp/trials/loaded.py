@@ -14,7 +14,7 @@ from gravcomp.trials.holding import errors_to
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 _SETTLING, _LEARNT, _FINDING, _MEASURED = 4.0, 0.5, 6.0, 1.0  # s
-_BRIEF = 0.25  # of these, and of the time in which the errors are learnt
+_BRIEF = 0.25  # of these, but the errors of model and sensors take their time to be learnt
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +48,7 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     kind = "payload" if case.force is None else "force"
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
     share = _BRIEF if case.brief else 1.0
-    options = LoadEstimationOptions(kind=kind, zero_time=share * LoadEstimationOptions.zero_time)
+    options = LoadEstimationOptions(kind=kind)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
     loop.hold(target)
