@@ -65,7 +65,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 25},
     "robots": {"every": 10},
-    "contact": {"every": 19},
+    "contact": {"every": 39},
     "track": {"seeds": 1, "brief": True},
     "loads": {"seeds": 1, "rods": 3, "brief": True},
     "estimator": {"every": 13},
