@@ -12,15 +12,16 @@ from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_r
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, errors_to, target_of
+from gravcomp.trials.holding import GROUND, Case, errors_to, lasting, target_of
 from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
 
-HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
+HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s; slow robots are held longer
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
+_PERIODS = 13.0  # first periods of the robot that either lasts at least
 
 
 def run(context: Context) -> Result:
@@ -85,7 +86,7 @@ def run(context: Context) -> Result:
             ),
             *plots,
         ],
-        parameters={"inclinations_deg": INCLINATIONS, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        parameters={"inclinations_deg": INCLINATIONS, "hold_s": lasting(context.setup, HOLD, _PERIODS), "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
         notes=[
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
@@ -97,14 +98,15 @@ def run(context: Context) -> Result:
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
     inclinations = INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
+    hold, start = HOLD / 20 if brief else lasting(setup, HOLD, _PERIODS), lasting(setup, _START, _PERIODS)
     stops = [
-        (base_orientation(np.radians(i)), (HOLD / 20 if brief else HOLD) + (_START if k == 0 else 0.0))
+        (base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0))
         for k, i in enumerate(inclinations)
     ]
     motion = WaypointMotion(stops, RATE * (10 if brief else 1))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
-    loop.run(_START)
+    loop.run(start)
     loop.forget()
     loop.run(motion.duration - loop.time)
     return loop.trace
