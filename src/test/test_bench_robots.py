@@ -68,7 +68,14 @@ def fake_parts(monkeypatch, tmp_path):
 
     def loop(file, part):
         ran.append(part)
-        run = {"held": 0.02 * part.seed, "moving": 0.03, "held_m": 2e-4 * part.seed, "moving_m": 3e-4, "sag": 1e-2, "settled": 0.5}
+        run = {
+            "held": 0.02 * part.seed,
+            "moving": 0.03,
+            "held_m": 2e-4 * part.seed,
+            "moving_m": 3e-4,
+            "sag": 1e-2,
+            "settled": 0.5,
+        }
         return run | ({"settled": None} if part.seed == 2 else {})
 
     def calibration(file, part):
@@ -79,7 +86,12 @@ def fake_parts(monkeypatch, tmp_path):
         ran.append(part)
         raise RuntimeError("the bridge does not start")
 
-    kinds = {"loop": loop, "calibration": calibration, "similarity": lambda file, part: {"difference": 0.01}, "holdability": broken}
+    kinds = {
+        "loop": loop,
+        "calibration": calibration,
+        "similarity": lambda file, part: {"difference": 0.01},
+        "holdability": broken,
+    }
     monkeypatch.setattr(robot_parts, "KINDS", kinds)
     monkeypatch.setattr("gravcomp.bench.robot_loop.Sweep", lambda: Sweep(1))
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))

@@ -100,7 +100,9 @@ ROWS = {
         Row("robots.article.calibrated_pct", "article: lateral residual held, calibrated, of the released sag", "%", 1.0),
         Row("robots.*.moving_pct", "the same, calibrated, while the base turns at 30 deg/s", "%", 4.0),
         Row("robots.*.modulus_error_pct", "error of a segment's calibrated modulus, worst", "%", 2.0),
-        Row("robots.*.compliance_error_pct", "error of a cable's calibrated compliance, where it shows", "%", 10.0, optional=True),
+        Row(
+            "robots.*.compliance_error_pct", "error of a cable's calibrated compliance, where it shows", "%", 10.0, optional=True
+        ),
         Row("robots.*.calibrate_s", "robot time of a calibration", "s", 180.0),
         Row("robots.*.similarity_pct", "robots of 0.5 to 4 times the size, largest difference", "%", 2.0, optional=True),
         Row("ccx_error_pct", "against CalculiX, worst row, share of the length", "%", 0.2),

@@ -30,7 +30,10 @@ _ORIENTATIONS = 20
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """One run. kind: a key of `KINDS`; file: of the robot; seed: of its virtual robot; every: so many times fewer orientations."""
+    """One run.
+
+    kind: a key of `KINDS`; file: of the robot; seed: of its virtual robot; every: so many times fewer orientations.
+    """
 
     kind: str
     file: str

@@ -86,7 +86,12 @@ def run(context: Context) -> Result:
             ),
             *plots,
         ],
-        parameters={"inclinations_deg": INCLINATIONS, "hold_s": lasting(context.setup, HOLD, _PERIODS), "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        parameters={
+            "inclinations_deg": INCLINATIONS,
+            "hold_s": lasting(context.setup, HOLD, _PERIODS),
+            "rate_deg_s": float(np.degrees(RATE)),
+            "passes": 2,
+        },
         notes=[
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
@@ -99,10 +104,7 @@ def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
     inclinations = INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
     hold, start = HOLD / 20 if brief else lasting(setup, HOLD, _PERIODS), lasting(setup, _START, _PERIODS)
-    stops = [
-        (base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0))
-        for k, i in enumerate(inclinations)
-    ]
+    stops = [(base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
     motion = WaypointMotion(stops, RATE * (10 if brief else 1))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)

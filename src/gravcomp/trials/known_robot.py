@@ -61,7 +61,9 @@ def recover(context: Context) -> list[Recovered]:
     for estimate in fits[0].estimates:
         cable = next((i for i, c in enumerate(context.setup.robot.cables) if estimate.name == f"offset of {c.name}"), None)
         if cable is not None:
-            found.append(Recovered(estimate.name, "mm", 1e3 * offsets(context.setup.robot)[cable], estimate.value, estimate.interval))
+            found.append(
+                Recovered(estimate.name, "mm", 1e3 * offsets(context.setup.robot)[cable], estimate.value, estimate.interval)
+            )
     setup = known_setup(context.setup, moduli[0])
     inclinations, duration = ((0.0,), 0.5) if context.brief else ((0.0, 30.0), 1.5)
     falls = context.map(
