@@ -116,8 +116,8 @@ def run(context: Context) -> Result:
         notes=[
             "One model for the fall and for the rest after it, fitted at other poses than the evaluated ones: inclination and"
             f" roll {', '.join(f'{i:g}° and {r:g}°' for i, r in poses[len(inclinations) :])}.",
-            f"The last {_REST * period:.1f} s count as rest. At 90° the robot points up and does not move; 135° and 45° are mirror"
-            " images.",
+            f"The last {_REST * period:.1f} s count as rest. At 90° the robot points up and does not move; 135° and 45° are"
+            " mirror images.",
             "A material with creep is stiffer during the swing than at rest: a model with one modulus and damping alone has an"
             " error either in the frequency of the swing or at rest.",
         ],
