@@ -106,7 +106,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.report import figures_table
 
-    command = f"bench {args.benchmark}"
+    loop = args.benchmark == "robots" and args.loop
+    command = f"bench {args.benchmark}{' --loop' if loop else ''}"
     if args.write and args.brief:
         raise ConfigError("--write and --brief exclude each other: a document takes the figures of whole benchmarks")
     if args.write:
@@ -121,9 +122,18 @@ def run(args: argparse.Namespace) -> int:
     figures = headline_figures(args.benchmark, measured)
     console.print(_table_of_everything(command, measured))
     if args.write:
-        figures_table.renew(Path(args.write), command, figures)
+        figures_table.renew(Path(args.write), command, figures, typed=_typed(args, command))
     output.result(measured, figures_table.rich_table(command, figures))
     return 1 if any(figure.reached is False for figure in figures) else 0
+
+
+def _typed(args: argparse.Namespace, command: str) -> str:
+    """Return the command with the files and figures that were given."""
+    words = [command]
+    for argument in LISTS.get(args.benchmark, {}):
+        given = getattr(args, argument.lstrip("-"))
+        words += [argument, *given] if given and argument.startswith("--") else given
+    return " ".join(words)
 
 
 def _table_of_everything(title: str, measured: dict[str, Any]) -> "Table":

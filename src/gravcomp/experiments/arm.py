@@ -12,17 +12,18 @@ from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_r
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, errors_to, target_of
+from gravcomp.trials.holding import GROUND, Case, errors_to, lasting, target_of
 from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
 
-HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
+HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s; slow robots are held longer
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
 _BRIEF_START, _BRIEF_HOLD, _BRIEF_FASTER = 1.5, 0.5, 20.0  # s, s, times the rate
 _BRIEF_INCLINATIONS = (45.0, 0.0)
+_PERIODS = 13.0  # first periods of the robot that either lasts at least
 
 
 def run(context: Context) -> Result:
@@ -89,7 +90,12 @@ def run(context: Context) -> Result:
             ),
             *plots,
         ],
-        parameters={"inclinations_deg": inclinations, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        parameters={
+            "inclinations_deg": inclinations,
+            "hold_s": lasting(context.setup, HOLD, _PERIODS),
+            "rate_deg_s": float(np.degrees(RATE)),
+            "passes": 2,
+        },
         notes=[
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
@@ -101,7 +107,7 @@ def run(context: Context) -> Result:
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
     inclinations = _BRIEF_INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
-    start, hold = (_BRIEF_START, _BRIEF_HOLD) if brief else (_START, HOLD)
+    start, hold = (_BRIEF_START, _BRIEF_HOLD) if brief else (lasting(setup, _START, _PERIODS), lasting(setup, HOLD, _PERIODS))
     stops = [(base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
     motion = WaypointMotion(stops, RATE * (_BRIEF_FASTER if brief else 1.0))
     loop = ClosedLoop(setup, motion)

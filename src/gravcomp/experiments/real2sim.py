@@ -18,17 +18,19 @@ from gravcomp.virtual.motion import base_orientation
 TITLE = "Real to simulation: free fall"
 
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
-_DURATION, _BRIEF_DURATION = 4.0, 0.6  # s, of a fall
-_REST = 1.0  # s: the last part of a fall, which counts as rest
-_SHOWN = (0.03, 0.06, 0.1, 2.0)  # s after the start of the fall at which shapes are drawn
+# In first periods of the robot.
+_DURATION, _BRIEF_DURATION = 13.7, 2.0  # of a fall
+_REST = 3.4  # the last part of a fall, which counts as rest
+_SHOWN = (0.1, 0.2, 0.34, 6.8)  # after the start of the fall, when shapes are drawn
 
 
 def run(context: Context) -> Result:
     """Run the experiment."""
     setup = context.setup
-    duration = _BRIEF_DURATION if context.brief else _DURATION
+    period = setup.first_period
+    duration = SAMPLE * round((_BRIEF_DURATION if context.brief else _DURATION) * period / SAMPLE)
     inclinations = INCLINATIONS[3:4] if context.brief else INCLINATIONS
-    shown = tuple(t for t in _SHOWN if t < duration)
+    shown = tuple(t * period for t in _SHOWN if t * period < duration)
     poses = [(i, 0.0) for i in inclinations] + list(_FITTED_POSES[: 1 if context.brief else 2])
     jobs = [(setup, i, roll, duration, trial) for trial, (i, roll) in enumerate(poses)]
     falls = context.map(free_fall, jobs, "free fall of the virtual robot")
@@ -44,7 +46,7 @@ def run(context: Context) -> Result:
     predicted = context.map(_predict, falls_of_models, "fall of the model")
     courses = {name: predicted[k * len(evaluated) : (k + 1) * len(evaluated)] for k, name in enumerate(robots)}
     errors = {name: [_errors(course, *model) for course, model in zip(evaluated, models)] for name, models in courses.items()}
-    rest = slice(-round(_REST / 0.01), None)
+    rest = slice(-round(_REST * period / SAMPLE), None)
     whole = slice(None)
 
     def worst(model: str, row: int, part: slice) -> float:
@@ -114,7 +116,8 @@ def run(context: Context) -> Result:
         notes=[
             "One model for the fall and for the rest after it, fitted at other poses than the evaluated ones: inclination and"
             f" roll {', '.join(f'{i:g}° and {r:g}°' for i, r in poses[len(inclinations) :])}.",
-            "The last second counts as rest. At 90° the robot points up and does not move; 135° and 45° are mirror images.",
+            f"The last {_REST * period:.1f} s count as rest. At 90° the robot points up and does not move; 135° and 45° are"
+            " mirror images.",
             "A material with creep is stiffer during the swing than at rest: a model with one modulus and damping alone has an"
             " error either in the frequency of the swing or at rest.",
         ],

@@ -65,6 +65,11 @@ class Outcome:
     shape_held: np.ndarray
 
 
+def lasting(setup: Setup, shortest: float, periods: float) -> float:
+    """Return the duration in s of a phase that lasts `periods` first periods of the robot, at least `shortest` s."""
+    return max(shortest, periods * setup.first_period)
+
+
 def target_of(setup: Setup, case: Case) -> Target:
     """Return the target of a case, with the weights of the controller."""
     options = {"tip_direction_weight": setup.direction_weight, **case.options}
@@ -74,15 +79,14 @@ def target_of(setup: Setup, case: Case) -> Target:
 def run_case(job: tuple[Setup, Case]) -> Outcome:
     """Run one case: release, compensate, evaluate. The phases last as long as the robot's first period demands."""
     setup, case = job
-    period = setup.first_period
-    settled, share = _SETTLED * period, _BRIEF if case.brief else 1.0
+    settled, share = _SETTLED * setup.first_period, _BRIEF if case.brief else 1.0
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(case.inclination), np.radians(case.roll))))
     target = target_of(setup, case)
     loop.release()
-    loop.run(max(_SHORTEST, share * _RELEASED * period))
+    loop.run(lasting(setup, _SHORTEST, share * _RELEASED))
     start = loop.time
     loop.hold(target)
-    loop.run(max(_SHORTEST, share * _HELD * period))
+    loop.run(lasting(setup, _SHORTEST, share * _HELD))
     trace = loop.trace
     before, after = trace.between(start - settled, start), trace.between(loop.time - settled)
     station = setup.robot.effectors.backbone_station

@@ -17,6 +17,7 @@ import numpy as np
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.evaluation.metrics import SETTLED, settling_time
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.virtual.body import build_rod
@@ -37,8 +38,8 @@ class Residuals:
     """Root mean squares of lateral distances of the true tip from the straight robot's, in m; NaN where nothing is counted.
 
     held: at the end of each rest; moving: during the turns; sag: released, at the same orientations; orientations: their number,
-    without those at which the released robot has no equilibrium; settled: s from the start of compensation until the tip stays
-    within a twentieth of the sag there, NaN: never.
+    without those at which the released robot has no equilibrium; settled: s from the start of compensation until the lateral
+    distance stays within a twentieth of the sag of where it comes to rest, NaN: it does not.
     """
 
     held: float
@@ -107,12 +108,8 @@ def residuals(
     sags = _released(setup, wanted)
     sag = _rms(sags)
     first = trace.between(start, legs[0][1])
-    outside = np.flatnonzero(_lateral(first) > 0.05 * sag)
-    settled = 0.0 if not len(outside) else first.time[min(outside[-1] + 1, len(first.time) - 1)] - start
-    never = len(outside) > 0 and outside[-1] + 1 >= len(first.time)
-    return Residuals(
-        held=_rms(held), moving=_rms(turns), sag=sag, orientations=len(sags), settled=math.nan if never else float(settled)
-    )
+    settled = settling_time(first.time, _lateral(first), start=start, band=SETTLED * sag)
+    return Residuals(held=_rms(held), moving=_rms(turns), sag=sag, orientations=len(sags), settled=settled)
 
 
 def _released(setup: Setup, wanted: list[np.ndarray]) -> list[np.ndarray]:
