@@ -13,6 +13,7 @@ lacks (`TipNoise.stiffness`). Gravity bends the robot by density over modulus, s
 the density keeps its value, and its uncertainty is part of the moduli's intervals.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,7 +21,7 @@ import numpy as np
 
 from gravcomp.calibration.estimates import Estimate, estimate, name_of, partners_of, unfit, warnings
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
-from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
 from gravcomp.calibration.problem import Predictor, Problem
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
@@ -101,8 +102,8 @@ def fit_statics(
     initial = starting_parameters(robot, creep_times)
     before = predictor.predict(initial)
     if own:
-        coarse = with_coarse_elements(robot)  # exchanges show in centimetres
-        check_frame(robot, windows, before.tip, lambda other: StaticPredictor(coarse, other).predict(initial).tip)
+        exchanged = functools.cache(lambda: StaticPredictor(with_coarse_elements(robot), windows))  # they show in centimetres
+        check_frame(robot, windows, before.tip, lambda displacement: exchanged().tips_of(displacement))
     sigma = np.array([noise.position_share * robot.length, noise.direction])
     unknowns = unknowns_of(robot, before, initial, groups, priors)
     problem = Problem(predictor, initial, unknowns, prior_rows(unknowns, priors), sigma, progress)
@@ -143,7 +144,7 @@ def fit_statics(
             )
     rms_before, rms_after = (rms_distance(found.tip[:, :3] - windows.tip_position) for found in (before, after))
     if own:
-        check_explained(robot, rms_after)
+        check_explained(robot, windows, after.tip)
     if problem.worse(x, np.zeros(len(x))):
         raise MeasurementError(
             f"no values describe these data better than the robot file does (tip error {1e3 * rms_before:.2f} mm before,"
@@ -163,22 +164,8 @@ def fit_statics(
     )
 
 
-def starting_parameters(robot: Robot, creep_times: tuple[float, ...]) -> StaticParameters:
-    """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times."""
-    creep = np.zeros(len(creep_times))
-    for ratio, time in robot.materials[0].branches if creep_times else ():
-        creep[int(np.argmin(np.abs(np.log(np.array(creep_times) / time))))] += ratio
-    moduli = np.array([material.youngs_modulus for material in robot.materials])
-    return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep)
-
-
 def body_mass(robot: Robot) -> tuple[float, float, float]:
     """Return the mass in kg of what the density stands for, of the payload, and of the rest of the robot."""
     model = RobotModel(with_coarse_elements(robot))
     body, payload = float(model.body_weight.sum()), robot.payload.mass
     return body, payload, model.mass - body - payload
-
-
-def cable_compliance(robot: Robot) -> np.ndarray:
-    """Return (m,) the elongation in m/N of each cable from capstan to end, from the robot's description."""
-    return np.array([robot.cable_compliance(cable) for cable in robot.cables])

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.fit import TipNoise, starting_parameters
+from gravcomp.calibration.fit import TipNoise
 from gravcomp.calibration.measured import StillWindows
+from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
 from gravcomp.config import ConfigError, parameter

@@ -19,7 +19,7 @@ import numpy as np
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import Tendons
 from gravcomp.calibration.measured import StillWindows
-from gravcomp.calibration.parameters import StaticParameters, with_cable_places, with_moduli
+from gravcomp.calibration.parameters import StaticParameters, starting_parameters, with_cable_places, with_moduli
 from gravcomp.calibration.walk import Step, Walk, steps_of
 from gravcomp.description import PronyTerm, Robot
 from gravcomp.full_model.robot_model import RobotModel
@@ -70,6 +70,17 @@ class StaticPredictor:
         shown = [step for step in self._walked(parameters) if step.window is not None]
         return StaticPrediction(np.array([step.tip for step in shown]), np.array([step.tension for step in shown]))
 
+    def tips_of(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the tips (k, 6) of the described robot where the measured displacements were these (k, m), NaN: released.
+
+        Raises RuntimeError if there is no equilibrium.
+        """
+        other = dataclasses.replace(self.windows, displacement=displacement)
+        parameters = starting_parameters(self._robot, self._creep_times)
+        self._apply(parameters)
+        steps = self._walk.run(self._inputs(parameters, steps_of(other, crept=bool(self._creep_times))), parameters.creep)
+        return np.array([step.tip for step in steps if step.window is not None])
+
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
         """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.
 
@@ -102,8 +113,8 @@ class StaticPredictor:
             self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, self._last and self._last[1])
         return self._last[1]
 
-    def _inputs(self, parameters: StaticParameters) -> list[Step]:
-        """Return the steps with the gravity and the displacements that the parameters make of the measured ones."""
+    def _inputs(self, parameters: StaticParameters, steps: list[Step] | None = None) -> list[Step]:
+        """Return the steps (None: its own) with the gravity and displacements that the parameters make of the measured ones."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec(parameters.mount)
@@ -113,7 +124,7 @@ class StaticPredictor:
                 gravity=turn.apply(step.gravity),
                 displacement=parameters.winding * step.displacement + parameters.offset,
             )
-            for step in self._steps
+            for step in (self._steps if steps is None else steps)
         ]
 
     def _apply(self, parameters: StaticParameters) -> None:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gravcomp.calibration.estimates import edge_unit
-from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics, starting_parameters
+from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
 from gravcomp.calibration.measured import StillWindows
-from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plan import PlannedPose, make_plan
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import GROUPS
