@@ -164,7 +164,7 @@ def test_a_session_names_tips_that_cannot_be_of_the_robot(robot, tmp_path, late,
 
 def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     """Of a few seeds; `bench robots --figures coverage_pct` takes 50 and three robots."""
-    found = coverage(robot, plan.poses, range(12))
+    found = coverage(robot, plan, range(12))
     counted = sum(one.count for one in found.values())
     inside = sum(one.share * one.count for one in found.values())
     assert counted > 50 and inside / counted >= 0.9

@@ -10,8 +10,7 @@ from typing import Any
 from gravcomp.bench import robot_calibration
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
-from gravcomp.holdability import holdability
-from gravcomp.holdability.text import sentence
+from gravcomp.trials.holding import unholdable
 from gravcomp.trials.similarity import SCALES, similarity
 from gravcomp.trials.turning_base import Residuals, residuals
 
@@ -62,18 +61,12 @@ def measure(
             "moving_lateral_mm": round(1e3 * max(run.moving for run in runs.values()), 3),
             "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
             "settle_s": _worst([run.settled for run in runs.values()]),
-            "unholdable": unholdable(robot_file),
+            "unholdable": unholdable(robot_file.robot),
             "similarity_pct": similarity_pct(robot_file, every, progress),
             "seeds": {str(seed): share for seed, share in shares.items()},
         }
         | (robot_calibration.worst(calibrations) if calibrations else {})
     )
-
-
-def unholdable(file: RobotFile) -> str | None:
-    """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
-    answer = holdability(file.robot, with_needed=False)
-    return None if answer.held else sentence(file.robot, answer)
 
 
 def similarity_pct(file: RobotFile, every: int, progress: Callable[[str], None]) -> float | None:

@@ -123,7 +123,7 @@ def fit_statics(
     names = [name_of(robot, unknown, creep_times) for unknown in unknowns]
     partners = partners_of(problem.information(x), unknowns, priors)
     reasons = [
-        unfit(u, entry, half, quantile * half, [names[j] for j in others])
+        unfit(u, entry, half, quantile * half, [names[j] for j in others], float(initial.values(u.kind)[u.index[0]]) / u.scale)
         for u, entry, half, others in zip(unknowns, x, deviation, partners)
     ]
     fitted = np.array([not reason for reason in reasons])
