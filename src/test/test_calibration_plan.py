@@ -15,7 +15,7 @@ from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
-from gravcomp.trials.coverage import coverage
+from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
 
@@ -169,3 +169,14 @@ def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     inside = sum(one.share * one.count for one in found.values())
     assert counted > 50 and inside / counted >= 0.9
     assert found["modulus"].share >= 0.9
+    assert all(np.isfinite(one.width) and one.count >= 5 for one in found.values())
+
+
+def test_kinds_that_few_seeds_tell_are_counted_together():
+    """Of one interval neither a share nor a scatter follows."""
+    errors = {"modulus": [0.1, -0.1] * 5, "friction": [0.3], "winding": [0.1, 0.1, 0.9]}
+    halves = {"modulus": [0.2] * 10, "friction": [0.4], "winding": [0.2] * 3}
+    found = counted(errors, halves, 10)
+    assert set(found) == {"modulus", RARE} and found[RARE].count == 4 and found[RARE].share == 0.75
+    assert found["modulus"].width == pytest.approx(2.0)
+    assert set(counted(errors, halves, 50)) == set()

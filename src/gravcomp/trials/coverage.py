@@ -81,10 +81,10 @@ def coverage(robot: Robot, plan: Plan, seeds: Sequence[int]) -> dict[str, Covere
                 )  # MPa of soft and stiff
                 errors.setdefault(estimate.kind, []).append((estimate.value - factor * float(values[estimate.index])) / scale)
                 halves.setdefault(estimate.kind, []).append(estimate.interval / scale)
-    return _counted(errors, halves, len(seeds))
+    return counted(errors, halves, len(seeds))
 
 
-def _counted(errors: dict[str, list[float]], halves: dict[str, list[float]], seeds: int) -> dict[str, Covered]:
+def counted(errors: dict[str, list[float]], halves: dict[str, list[float]], seeds: int) -> dict[str, Covered]:
     """Return the kinds with their shares; those that few seeds tell together, in deviations of their intervals."""
     found: dict[str, Covered] = {}
     rare_error: list[float] = []
