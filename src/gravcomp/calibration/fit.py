@@ -8,9 +8,9 @@ begin at declared values; a second round takes them from the residuals of the fi
 and says why (`estimates.unfit`).
 
 Intervals are at 95 %: cov = (J^T J + R^T R)^-1, with J scaled by those sigmas and with every unknown, those that are not fitted
-as well: what is not known of them widens the intervals of the others. Those of the moduli contain in addition what the model
-lacks (`TipNoise.stiffness`). Gravity bends the robot by density over modulus, so tips alone cannot tell both: without a balance
-the density keeps its value, and its uncertainty is part of the moduli's intervals.
+as well: what is not known of them widens the intervals of the others. Those of moduli and creep contain in addition what the
+model lacks (`TipNoise.stiffness`, `TipNoise.creep`). Gravity bends the robot by density over modulus, so tips alone cannot tell
+both: without a balance the density keeps its value, and its uncertainty is part of the moduli's intervals.
 """
 
 import functools
@@ -25,7 +25,7 @@ from gravcomp.calibration.parameters import StaticParameters, starting_parameter
 from gravcomp.calibration.plausible import check_explained, check_frame
 from gravcomp.calibration.problem import Predictor, Problem
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
-from gravcomp.calibration.unknowns import Priors, parameters_at, prior_rows, unknowns_of
+from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_rows, unknowns_of
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
@@ -47,6 +47,12 @@ class TipNoise:
         minimum=0.0,
         maximum=0.5,
         description="error of the stiffness that no fit sees, relative: inner friction, the law at small strain",
+    )
+    creep: float = parameter(
+        0.15,
+        minimum=0.0,
+        maximum=2.0,
+        description="error of a branch of creep that no fit sees, relative: bodies creep by other times than the branches",
     )
     balance: float = parameter(5e-3, minimum=1e-6, maximum=0.5, description="deviation of a weighed mass, relative")
 
@@ -130,8 +136,8 @@ def fit_statics(
     x = problem.solve(np.where(fitted, x, 0.0), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     deviation = np.sqrt(np.diag(problem.covariance(x)))
-    unseen = np.array([noise.stiffness * (unknown.kind == "modulus") for unknown in unknowns])
     after, parameters = problem.predict(x), parameters_at(x, unknowns, initial)
+    unseen = np.array([_unseen(unknown, parameters, noise) for unknown in unknowns])
     estimates = tuple(
         estimate(robot, unknown, initial, parameters, quantile * half, half, reason, creep_times)
         for unknown, half, reason in zip(unknowns, np.hypot(deviation, unseen), reasons)
@@ -162,6 +168,15 @@ def fit_statics(
         warnings=tuple(warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any()))),
         creep_times=creep_times,
     )
+
+
+def _unseen(unknown: Unknown, parameters: StaticParameters, noise: TipNoise) -> float:
+    """Return the deviation in x of an unknown that the scatter of the tips does not show."""
+    if unknown.kind == "modulus":
+        return noise.stiffness
+    if unknown.kind == "creep":
+        return noise.creep * float(parameters.creep[unknown.index[0]]) / unknown.scale
+    return 0.0
 
 
 def body_mass(robot: Robot) -> tuple[float, float, float]:

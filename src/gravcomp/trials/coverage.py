@@ -2,8 +2,9 @@
 
 Each seed draws true parameters around the description, in the ranges of `virtual.draw`; the tips that they give, by the model
 linearised at the description, with noise and with a stiffness that the model lacks, are fitted like measured ones. True bodies
-creep by the branches of their material's class, the fit has those of the plan. It covers plan, priors, choice of what is fitted,
-and intervals; not the difference of mechanical models, for which `bench robots --loop` measures whole virtual robots.
+creep by the branches of their material's class, with other times; the fit has those of the plan. It covers plan, priors, choice
+of what is fitted, and intervals; not the difference of mechanical models, for which `bench robots --loop` measures whole virtual
+robots.
 
 All seeds of a robot share one linearised model: a seed costs the least squares only.
 """
@@ -33,6 +34,7 @@ _EVEN = {"modulus": 0.08, "density": 0.02, "radius": 0.01, "angle": np.radians(1
 
 _LINE, _ZERO, _FRICTION = 0.1, 2e-3, 0.1  # stretch, relative; zero of a cable, over the length; coefficient of friction
 _CREEP = 0.3  # of the ratios of a class, relative
+_TIMES = (0.5, 1.0, 2.0)  # factors of the times of a class, of which each branch has one
 _WINDOWS = 3  # of each rest
 _FIRST = 0.1  # of a rest: the beginning of its first window
 _COUNTED = 0.4  # of the seeds: kinds with fewer intervals count together, as RARE
@@ -126,10 +128,17 @@ def _lacking(true: StaticParameters, noise: TipNoise, random: np.random.Generato
     return true
 
 
+def _true_times(robot: Robot) -> np.ndarray:
+    """Return the times (b,) in s of all branches that true bodies may have, each of its class with all factors."""
+    return np.outer(class_of(robot.materials[0].youngs_modulus).creep_time, _TIMES).ravel()
+
+
 def _drawn_branches(robot: Robot, random: np.random.Generator) -> np.ndarray:
-    """Return the ratios (b,) of the true body's branches of creep, of the class of its first material."""
+    """Return the ratios (b,) of the branches of `_true_times`: each of the class of the first material has one of its times."""
     ratio = np.array(class_of(robot.materials[0].youngs_modulus).creep_ratio)
-    return ratio * (1.0 + _CREEP * random.uniform(-1.0, 1.0))
+    factors = np.zeros((len(ratio), len(_TIMES)))
+    factors[np.arange(len(ratio)), random.integers(len(_TIMES), size=len(ratio))] = 1.0
+    return (ratio[:, None] * factors * (1.0 + _CREEP * random.uniform(-1.0, 1.0))).ravel()
 
 
 class _Linear:
@@ -140,7 +149,7 @@ class _Linear:
 
     def __init__(self, robot: Robot, plan: Plan):
         self.times = creep_times(plan.rest)
-        self._true_times = class_of(robot.materials[0].youngs_modulus).creep_time
+        self._true_times = _true_times(robot)
         self.windows = _windows(plan)
         # The fit's branches, and after them the true ones.
         predictor = StaticPredictor(robot, self.windows, (*self.times, *self._true_times))
@@ -163,7 +172,7 @@ class _Linear:
         One that is nearer to a tenth of the shortest time has ended before the first window, and counts for none.
         """
         times = np.array([0.1 * min(self.times), *self.times])
-        nearest = np.abs(np.log(np.array(self._true_times)[:, None] / times)).argmin(axis=1)
+        nearest = np.abs(np.log(self._true_times[:, None] / times)).argmin(axis=1)
         return np.bincount(nearest, branches, len(times))[1:]
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
