@@ -23,7 +23,7 @@ _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other 
 # In first periods of the robot: a fall, its last part, which counts as rest, and when shapes are drawn.
 _DURATION, _BRIEF_DURATION, _REST = 14.0, 4.2, 3.5
 _SHOWN = (0.1, 0.2, 0.35, 7.0)
-# Of the sag, the largest distance of a resting tip from the straight robot's, and of the tip's turn there.
+# Of the sag of the horizontal robot, its tip's distance from the straight one's, and of the turn of that tip.
 _WORST, _WORST_TURN = 0.06, 0.04
 
 
@@ -50,9 +50,10 @@ def run(context: Context) -> Result:
     courses = {name: predicted[k * len(evaluated) : (k + 1) * len(evaluated)] for k, name in enumerate(robots)}
     errors = {name: [_errors(course, *model) for course, model in zip(evaluated, models)] for name, models in courses.items()}
     rest = slice(-max(2, round(_REST * period / SAMPLE)), None)
+    hanging = evaluated[inclinations.index(0.0)]
+    hanging = hanging.rows(np.arange(len(hanging.time))[rest])
     straight = np.array([0.0, 0.0, setup.nominal.length]), np.array([0.0, 0.0, 1.0])
-    hanging = [course.rows(np.arange(len(course.time))[rest]) for course in evaluated]
-    sag, turn = (max(float(part.max()) for part in pair) for pair in zip(*(_errors(course, *straight) for course in hanging)))
+    sag, turn = (float(part.max()) for part in _errors(hanging, *straight))
     whole = slice(None)
 
     def worst(model: str, row: int, part: slice) -> float:
@@ -154,7 +155,7 @@ def _fall_shapes(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return backbones (n, 3) of the virtual robot and of the model `robot`, in the world, at `times` (s)."""
     base = base_orientation(np.radians(inclination))
-    samples = [round(t / SAMPLE) for t in times]
+    samples = [max(1, round(t / SAMPLE)) for t in times]
     course = fall.rows(np.arange(samples[-1] + 1))
     modelled = dict(enumerate(predict_shapes(robot, course)))
     true = dict(enumerate(falling_rod(setup, base, times[-1])))
