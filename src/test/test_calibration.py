@@ -60,8 +60,10 @@ def test_derivatives_of_tips_are_those_of_finite_differences(robot):
 
 @pytest.fixture(scope="module")
 def windows(setup):
-    """Resting tips of a known robot."""
-    return known_windows(known_setup(setup, 0.6e6))
+    """Resting tips of a known robot: released in three poses, and with each cable pulled in in the first of them."""
+    found = known_windows(known_setup(setup, 0.6e6))
+    kept = np.isnan(found.displacement).all(axis=1) | (found.gravity == found.gravity[0]).all(axis=1)
+    return StillWindows(found.gravity[kept], found.displacement[kept], found.tip_position[kept], found.tip_direction[kept])
 
 
 def test_a_known_robot_is_recovered_within_two_per_cent(setup, windows):

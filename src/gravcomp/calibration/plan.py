@@ -129,14 +129,18 @@ def make_plan(
     transmission: Transmission | None = None,
     options: PlanOptions | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
+    orientations: tuple[tuple[float, float], ...] = ORIENTATIONS,
 ) -> Plan:
-    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose."""
+    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose.
+
+    orientations: candidates, inclination and roll of the base in rad.
+    """
     options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
-    candidates, shapes = _candidates(robot, transmission, options, progress)
+    candidates, shapes = _candidates(robot, transmission, options, progress, orientations)
     if not candidates:
         raise ConfigError(
-            f"robot '{robot.name}': in none of {len(ORIENTATIONS)} orientations has the released robot an equilibrium within"
+            f"robot '{robot.name}': in none of {len(orientations)} orientations has the released robot an equilibrium within"
             " the limits of its cables; no calibration can be planned"
         )
     windows = StillWindows(
@@ -170,15 +174,19 @@ def make_plan(
 
 
 def _candidates(
-    robot: Robot, transmission: Transmission | None, options: PlanOptions, progress: Callable[[str], None]
+    robot: Robot,
+    transmission: Transmission | None,
+    options: PlanOptions,
+    progress: Callable[[str], None],
+    orientations: tuple[tuple[float, float], ...],
 ) -> tuple[list[PlannedPose], list[Equilibrium]]:
     """Return the poses that the limits allow, and their shapes, from the model's equilibria."""
     simulator = Simulator(robot, reduced=False)
     found: list[tuple[PlannedPose, Equilibrium]] = []
     count = len(robot.cables)
     slack = options.slack * robot.length
-    for number, (inclination, roll) in enumerate(ORIENTATIONS):
-        progress(f"planning: orientation {number + 1} of {len(ORIENTATIONS)}")
+    for number, (inclination, roll) in enumerate(orientations):
+        progress(f"planning: orientation {number + 1} of {len(orientations)}")
         gravity = gravity_of(inclination, roll)
         free = simulator.solve(gravity)
         if not free.is_equilibrium:

@@ -42,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", default="reports", help="folder for the pages and JSON (default: reports)")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     add_seed_argument(parser)
-    parser.add_argument("--workers", type=int, metavar="N", help="number of processes for sweeps (default: one per core)")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes for sweeps (default: one per core; with --brief: one)"
+    )
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
     parser.add_argument(
         "--write",
@@ -102,7 +104,9 @@ def run(args: argparse.Namespace) -> int:
     prepare_model(args.robot)
     results, pages = [], []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Sweep(args.workers, args.dask) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
+    # Processes take longer to start than the runs of a brief experiment take.
+    workers = 1 if args.brief and args.workers is None else args.workers
+    with Sweep(workers, args.dask) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("starting")
         label = ""
         context = Context(

@@ -21,10 +21,13 @@ TITLE = "On a moving arm"
 HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
+_BRIEF_START, _BRIEF_HOLD, _BRIEF_FASTER = 1.5, 0.5, 20.0  # s, s, times the rate
+_BRIEF_INCLINATIONS = (45.0, 0.0)
 
 
 def run(context: Context) -> Result:
     """Run the experiment."""
+    inclinations = _BRIEF_INCLINATIONS if context.brief else INCLINATIONS
     setups = {"calibrated": context.once(calibrate_on_virtual_robot).setup, "not calibrated": context.setup}
     jobs = [
         (setup, bend, weightless, context.brief)
@@ -58,6 +61,7 @@ def run(context: Context) -> Result:
             Plot(
                 f"{shape.capitalize()}: at the five poses",
                 _shapes(
+                    inclinations,
                     without,
                     fitted,
                     arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station),
@@ -89,7 +93,7 @@ def run(context: Context) -> Result:
             ),
             *plots,
         ],
-        parameters={"inclinations_deg": INCLINATIONS, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        parameters={"inclinations_deg": inclinations, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
         notes=[
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
@@ -101,15 +105,13 @@ def run(context: Context) -> Result:
 
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
-    inclinations = INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
-    stops = [
-        (base_orientation(np.radians(i)), (HOLD / 20 if brief else HOLD) + (_START if k == 0 else 0.0))
-        for k, i in enumerate(inclinations)
-    ]
-    motion = WaypointMotion(stops, RATE * (10 if brief else 1))
+    inclinations = _BRIEF_INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
+    start, hold = (_BRIEF_START, _BRIEF_HOLD) if brief else (_START, HOLD)
+    stops = [(base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
+    motion = WaypointMotion(stops, RATE * (_BRIEF_FASTER if brief else 1.0))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
-    loop.run(_START)
+    loop.run(start)
     loop.forget()
     loop.run(motion.duration - loop.time)
     return loop.trace
@@ -121,10 +123,10 @@ def _recovery(trace: Trace, target: np.ndarray) -> float:
     return metrics.recovery_rate(wanted, Rotation.from_quat(trace.base_orientation).apply(trace.tip_position))
 
 
-def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
-    """Draw the shapes at the five poses. wanted: backbone (b, 3) of the target shape, in soft_base."""
-    with Drawing(1, len(INCLINATIONS), width=11.5, height=2.9) as drawing:
-        for axes, inclination in zip(drawing.axes, INCLINATIONS):
+def _shapes(inclinations: tuple[float, ...], without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
+    """Draw the shapes at the poses. wanted: backbone (b, 3) of the target shape, in soft_base."""
+    with Drawing(1, len(inclinations), width=11.5, height=2.9) as drawing:
+        for axes, inclination in zip(drawing.axes, inclinations):
             base = base_orientation(np.radians(inclination))
             draw_robot(axes, side_view(wanted, base), REST, "target")
             for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated")):

@@ -44,10 +44,10 @@ def run(context: Context) -> Result:
     calibrated = context.once(calibrate_on_virtual_robot).setup
     setup = dataclasses.replace(calibrated, robot=lengthened(calibrated.robot), nominal=lengthened(calibrated.nominal))
     inclinations = INCLINATIONS[1:2] if context.brief else INCLINATIONS
-    cases = [Case(i, options=options) for options in ({}, BACKBONE) for i in inclinations]
+    cases = [Case(i, options=options, brief=context.brief) for options in ({}, BACKBONE) for i in inclinations]
     outcomes = context.map(run_case, [(setup, case) for case in cases], "robot with a longer segment")
     tip_only, weighted = outcomes[: len(inclinations)], outcomes[len(inclinations) :]
-    short = context.map(run_case, [(calibrated, Case(0.0))], "robot as described")[0]
+    short = context.map(run_case, [(calibrated, Case(0.0, brief=context.brief))], "robot as described")[0]
     distal = setup.robot.effectors.backbone_station > 1.0 - setup.robot.segments[-1].full_length / setup.robot.length
     distal[-1] = False
 

@@ -19,6 +19,7 @@ from gravcomp.virtual.motion import StaticMotion, base_orientation
 # In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
 _RELEASED, _HELD, _SETTLED = 12.0, 14.0, 1.8
 _HELD_WELL = 0.1  # of the sag: a robot whose cables hold it keeps less
+_BRIEF = 0.4  # of the phases of a brief case
 _SHORTEST = 1.5  # s of a phase: filter, controller and winches need as long on the fastest robot
 GROUND = (
     "The whole loop runs in the core, faster than real time, against the virtual robot: CAN frames, bridge, position loops,"
@@ -29,13 +30,14 @@ GROUND = (
 
 @dataclass(frozen=True)
 class Case:
-    """Pose and target. Angles in degrees, bend 0: straight; options: further arguments of `bend_target`."""
+    """Pose and target. Angles in degrees, bend 0: straight; options: of `bend_target`; brief: shorter phases."""
 
     inclination: float
     roll: float = 0.0
     bend: float = 0.0
     plane: float = 0.0
     options: dict[str, Any] = field(default_factory=dict)
+    brief: bool = False
 
     @property
     def name(self) -> str:
@@ -77,14 +79,14 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
     """Run one case: release, compensate, evaluate. The phases last as long as the robot's first period demands."""
     setup, case = job
     period = setup.first_period
-    settled = _SETTLED * period
+    settled, share = _SETTLED * period, _BRIEF if case.brief else 1.0
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(case.inclination), np.radians(case.roll))))
     target = target_of(setup, case)
     loop.release()
-    loop.run(max(_SHORTEST, _RELEASED * period))
+    loop.run(max(_SHORTEST, share * _RELEASED * period))
     start = loop.time
     loop.hold(target)
-    loop.run(max(_SHORTEST, _HELD * period))
+    loop.run(max(_SHORTEST, share * _HELD * period))
     trace = loop.trace
     before, after = trace.between(start - settled, start), trace.between(loop.time - settled)
     station = setup.robot.effectors.backbone_station

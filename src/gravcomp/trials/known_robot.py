@@ -45,7 +45,7 @@ class Recovered:
 
 def recover(context: Context) -> list[Recovered]:
     """Fit modulus, offsets and elasticity to tips at rest, modulus and damping to free falls. Returns true and fitted values."""
-    moduli = MODULI[:1] if context.brief else MODULI
+    moduli = MODULI[1:2] if context.brief else MODULI
     poses = _POSES[:1] if context.brief else _POSES
     jobs = [(context.setup, modulus, poses) for modulus in moduli]
     fits = context.map(_fit_known, jobs, "fitting robots with known parameters")
@@ -60,7 +60,7 @@ def recover(context: Context) -> list[Recovered]:
         if cable is not None:
             found.append(Recovered(estimate.name, "mm", 1e3 * OFFSETS[cable], estimate.value, estimate.interval))
     setup = known_setup(context.setup, moduli[0])
-    inclinations, duration = ((0.0,), 0.5) if context.brief else ((0.0, 30.0), 1.5)
+    inclinations, duration = ((0.0,), 0.35) if context.brief else ((0.0, 30.0), 1.5)
     falls = context.map(
         free_fall, [(setup, i, 0.0, duration, trial) for trial, i in enumerate(inclinations)], "free falls of the known robot"
     )

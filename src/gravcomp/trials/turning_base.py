@@ -48,14 +48,14 @@ class Residuals:
     settled: float
 
 
-def orientations(count: int, seed: int) -> list[np.ndarray]:
-    """Return the rotations (3, 3), world from soft_base, of the five poses and of `count` random ones, in the order of the run.
+def orientations(count: int, seed: int, inclinations: tuple[float, ...] = INCLINATIONS) -> list[np.ndarray]:
+    """Return the rotations (3, 3), world from soft_base, of the poses and of `count` random ones, in the order of the run.
 
     The directions of gravity of the random ones are uniform on the sphere.
     """
-    five = [base_orientation(math.radians(angle)) for angle in INCLINATIONS]
-    found = [five[0]]
-    for pose in five[1:]:
+    poses = [base_orientation(math.radians(angle)) for angle in inclinations]
+    found = [poses[0]]
+    for pose in poses[1:]:
         found.append(_turned_upright(found[-1], pose[2]))
     left = np.random.default_rng(seed).standard_normal((count, 3))
     left /= np.linalg.norm(left, axis=1, keepdims=True)
@@ -83,13 +83,14 @@ def residuals(
     orientation_seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
     board: str = "virtual",
+    inclinations: tuple[float, ...] = INCLINATIONS,
 ) -> Residuals:
-    """Run the loop through the five poses and `count` random ones.
+    """Run the loop through the poses at `inclinations` (deg) and `count` random ones.
 
     progress receives the number of orientations that are done, and that of all; board: of the virtual robot. Raises ConfigError,
     NoEquilibrium, RuntimeError.
     """
-    wanted = orientations(count, orientation_seed)
+    wanted = orientations(count, orientation_seed, inclinations)
     rest = _REACTION + _PERIODS * setup.first_period + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
     loop = ClosedLoop(setup, motion, board=board)
