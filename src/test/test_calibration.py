@@ -6,9 +6,9 @@ import pytest
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
 from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
-from gravcomp.calibration.fit import cable_compliance, fit_statics
+from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
-from gravcomp.calibration.parameters import StaticParameters, with_moduli
+from gravcomp.calibration.parameters import StaticParameters, cable_compliance, with_moduli
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.closed_loop.setup import Setup
@@ -130,7 +130,12 @@ def test_csv_is_read_as_it_was_written(tmp_path, robot):
         (lambda text: text.replace("tip_x_mm", "tip_x"), "column 'tip_x_mm' is missing"),
         (lambda text: text.replace("100.0000", "ten", 1), r"line 2: tip_z_mm is 'ten'"),
         (lambda text: text.splitlines()[0], "has 0 samples"),
-        (lambda text: text.replace("100.0000", "nan", 1), "not finite"),
+        (lambda text: text.replace("100.0000", "nan", 1), r"line 2: tip_z_mm is 'nan'; a finite number"),
+        (lambda text: text.replace("100.0000", "", 1), r"line 2: tip_z_mm is empty"),
+        (lambda text: text.replace("\n0,0.1000,", "\n0,0.0000,", 1), "in trial 0 the time goes from"),
+        (lambda text: text[: len(text) - 30], "Is the line cut off"),
+        (lambda text: text.replace("100.0000", "100,0000", 1), "commas within numbers"),
+        (lambda text: text.replace(",", ";"), "separated by semicolons"),
     ],
 )
 def test_bad_csv_is_refused_with_what_is_wrong(tmp_path, robot, change, message):

@@ -113,6 +113,8 @@ ROWS = {
         Row("tentacle_mm", "tentacle, fitted", "mm", 8.0),
         Row("tentacle_held_mm", "tentacle, each pose predicted by a fit to the others", "mm", 12.0),
         Row("tdcr_mm", "nine tendons, five-fold", "mm", 4.0),
+        Row("coverage_pct", "95 % intervals of a calibration with the truth in them, worst kind", "%", 90.0, at_least=True),
+        Row("coverage_width", "half width of these intervals over the deviation of the errors, widest kind", "", 4.0),
     ),
     "track": (
         Row("robots.*.untracked_mm", "held, modulus 15 % off and strong creep, without tracker: lateral RMS, worst", "mm"),

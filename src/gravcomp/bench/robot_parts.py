@@ -18,9 +18,8 @@ from gravcomp.cache import cache_path, content_key
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import RobotFile, load_robot_file
-from gravcomp.holdability import holdability
-from gravcomp.holdability.text import sentence
 from gravcomp.mesh import MeshError
+from gravcomp.trials.holding import unholdable
 from gravcomp.trials.similarity import SCALES, similarity
 from gravcomp.trials.turning_base import residuals
 
@@ -108,8 +107,7 @@ def other_sizes(file: RobotFile, part: Part) -> dict[str, Any]:
 
 def holding(file: RobotFile, part: Part) -> dict[str, Any]:
     """Why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
-    answer = holdability(file.robot, with_needed=False)
-    return {"reason": None if answer.held else sentence(file.robot, answer)}
+    return {"reason": unholdable(file.robot)}
 
 
 KINDS = {"loop": loop, "calibration": calibration, "similarity": other_sizes, "holdability": holding}

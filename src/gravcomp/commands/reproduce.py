@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
-from gravcomp.experiments import EXPERIMENTS, MEASURED, experiment
+from gravcomp.experiments import ALSO, EXPERIMENTS, MEASURED, experiment
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -18,14 +18,20 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    lines = "\n".join(f"  {name:<14}{summary}" for name, summary in EXPERIMENTS.items())
+    other = {name: also for also, name in ALSO.items()}
+    lines = "\n".join(
+        f"  {name:<14}{summary}" + (f" (also: {other[name]})" if name in other else "") for name, summary in EXPERIMENTS.items()
+    )
     parser.description = (
         "Reproduce the article's experiments on the virtual robot, or evaluate a recording of your own robot (--bag):"
         f"\n\n{lines}\n  {'all':<14}all of them, with an index page\n  {'measured':<14}{MEASURED}"
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
-        "name", choices=[*EXPERIMENTS, "all", "measured"], metavar="NAME", help="name of the experiment, all or measured"
+        "name",
+        choices=[*EXPERIMENTS, *ALSO, "all", "measured"],
+        metavar="NAME",
+        help="name of the experiment, all or measured",
     )
     parser.add_argument(
         "data",
@@ -70,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.sweep import Sweep
     from gravcomp.trials.context import Context
 
+    args.name = ALSO.get(args.name, args.name)
     names = list(EXPERIMENTS) if args.name == "all" else [args.name]
     if args.data and args.name != "measured":
         raise ConfigError(f"DATA is {args.data}: only measured takes a folder of measurements, {args.name} does not")
@@ -111,7 +118,13 @@ def run(args: argparse.Namespace) -> int:
         for name in names:
             label = name
             started = time.perf_counter()
-            result = experiment(name).run(context)
+            try:
+                result = experiment(name).run(context)
+            except ConfigError as error:
+                if args.name != "all":
+                    raise
+                output.note(f"{name}: {error}")
+                continue
             result.seconds = time.perf_counter() - started
             result.parameters.setdefault("seed", context.setup.seed)
             result.parameters.update({"robot": context.setup.source, "sweeps": sweep.place})

@@ -12,7 +12,7 @@ from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_r
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, errors_to, lasting, target_of
+from gravcomp.trials.holding import GROUND, Case, errors_to, held_notes, lasting, target_of
 from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
@@ -36,7 +36,7 @@ def run(context: Context) -> Result:
         for setup, weightless in ((context.setup, True), *((setup, False) for setup in setups.values()))
     ]
     traces = context.map(_pass, jobs, "two passes of 90 s")
-    figures, rows, plots = [], [], []
+    figures, rows, plots, notes = [], [], [], []
     for index, bend in enumerate((0.0, 30.0)):
         without, fitted, plain = traces[3 * index : 3 * index + 3]
         target = target_of(context.setup, Case(0.0, bend=bend))
@@ -45,12 +45,16 @@ def run(context: Context) -> Result:
             for name, trace in (("without", without), ("calibrated", fitted), ("not calibrated", plain))
         }
         shape = f"bent by {bend:g} deg" if bend else "straight"
+        left = evaluated["calibrated"][1].lateral.mean() / evaluated["without"][1].lateral.mean()
         gain = evaluated["without"][1].distance.mean() / evaluated["calibrated"][1].distance.mean()
         figures += [
             Figure(f"recovery rate r, {shape}, calibrated", evaluated["calibrated"][0], "", ARTICLE[bend], 0.99, True, 5),
             Figure(f"recovery rate r, {shape}, without compensation", evaluated["without"][0], "", digits=5),
             Figure(f"tip error ratio, without / with compensation, {shape}", gain, "", limit=5.0, at_least=True),
+            Figure(f"mean lateral error, {shape}, calibrated, of that without compensation", 100.0 * left, "%"),
         ]
+        if not bend:
+            notes = held_notes(context.setup, *(evaluated[name][1].lateral.mean() for name in ("calibrated", "without")))
         for name, (r, errors) in evaluated.items():
             mean = [1e3 * errors.distance.mean(), 1e3 * errors.distance.max(), 1e3 * errors.lateral.mean()]
             rows.append((shape, name, f"{r:.5f}", *mean, float(np.degrees(errors.tilt.mean()))))
@@ -100,6 +104,7 @@ def run(context: Context) -> Result:
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
             "With the base tilted back (135 deg) the uncompensated robot falls over to the other side; this dominates r.",
+            *notes,
         ],
     )
 

@@ -8,13 +8,17 @@ import numpy as np
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.description import Robot
 from gravcomp.evaluation import metrics
+from gravcomp.holdability import holdability
+from gravcomp.holdability.text import sentence
 from gravcomp.inverse import Target, bend_target
 from gravcomp.inverse.target import arc_points
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 # In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
 _RELEASED, _HELD, _SETTLED = 12.0, 14.0, 1.8
+_HELD_WELL = 0.1  # of the sag: a robot whose cables hold it keeps less
 _BRIEF = 0.4  # of the phases of a brief case
 _SHORTEST = 1.5  # s of a phase: filter, controller and winches need as long on the fastest robot
 GROUND = (
@@ -108,6 +112,24 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
         shape_without=before.backbone.mean(axis=0),
         shape_held=after.backbone.mean(axis=0),
     )
+
+
+def unholdable(robot: Robot) -> str | None:
+    """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
+    answer = holdability(robot, with_needed=False)
+    return None if answer.held else sentence(robot, answer)
+
+
+def held_notes(setup: Setup, residual: float, sag: float) -> list[str]:
+    """Return notes about a lateral residual of a straight target and the released robot's sag, both in m.
+
+    One that is a large share of the sag asks whether the cables can hold this robot at all; the answer is that of `model info`.
+    """
+    if residual <= _HELD_WELL * sag:
+        return []
+    reason = unholdable(setup.robot)
+    share = f"{100.0 * residual / sag:.0f} % of the sag remain"
+    return [f"{share}: {reason}" if reason else f"{share}, and the cables could hold the robot in every direction of gravity"]
 
 
 def errors_to(trace: Trace, target: Target) -> metrics.TipErrors:
