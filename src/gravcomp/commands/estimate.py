@@ -16,12 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file",
         metavar="FILE",
-        help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder",
+        help="a rosbag2 folder, an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement), or CSV",
     )
     parser.add_argument(
         "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
     )
     parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument("--columns", metavar="YAML", help="names of the columns of a CSV file that do not say what they are")
     parser.add_argument(
         "--units",
         choices=("si", "auto"),
@@ -42,13 +43,13 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
     from gravcomp.orientation.inclination import inclination_rmse
-    from gravcomp.recordings.imu import read_recording
+    from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
     if args.average < 1:
         raise ConfigError(f"--average is {args.average}; 1 or more is needed")
     try:
-        recording = read_recording(args.file, args.topic)
+        recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
         recording, findings = in_si(recording, convert=args.units == "auto")
         if args.average > 1:
             recording = recording.averaged(args.average)

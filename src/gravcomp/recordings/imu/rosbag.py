@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gravcomp.recordings.imu.recording import Recording, RecordingError
-from gravcomp.recordings.imu.stamps import usable_stamps
+from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -67,7 +67,7 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
         accel=values[:, 3:].copy(),
         temperature_stamp_ns=temperature[0] if temperature else None,
         temperature=temperature[2][:, 0] if temperature else None,
-        orientation=_nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
+        orientation=nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
         notes=(*damage, *notes),
     )
 
@@ -102,14 +102,3 @@ def _arrays(rows: list[tuple[int, int, tuple[float, ...]]], width: int) -> tuple
     """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
     stamp, received = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
     return stamp, received, np.array([row[2] for row in rows], dtype=float).reshape(len(rows), width)
-
-
-def _nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:
-    """Return the truth whose stamp is nearest to that of each sample, NaN where they differ by more than the tolerance."""
-    after = np.clip(np.searchsorted(truth_stamp, stamp), 1, max(len(truth_stamp) - 1, 1))
-    after = np.minimum(after, len(truth_stamp) - 1)
-    before = np.maximum(after - 1, 0)
-    nearest = np.where(np.abs(truth_stamp[before] - stamp) <= np.abs(truth_stamp[after] - stamp), before, after)
-    result = truth[nearest].copy()
-    result[np.abs(truth_stamp[nearest] - stamp) > tolerance_ns] = np.nan
-    return result
