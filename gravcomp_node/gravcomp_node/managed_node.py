@@ -53,7 +53,7 @@ class ManagedNode(LifecycleNode):
         self.parameters = ros_parameters.declare(
             self, self.parameters_class, section, f"{self.robot_file.source}: nodes.{self.name}"
         )
-        ros_parameters.refuse_unknown_overrides(self)
+        ros_parameters.refuse_unknown_overrides(self, (SharedParameters, self.parameters_class))
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._apply_change)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)

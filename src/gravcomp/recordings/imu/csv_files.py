@@ -16,7 +16,7 @@ from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
 SUFFIXES = (".csv", ".txt", ".tsv")
 _RATES = (5.0, 8000.0)  # Hz, of an IMU whose unit of time is not given
-_TRUTHS = ("state_groundtruth_estimate0", "mocap0")  # of EuRoC and TUM-VI, beside imu0
+_TRUTHS = ("state_groundtruth_estimate0", "mocap0")  # of EuRoC and TUM-VI, next to imu0
 _TREE = ("mav0/imu0/data.csv", "imu0/data.csv", "data.csv")
 _NEEDED = "needed: time, rate x y z, specific force x y z; or their names in a file for --columns"
 
@@ -55,7 +55,7 @@ def _of_file(path: Path, mapping: CsvColumns | None) -> Recording:
         raise RecordingError(f"{path}: has the acceleration without gravity; the specific force is needed")
     gyro, accel = _vectors(table, found.gyro), _vectors(table, found.accel)
     stamp, notes = _stamps(table, found, None if mapping is None else mapping.rate, np.hstack([gyro, accel]))
-    truth = _vectors(table, found.orientation) if found.orientation else _truth_beside(path, stamp)
+    truth = _vectors(table, found.orientation) if found.orientation else _truth_next_to(path, stamp)
     return Recording(
         source=str(path),
         stamp_ns=stamp,
@@ -153,7 +153,7 @@ def _converted(found: Found) -> tuple[str, ...]:
     return tuple(f"the {name} is in {unit} by its header: converted" for name, unit, si in pairs if unit not in (None, si))
 
 
-def _truth_beside(path: Path, stamp: np.ndarray) -> np.ndarray | None:
+def _truth_next_to(path: Path, stamp: np.ndarray) -> np.ndarray | None:
     """Return the ground truth of EuRoC's tree (n, 4), where there is one."""
     for name in _TRUTHS:
         file = path.parent.parent / name / "data.csv"
