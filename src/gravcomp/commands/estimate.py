@@ -29,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="si",
         help="si: rad/s, m/s^2 and right-handed axes, anything else is refused or reported; auto: convert what is found",
     )
+    parser.add_argument(
+        "--calibrate",
+        action="store_true",
+        help="fit scale and offset of the accelerometer to the recording itself, in which the sensor has to turn",
+    )
     parser.add_argument("--average", type=int, default=1, metavar="N", help="average every N samples (3: 95.2 Hz in BROAD)")
     parser.add_argument(
         "--robot", default="article", help="shipped robot or robot file with the IMU's mount and the parameters of imu_estimator"
@@ -42,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
+    from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
     from gravcomp.orientation.inclination import inclination_rmse
     from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
@@ -51,6 +57,9 @@ def run(args: argparse.Namespace) -> int:
     try:
         recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
         recording, findings = in_si(recording, convert=args.units == "auto")
+        correction = calibrate_in_motion(recording) if args.calibrate else None
+        if correction is not None:
+            recording = calibrated(recording, correction)
         if args.average > 1:
             recording = recording.averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
@@ -79,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         "rejected": estimator.filter.rejected,
         "problems": dict.fromkeys((*recording.notes, *(f.text for f in findings)), 1) | result.problems,
         "findings": [finding.kind for finding in findings],
+        "calibration": None if correction is None else {"scale": correction.accel_scale, "offset": correction.accel_offset},
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
     if recording.orientation is not None:
