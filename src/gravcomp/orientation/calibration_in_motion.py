@@ -25,11 +25,12 @@ _FEWEST = 10  # windows
 _NOISE = 0.1  # m/s^2, of the mean over a window
 _STILL = np.radians(1.0)  # rad/s: a window whose rate varies less shows the gyroscope's offset
 _LARGEST_OFFSET = np.radians(5.0)  # rad/s
-_SPREAD = 0.5  # of a direction: gravity's directions in the sensor that lie closer together determine no offset
+_PASSES = 3  # the noise follows from the residuals of the pass before
+_KNOWN = 0.4  # of the prior: an offset that is less certain is not determined
 
 
 def calibrate_in_motion(recording: Recording, gravity: float = 9.81) -> ImuCalibration:
-    """Return scale and offset of the accelerometer (3,) each. Raises CalibrationError where the sensor hardly turns."""
+    """Return scale and offset of the accelerometer (3,) each. Raises CalibrationError where the motion does not determine them."""
     from scipy.optimize import least_squares
 
     period = 1.0 / recording.rate
@@ -50,19 +51,26 @@ def calibrate_in_motion(recording: Recording, gravity: float = 9.81) -> ImuCalib
         turned += matrix / count
         by_axis += matrix * accel[:, k, None, :] / count
         attitude = attitude * Rotation.from_rotvec(gyro[:, k] * period)
-    # Directions of gravity in the sensor, at the middle of each window.
-    direction = accel.mean(axis=1) / np.linalg.norm(accel.mean(axis=1), axis=1, keepdims=True)
-    if np.linalg.norm(direction - direction.mean(axis=0), axis=1).max() < _SPREAD:
-        raise CalibrationError(f"{recording.source}: the sensor hardly turns; turn it in all directions to calibrate it")
 
-    def residuals(unknown: np.ndarray) -> np.ndarray:
-        scale, product = unknown[:3], unknown[3:]
-        length = np.linalg.norm(by_axis @ scale - turned @ product, axis=1)
-        return np.concatenate([_soft((length - gravity) / _NOISE), (scale - 1.0) / SCALE_PRIOR, product / OFFSET_PRIOR])
+    def excess(unknown: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(by_axis @ unknown[:3] - turned @ unknown[3:], axis=1) - gravity
 
-    found = least_squares(residuals, np.r_[np.ones(3), np.zeros(3)]).x
-    scale = found[:3]
-    return ImuCalibration(tuple(scale.tolist()), tuple((found[3:] / scale).tolist()))
+    def residuals(unknown: np.ndarray, noise: float) -> np.ndarray:
+        priors = (unknown[:3] - 1.0) / SCALE_PRIOR, unknown[3:] / OFFSET_PRIOR
+        return np.concatenate([_soft(excess(unknown) / noise), *priors])
+
+    unknown, noise = np.r_[np.ones(3), np.zeros(3)], _NOISE
+    for _ in range(_PASSES):
+        solution = least_squares(residuals, unknown, args=(noise,))
+        unknown = solution.x
+        noise = max(_NOISE, float(1.48 * np.median(np.abs(excess(unknown)))))
+    std = np.sqrt(np.diag(np.linalg.inv(solution.jac.T @ solution.jac)))[3:]
+    if std.max() > _KNOWN * OFFSET_PRIOR:
+        raise CalibrationError(
+            f"{recording.source}: its motion determines the offset of the accelerometer to {std.max():.2f} m/s^2 only;"
+            " turn the sensor slowly in all directions to calibrate it"
+        )
+    return ImuCalibration(tuple(unknown[:3].tolist()), tuple((unknown[3:] / unknown[:3]).tolist()))
 
 
 def calibrated(recording: Recording, correction: ImuCalibration) -> Recording:
