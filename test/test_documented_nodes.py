@@ -59,6 +59,7 @@ def test_a_bag_is_replayed(type_in, folder, own_domain, line):
         "ros2 run gravcomp_estimation imu_estimator --ros-args -p use_sim_time:=true",
         "ros2 run gravcomp_fem fem_simulator",
         "ros2 run gravcomp_fem inverse_controller",
+        "ros2 run gravcomp_fem composed_loop --ros-args -p robot:=article -p imu_estimator:prediction.horizon_ms:=10.0",
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",

@@ -57,10 +57,12 @@ def test_files_of_other_kinds_are_refused(tmp_path):
     (tmp_path / "text.npz").write_text("hello")
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.csv").write_text("1,2")
+    (tmp_path / "a.jpg").write_text("")
     for name, words in (
         ("text.npz", "is not an .npz"),
         ("folder", "is not a bag"),
-        ("a.csv", "neither"),
+        ("a.csv", "lacks a rate and a specific force"),
+        ("a.jpg", "of no known kind"),
         ("none", "does not exist"),
     ):
         with pytest.raises(RecordingError, match=words):

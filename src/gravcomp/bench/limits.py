@@ -164,6 +164,9 @@ ROWS = {
     "graph": (
         Row("delay_ms.median", "delay from IMU frame to the current frame that it caused, median", "ms", 8.0),
         Row("delay_ms.p99", "delay from IMU frame to the current frame that it caused, 99th percentile", "ms", 25.0),
+        Row("composed.delay_ms.median", "the same with the inner nodes in one process, median", "ms"),
+        Row("composed.less_pct.median", "delay with the inner nodes in one process, by how much less, median", "%", 30.0, True),
+        Row("composed.commands_hz", "commands followed with the inner nodes in one process, slowest run", "Hz", 99.0, True),
         Row("bridge_cpu", "CPU load of the bridge with six motors at 500 Hz feedback, share of a core", "", 0.5),
         Row(
             "two_robots_hz.slower",

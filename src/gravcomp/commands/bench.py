@@ -43,6 +43,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "messages": (1_000_000, "number of malformed and hostile messages"),
         "seed": (1, "seed of the messages and of the virtual robot"),
     },
+    "graph": {"composed": (False, "compare the delay with the inner nodes in one process with that as processes")},
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "loads": {"seeds": (3, "number of seeds of the virtual robot")},
