@@ -19,21 +19,22 @@ from gravcomp.launcher.domain import reserve_domain
 pytestmark = [pytest.mark.graph, pytest.mark.timeout(900)]
 
 APART = reserve_domain()
+SHORTEST = "--duration 10"
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 
 def test_an_own_robot_is_demonstrated(type_in):
-    code, output = type_in("./gravcomp demo --robot src/examples/own_robot.yaml", "--duration 12")
+    code, output = type_in("./gravcomp demo --robot src/examples/own_robot.yaml", SHORTEST)
     assert code == 0 and "sag without compensation" in output, output
 
 
 def test_a_robot_with_joints_is_demonstrated(type_in):
-    code, output = type_in("./gravcomp demo --robot src/examples/joint_robot.yaml --headless", "--duration 12")
+    code, output = type_in("./gravcomp demo --robot src/examples/joint_robot.yaml --headless", SHORTEST)
     assert code == 0 and "sag without compensation" in output and "joint_bridge" in output, output
 
 
 def test_the_firmware_is_the_board_of_a_demonstration(type_in):
-    code, output = type_in("./gravcomp demo --board emulated", "--headless --duration 12")
+    code, output = type_in("./gravcomp demo --board emulated", f"--headless {SHORTEST}")
     assert code == 0 and "sag without compensation" in output, output
 
 

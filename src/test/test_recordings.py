@@ -78,6 +78,15 @@ def test_averaging_keeps_the_truth_at_the_end_of_each_window():
     assert recording.orientation.tolist() == [truth[2].tolist(), truth[5].tolist()]
 
 
+def test_the_beginning_of_a_recording_has_its_first_seconds():
+    stamp = 5 * 10**9 + np.arange(7) * 10**9
+    truth = np.arange(28.0).reshape(7, 4)
+    recording = Recording("x", stamp, np.arange(21.0).reshape(7, 3), np.ones((7, 3)), orientation=truth).beginning(2.0)
+    assert recording.stamp_ns.tolist() == stamp[:3].tolist()
+    assert recording.gyro[-1].tolist() == [6.0, 7.0, 8.0] and recording.accel.shape == (3, 3)
+    assert recording.orientation.tolist() == truth[:3].tolist() and recording.movement is None
+
+
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_rosbag_gives_samples_temperature_and_truth_by_their_stamps(tmp_path, storage):
     recording = read_recording(write_bag(tmp_path / "bag", storage))

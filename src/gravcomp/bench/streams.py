@@ -10,8 +10,8 @@ from gravcomp.bench.stream_faults import FAULTS, Fault
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
 from gravcomp.orientation.errors import CalibrationError
-from gravcomp.recordings.imu import Recording, read_recording
-from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
+from gravcomp.recordings.imu import Recording
+from gravcomp.recordings.imu.broad_folder import WHERE, broad_trials
 from gravcomp.stream_checks import StreamMonitor, check_recording, converted
 
 
@@ -21,10 +21,9 @@ def run(progress: Callable[[str], None], *, seed: int = 1, every: int = 1) -> di
     Every `every`-th trial at 95.2 Hz. `trials`: error of each trial and kinds that are found; `not_calibrated`: trials
     that turn too little to be calibrated from themselves.
     """
-    files = broad_files()[::every]
-    if not files:
+    recordings = {name: trial.averaged(3) for name, trial in broad_trials(every).items()}
+    if not recordings:
         return {"broad": f"no recordings found. {WHERE}"}
-    recordings = {file.stem: read_recording(file).averaged(3) for file in files}
     clean = {name: rmse_deg(estimate_recording(r).orientation, r) for name, r in recordings.items()}
     figures: dict = {
         "false_reports": sum(len(check_recording(r)) for r in recordings.values()),
