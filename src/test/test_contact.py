@@ -167,7 +167,7 @@ def test_a_target_behind_a_wall_gives_the_nearest_shape_and_names_the_wall(model
     for _ in range(60):
         command = controller.step(
             shape.response, behind, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02,
-            followed=shape.is_equilibrium, contact=shape.contacts.sentence,
+            followed=shape.is_equilibrium, contact=shape.contacts.by_obstacle(),
         )  # fmt: skip
         shape = simulator.step(G, command.displacement)
     assert command.code == ControllerCode.CONTACT
