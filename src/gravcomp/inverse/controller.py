@@ -6,6 +6,7 @@ the result. The model takes the displacements with the next sample of gravity, s
 `retreat` recovers from states in which the iteration does not get closer to the target.
 """
 
+import dataclasses
 import time
 from typing import TYPE_CHECKING
 
@@ -80,6 +81,7 @@ class InverseController:
         self._retreat.reset()
         self._displacement: np.ndarray | None = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
+        self._missed, self._held = 0.0, False
 
     def step(
         self,
@@ -148,7 +150,7 @@ class InverseController:
                 backbone_station=backbone_station,
                 interval=interval,
                 damping=self._damping.factor,
-                options=options,
+                options=self._options_at(len(forces) > 0 or self._held),
                 least_tension=self._least_tension(),
                 couplings=self._couplings,
                 around=rows_of(demands),
@@ -188,6 +190,7 @@ class InverseController:
         missed = max(
             errors.distance * (target.tip_position_weight > 0.0), backbone_missed(result.effector, target, backbone_station)
         )
+        self._missed, self._held = missed, around.holds
         code, message = evaluate(
             target=target,
             points_missed=missed,
@@ -213,6 +216,18 @@ class InverseController:
             forces=forces,
             solve_time=time.perf_counter() - started,
         )
+
+    def _options_at(self, held: bool) -> InverseOptions:
+        """Return the options of a step; held: what is around the robot may keep it from its target.
+
+        Then the nearest shape is sought also along the robot, by as much as the last step missed the target by more than the
+        tolerance: otherwise the cables would pull the robot together to come a little nearer across it.
+        """
+        options, tolerance = self.options, self.options.tolerance_of(self.robot.length)
+        if not held or self._missed <= tolerance:
+            return options
+        share = min(1.0, self._missed / tolerance - 1.0)
+        return dataclasses.replace(options, axial_weight=options.axial_weight + share * (1.0 - options.axial_weight))
 
     @property
     def _slack(self) -> float:

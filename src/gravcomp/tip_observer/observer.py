@@ -85,13 +85,13 @@ class TipObserver:
         self._last_used = self._last_stamp = -np.inf
         self._refusal, self._in_a_row = "", 0
         self._largest_sag = 0.0
+        self._motion = MotionCheck(self._length, options.std, options.response)
+        self._agreed: ErrorFilter | None = None  # estimate while measured and modelled tip moved alike
         self._equal, self._last_position = 0, np.full(3, np.nan)
         self._restart()
 
     def _restart(self) -> None:
         """Forget the estimate."""
-        self._motion = MotionCheck(self._length, self.options.std, self.options.response)
-        self._agreed: ErrorFilter | None = None  # estimate while measured and modelled tip moved alike
         self._filter = ErrorFilter(0.1 * self._allowed, self.options.model_error)
         self._before: Prediction | None = None  # of the last accepted measurement
         self._outliers: list[np.ndarray] = []
@@ -211,6 +211,7 @@ class TipObserver:
             pairs = self._pairs
             self._restart()
             self._pairs = pairs  # until the motion agrees again
+            self._motion.forget()
             return axes
         if far:
             return wild(measured, modelled, self._length, self._allowed)
