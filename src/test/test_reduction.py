@@ -390,8 +390,7 @@ def test_contact_of_the_reduced_model_is_that_of_the_full_one(built, friction):
     assert own.names == pressing.names == ("table",)
     assert own.force == pytest.approx(pressing.force, rel=5e-2)  # little training
     slid, own_slid = (
-        after.contacts.position[-1] - before.contacts.position[-1]
-        for before, after in ((full, full_moved), (reduced, moved))
+        after.contacts.position[-1] - before.contacts.position[-1] for before, after in ((full, full_moved), (reduced, moved))
     )
     if friction:
         assert not moved.contacts.sliding.any() and not full_moved.contacts.sliding.any()

@@ -70,9 +70,7 @@ class Contacts:
     def none() -> "Contacts":
         """Return no contact."""
         whole, points = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        return Contacts(
-            whole, np.zeros(0), points, points, points, np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros((0, 0))
-        )
+        return Contacts(whole, np.zeros(0), points, points, points, np.zeros(0), np.zeros(0, dtype=np.bool_), np.zeros((0, 0)))
 
     def __len__(self) -> int:
         """Return the number of places."""

@@ -38,10 +38,10 @@ NEAR, TOUCHED = 0.02, 1e-3
 class FullContact:
     """Contact of a model with a scene. Remembers the forces at the places as guesses for the next solution.
 
-    Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m, nearer places are candidates; rubbing: whether any obstacle
-    has friction; allowed: depth in m by which obstacles are lowered, for loads applied in steps; of the last
-    solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of contact hold; longest: largest step
-    in m that cannot pass over an obstacle.
+    Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
+    nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
+    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of
+    contact hold; longest: largest step in m that cannot pass over an obstacle.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -165,9 +165,7 @@ class FullContact:
             names=tuple(self.scene.names[self.arrays.obstacle[k]] for k in row),
         )
 
-    def _keep(
-        self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray
-    ) -> None:
+    def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray) -> None:
         if not len(places.row):
             self._force[:], self.settled = 0.0, True
         self._last, self.pull = (places, forces, held, by_tension), pull

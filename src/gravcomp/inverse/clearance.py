@@ -1,8 +1,9 @@
 """Where the robot's surface is near obstacles or zones, and how the tensions change its distance from them.
 
 The backbone between the observed points is the cubic through the four nearest ones. A section is a disc across it, as large as
-the robot there; its nearest point is on its edge (`contact.places`), or, next to something that is smaller, within. A tension moves that point with the middle c of the section and
-turns it about c: with the tangent t of the backbone, d = t / |t|, the normal n and the point rho = x - c,
+the robot there; its nearest point is on its edge (`contact.places`), or, next to something that is smaller, within. A tension
+moves that point with the middle c of the section and turns it about c: with the tangent t of the backbone, d = t / |t|, the
+normal n and the point rho = x - c,
 
     gap' = n . c' - (n . d) rho . t' / |t|.
 
@@ -119,7 +120,7 @@ def _section(
 ) -> None:  # fmt: skip
     """Write the weights (n,) of the points (n, 3) at `place` m and their slopes (n,) in 1/m, the section p, f_1, f_2, and p'."""
     count = min(_NODES, len(node))
-    first = min(max(np.searchsorted(node, place) - count // 2, 0), len(node) - count)
+    first = int(min(max(int(np.searchsorted(node, place)) - count // 2, 0), len(node) - count))
     weight[:], slope[:] = 0.0, 0.0
     for i in range(first, first + count):
         value, change = 1.0, 0.0

@@ -137,9 +137,7 @@ class InverseController:
         if move != Move.ONWARD:
             return self._recovery_command(move, followed, response, target, previous, tension, interval, started)
         forces = ObstacleForces.none() if contact is None else contact
-        demands = self._surroundings.demands(
-            response, tension, backbone_station, gravity, forces, options.max_contact_force
-        )
+        demands = self._surroundings.demands(response, tension, backbone_station, gravity, forces, options.max_contact_force)
         try:
             programme = build_programme(
                 response,

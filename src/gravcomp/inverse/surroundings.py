@@ -158,7 +158,13 @@ class Surroundings:
             moved = np.concatenate([np.zeros_like(moved[:1]), moved])
         arrays = scene.arrays if gravity is None else scene.under_gravity(gravity)
         found: Nearby = nearby(
-            arrays, self._surface, node, np.ascontiguousarray(points), np.ascontiguousarray(moved), _WITHIN * self._length, _PLACES
+            arrays,
+            self._surface,
+            node,
+            np.ascontiguousarray(points),
+            np.ascontiguousarray(moved),
+            _WITHIN * self._length,
+            _PLACES,
         )
         moves = self._strongest * np.abs(found.change).sum(axis=1) > _DISTANCE * self._length
         return Nearby(*(part[moves] for part in found))

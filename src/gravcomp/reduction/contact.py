@@ -71,9 +71,7 @@ class ReducedContact:
             full.rubbing, full.margin,
         )  # fmt: skip
 
-    def keep(
-        self, touching: Touching, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray
-    ) -> None:
+    def keep(self, touching: Touching, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray) -> None:
         """Keep what a step has found."""
         self._force, self._pull = touching.force, touching.pull
         self._last = places, forces, held, by_tension
@@ -93,8 +91,7 @@ def tracked_touching(
 ) -> tuple[
     bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray, np.ndarray,
 ]:  # fmt: skip
-    """Return what `tracking._tracked` returns, then the places, and there forces (c, 3), states (c,), and changes (c, m) of the
-    normal forces by the tensions.
+    """Return what `tracking._tracked` returns, then places, their forces (c, 3) and states (c,), and changes by tension (c, m).
 
     Writes the memory of `touching`.
     """

@@ -68,9 +68,7 @@ class Scene:
         Points and normals are in soft_base. arrays: of `turned` or `under_gravity`, default: those of the horizontal robot.
         Without obstacles the gap is infinite and the number -1.
         """
-        return nearest_of_all(
-            self.arrays if arrays is None else arrays, np.ascontiguousarray(points, dtype=float).reshape(-1, 3)
-        )
+        return nearest_of_all(self.arrays if arrays is None else arrays, np.ascontiguousarray(points, dtype=float).reshape(-1, 3))
 
     def refuse_other_units(self, length: float) -> None:
         """Raise ConfigError for a surface of a size that does not suit a robot of this length in m, but would in m or mm."""

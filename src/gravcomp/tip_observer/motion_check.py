@@ -1,8 +1,9 @@
 """Does the measured tip move as the model's does? Where a scene is wrong, or something unknown is in the way, it does not.
 
 Both are compared with where they were when they last agreed. They agree while their ways differ by less than half of the longer
-one, and disagree where the difference is larger than that and than noise explains. A robot that stands still while its model moves on is held by something: a correction of the target by the difference
-would press it on, farther with every measurement. A robot that moves while its model leans on an obstacle is not held by it.
+one, and disagree where the difference is larger than that and than noise explains. A robot that stands still while its model
+moves on is held by something: a correction of the target by the difference would press it on, farther with every measurement. A
+robot that moves while its model leans on an obstacle is not held by it.
 """
 
 import enum

@@ -28,7 +28,7 @@ class WrongSceneCase:
 
 @dataclass(frozen=True)
 class WrongSceneOutcome:
-    """True force of the wall, largest and at the end, N; deviation of the true tip at the end, m; what the loop says at any time."""
+    """True force of the wall in N, largest and at the end; ripple in m: of the true tip at the end; what the loop said."""
 
     peak: float
     force: float
