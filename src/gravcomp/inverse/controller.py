@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 # Of the robot's length: farthest that the winches may move the tip in a step. The linear response is not valid farther, and the
 # model would have to search for the next shape. It counts after a pause between two steps; otherwise the winches are slower.
 _FARTHEST = 0.1
+_MORE_ENERGY = 30.0  # times the energy's weight where what is around the robot keeps it from its target
 _LONGEST_INTERVAL = 0.1  # s in which cables are paid out in one step after a pause
 
 
@@ -225,7 +226,11 @@ class InverseController:
         if not held or self._missed <= tolerance:
             return options
         share = min(1.0, self._missed / tolerance - 1.0)
-        return dataclasses.replace(options, axial_weight=options.axial_weight + share * (1.0 - options.axial_weight))
+        return dataclasses.replace(
+            options,
+            axial_weight=options.axial_weight + share * (1.0 - options.axial_weight),
+            energy_weight=options.energy_weight * _MORE_ENERGY**share,
+        )
 
     @property
     def _slack(self) -> float:

@@ -1,17 +1,19 @@
 """Does the measured tip move as the model's does? Where a scene is wrong, or something unknown is in the way, it does not.
 
 Both are compared with where they were when they last agreed. They agree while their ways differ by less than half of the longer
-one, and disagree where the difference is larger than that and than noise explains. A robot that stands still while its model
-moves on is held by something: a correction of the target by the difference would press it on, farther with every measurement. A
-robot that moves while its model leans on an obstacle is not held by it.
+one, and disagree where the difference is larger than that and than noise explains. A robot that does not move while its model
+moves on is held by something: a correction of the target by the difference would press it on, farther with every measurement.
+A robot that moves while its model leans on an obstacle is not held by it.
 """
 
+import collections
 import enum
 
 import numpy as np
 
-_WAY = 0.02  # of the robot's length, and
-_DEVIATIONS = 6.0  # standard deviations of a measurement: ways that count
+_MEAN = 5  # measurements whose mean is compared
+_WAY = 0.01  # of the robot's length, and
+_DEVIATIONS = 6.0  # standard deviations of such a mean: ways that count
 _DIFFERENCE = 0.5  # of the longer way
 _LEAST = 3  # measurements, and
 _LAGS = 3.0  # times by which the robot follows late: how long they have to disagree
@@ -33,12 +35,13 @@ class MotionCheck:
 
     def __init__(self, length: float, std: float, lag: float):
         """length of the robot in m; std in m: of a measurement; lag in s: by how much the robot may follow late."""
-        self._way, self._time = max(_WAY * length, _DEVIATIONS * std), _LAGS * lag
+        self._way, self._time = max(_WAY * length, _DEVIATIONS * std / _MEAN**0.5), _LAGS * lag
         self.forget()
 
     def forget(self) -> None:
         """Begin again at the next measurement."""
         self._agreed: tuple[np.ndarray, np.ndarray] | None = None
+        self._last: collections.deque[tuple[np.ndarray, np.ndarray]] = collections.deque(maxlen=_MEAN)
         self.agrees = True
         self._began()
 
@@ -48,6 +51,10 @@ class MotionCheck:
 
     def observe(self, time: float, measured: np.ndarray, modelled: np.ndarray, touching: bool) -> Disagreement:
         """Take tips (3,) in m at `time` (s); touching: the model leans on an obstacle. Return what they show."""
+        self._last.append((measured, modelled))
+        if len(self._last) < _MEAN:
+            return Disagreement.NONE
+        measured, modelled = (np.mean(tips, axis=0) for tips in zip(*self._last))
         if self._agreed is None:
             self._agreed = measured, modelled
         own, foreseen = measured - self._agreed[0], modelled - self._agreed[1]
