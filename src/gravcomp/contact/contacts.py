@@ -78,14 +78,16 @@ class Contacts:
 
     def by_obstacle(self) -> ObstacleForces:
         """Return what presses on each obstacle that is touched."""
+        if not len(self):
+            return ObstacleForces.none()
         numbers = np.unique(self.obstacle)
         force, own = self.normal_force, [np.flatnonzero(self.obstacle == number) for number in numbers]
         strongest = [places[np.argmax(force[places])] for places in own]
         return ObstacleForces(
             names=tuple(self.names[k] for k in strongest),
             force=np.array([force[places].sum() for places in own]),
-            position=self.position[strongest].reshape(-1, 3),
-            change=np.array([self.by_tension[places].sum(axis=0) for places in own]).reshape(-1, self.by_tension.shape[1]),
+            position=self.position[strongest],
+            change=np.array([self.by_tension[places].sum(axis=0) for places in own]),
         )
 
     @property

@@ -1,9 +1,10 @@
 """Does the measured tip move as the model's does? Where a scene is wrong, or something unknown is in the way, it does not.
 
-Both are compared with where they were when they last agreed. They agree while their ways differ by less than half of the longer
-one, and disagree where the difference is larger than that and than noise explains. A robot that does not move while its model
-moves on is held by something: a correction of the target by the difference would press it on, farther with every measurement.
-A robot that moves while its model leans on an obstacle is not held by it.
+Both are compared with where they were when they last agreed, or last were at rest apart from obstacles. They disagree where their
+ways differ by more than noise explains, and by half of the longer one; by a fifth where the model leans on an obstacle, as the
+robot may lean on it elsewhere. A robot that does not move while its model moves on is held by something: a correction of the
+target by the difference would press it on, farther with every measurement. A robot that moves while its model leans on an
+obstacle is not held by it.
 """
 
 import collections
@@ -14,7 +15,8 @@ import numpy as np
 _MEAN = 5  # measurements whose mean is compared
 _WAY = 0.01  # of the robot's length, and
 _DEVIATIONS = 6.0  # standard deviations of such a mean: ways that count
-_DIFFERENCE = 0.5  # of the longer way
+_DIFFERENCE, _TOUCHING = 0.5, 0.2  # of the longer way: apart from obstacles, and where the model leans on one
+_REST = 0.25  # of such a way: a model that moves less in these measurements is at rest
 _LEAST = 3  # measurements, and
 _LAGS = 3.0  # times by which the robot follows late: how long they have to disagree
 
@@ -41,6 +43,7 @@ class MotionCheck:
     def forget(self) -> None:
         """Begin again at the next measurement."""
         self._agreed: tuple[np.ndarray, np.ndarray] | None = None
+        self._leant = False  # whether the model leant on an obstacle there
         self._last: collections.deque[tuple[np.ndarray, np.ndarray]] = collections.deque(maxlen=_MEAN)
         self.agrees = True
         self._began()
@@ -55,16 +58,18 @@ class MotionCheck:
         if len(self._last) < _MEAN:
             return Disagreement.NONE
         measured, modelled = (np.mean(tips, axis=0) for tips in zip(*self._last))
-        if self._agreed is None:
-            self._agreed = measured, modelled
+        at_rest = max(float(np.linalg.norm(tip - modelled)) for _, tip in self._last) < _REST * self._way
+        if self._agreed is None or (self._leant and at_rest and not touching):
+            self._agreed, self._leant = (measured, modelled), touching
         own, foreseen = measured - self._agreed[0], modelled - self._agreed[1]
         moved, expected = float(np.linalg.norm(own)), float(np.linalg.norm(foreseen))
         longer = max(moved, expected)
-        difference, alike = float(np.linalg.norm(own - foreseen)), _DIFFERENCE * longer
-        self.agrees = difference < max(alike, _DIFFERENCE * self._way)
-        if difference < max(alike, self._way):
-            if self.agrees and longer > self._way:
-                self._agreed = measured, modelled
+        difference = float(np.linalg.norm(own - foreseen))
+        allowed = max((_TOUCHING if touching else _DIFFERENCE) * longer, self._way)
+        self.agrees = difference < 0.5 * allowed
+        if difference < allowed:
+            if difference < 0.5 * _TOUCHING * longer:
+                self._agreed, self._leant = (measured, modelled), touching
             self._began()
             return Disagreement.NONE
         if self._count == 0:

@@ -1,4 +1,4 @@
-"""A robot whose target is behind a wall, which is not where the model's scene has it."""
+"""A robot whose target is behind a wall that is not where the model's scene has it."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -8,13 +8,14 @@ import numpy as np
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
-from gravcomp.inverse import Target
+from gravcomp.inverse import Target, straight_target
 from gravcomp.scene import PlaneWall, SceneSection
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 _GAP, _BEHIND = 0.06, 0.05  # of the robot's length: from the straight robot to the modelled wall, and from there to the target
-_HELD, _LAST = 10.0, 2.0  # s, and the part of it in which the robot should be at rest
+# s: straight, then at the wall; the part of it in which the robot should be at rest
+_STRAIGHT, _HELD, _LAST = 4.0, 10.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class WrongSceneOutcome:
 
 
 def run_wrong_scene(job: tuple[Setup, WrongSceneCase]) -> WrongSceneOutcome:
-    """Lead the tip of a horizontal robot to a target below a plane."""
+    """Hold a horizontal robot straight, then lead its tip to a target below a plane."""
     setup, case = job
     length, radius = setup.robot.length, 0.5 * setup.robot.segments[-1].outer_diameter
     below = radius + _GAP * length
@@ -54,6 +55,9 @@ def run_wrong_scene(job: tuple[Setup, WrongSceneCase]) -> WrongSceneOutcome:
         controller=dataclasses.replace(setup.controller, inverse=inverse),
     )
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)), tracker=case.tracker)
+    loop.hold(straight_target(length))
+    loop.run(_STRAIGHT)
+    loop.forget()
     loop.hold(Target(np.array([-(_GAP + _BEHIND) * length, 0.0, 0.98 * length])))
     begin, sentences = loop.time, []
     while loop.time < begin + _HELD:
