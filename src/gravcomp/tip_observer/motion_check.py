@@ -79,7 +79,7 @@ class MotionCheck:
         if self._count < _LEAST or time - self._since < self._time:
             return Disagreement.NONE
         if self._kind is Disagreement.LOOSE and not touching:  # a load, or a tracker that was moved
-            self._agreed = measured, modelled
+            self._agreed, self._leant = (measured, modelled), False
             self._began()
             return Disagreement.NONE
         ways = f"the model's tip has moved by {1e3 * expected:.1f} mm, the measured one by {1e3 * moved:.1f} mm"
