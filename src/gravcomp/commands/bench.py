@@ -43,7 +43,10 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "messages": (1_000_000, "number of malformed and hostile messages"),
         "seed": (1, "seed of the messages and of the virtual robot"),
     },
-    "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
+    "robots": {
+        "loop": (False, "measure the loop on each robot's virtual robot instead of its model"),
+        "again": (False, "measure again what was measured before with the same robots and the same program"),
+    },
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},
