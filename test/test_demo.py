@@ -52,8 +52,10 @@ def check_compensation(figures: dict) -> None:
     assert set(figures["nodes"]) == set(LOOP) and set(figures["nodes"].values()) == {"active"}
     assert figures["sag_mm"] > 20.0
     assert figures["residual_lateral_mm"] < figures["sag_mm"] / 5.0
-    assert figures["command_rate_hz"] == pytest.approx(figures["imu_rate_hz"], rel=0.02)
-    assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.02)
+    # One command a sample. A loop that leaves out every second sample has half the rate, one on a loaded machine a little less;
+    # `bench graph` measures the rate.
+    assert 0.7 * figures["imu_rate_hz"] < figures["command_rate_hz"] < 1.02 * figures["imu_rate_hz"]
+    assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.1)
     assert figures["gravity_error_deg"] < 2.0
     assert figures["delay_ms"]["median"] > 0.0
 
