@@ -29,7 +29,7 @@ def material_result(test: MaterialTest, fit: SeriesFit, written: str) -> Result:
         name="calibration",
         title="Calibration of the material",
         question=f"Prony series from the {test.what} in {test.source}; written to {written}.",
-        ground="A Maxwell branch for each term, beside the long-term stiffness. Intervals hold at 95 %.",
+        ground="A Maxwell branch for each term, in addition to the long-term stiffness. Intervals hold at 95 %.",
         figures=[
             Figure(f"{test.what}: what remains after the fit, RMS", 100.0 * fit.error, "%"),
             Figure("terms", len(fit.terms), ""),
