@@ -86,7 +86,11 @@ class Ros2:
 
     def subscribers(self, topic: str) -> set[str]:
         """Return the names of the nodes that subscribe to a topic."""
-        return {found.node_name for found in self._node.get_subscriptions_info_by_topic(topic)}
+        return {found.node_name for found in self.subscriptions(topic)}
+
+    def subscriptions(self, topic: str) -> list:
+        """Return what the graph knows of the subscriptions of a topic."""
+        return self._node.get_subscriptions_info_by_topic(topic)
 
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)
