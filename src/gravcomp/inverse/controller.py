@@ -7,10 +7,12 @@ the result. The model takes the displacements with the next sample of gravity, s
 """
 
 import dataclasses
+import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 
 from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.description import Robot
@@ -67,6 +69,7 @@ class InverseController:
         self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
         rows = self._couplings.rows
         self._coupled = rows.any(axis=0) if len(rows) else np.zeros(len(robot.cables), bool)  # (m,)
+        self._least: tuple[float, np.ndarray] | None = None  # the option `pretension`, and the bounds that follow from it
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length, robot.limits.tension_max)
@@ -239,8 +242,7 @@ class InverseController:
 
     def _longest_interval(self, response: "Response") -> float:
         """Return the time in s in which no winch alone moves the tip farther than `_FARTHEST` of the length."""
-        ratio = np.linalg.norm(response.compliance_ea[:3], axis=0) / np.diag(response.compliance_aa)  # tip over cable
-        speed = self.robot.limits.displacement_rate * float(ratio.max(initial=0.0))
+        speed = self.robot.limits.displacement_rate * _tip_over_cable(response.compliance_ea, response.compliance_aa)
         return _FARTHEST * self.robot.length / speed if speed > 0.0 else _LONGEST_INTERVAL
 
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
@@ -257,9 +259,11 @@ class InverseController:
 
         A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
         """
-        limits, option = self.robot.limits, self.options.pretension
-        own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
-        return np.where(self._coupled, 0.0, np.maximum(own, limits.tension_min))
+        option = self.options.pretension
+        if self._least is None or self._least[0] != option:
+            own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
+            self._least = option, np.where(self._coupled, 0.0, np.maximum(own, self.robot.limits.tension_min))
+        return self._least[1]
 
     def _recovery_command(
         self,
@@ -322,6 +326,18 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
+
+
+@njit(cache=True)
+def _tip_over_cable(compliance_ea: np.ndarray, compliance_aa: np.ndarray) -> float:
+    """Return the largest motion of the tip over that of the cable which moves it, from the compliances (e, m) and (m, m)."""
+    largest = 0.0
+    for k in range(compliance_aa.shape[0]):
+        if not compliance_aa[k, k] > 0.0:
+            continue
+        moved = math.sqrt(compliance_ea[0, k] ** 2 + compliance_ea[1, k] ** 2 + compliance_ea[2, k] ** 2)
+        largest = max(largest, moved / compliance_aa[k, k])
+    return largest
 
 
 def _couplings(transmission: Transmission) -> Couplings:
