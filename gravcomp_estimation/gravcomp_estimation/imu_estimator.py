@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimate, GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
-from gravcomp.stream_checks import StreamMonitor
+from gravcomp.stream_checks import CounterStamps, StreamMonitor
 from gravcomp.thermal import HeaterControl
 from gravcomp_estimation import messages
 from gravcomp_estimation.status import Situation, evaluate
@@ -58,6 +58,7 @@ class ImuEstimator(ManagedNode):
         """Reset the estimator and subscribe."""
         self._estimator.reset()
         self._monitor = StreamMonitor(CHECKS_MEMORY)
+        self._counter = CounterStamps()
         self._estimate: GravityEstimate | None = None
         self._problem = Problem.NONE
         self._sample_time: float | None = None  # monotonic, s
@@ -133,8 +134,9 @@ class ImuEstimator(ManagedNode):
         self._sample_time = now
         stamp, gyro, accel = messages.sample_of(message)
         known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
-        estimate = self._estimator.update(stamp, gyro, accel, known)
-        self._monitor.add(stamp, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
+        continued = self._counter.continued(stamp)
+        estimate = self._estimator.update(continued, gyro, accel, known)
+        self._monitor.add(continued, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
         problem = estimate if isinstance(estimate, Problem) else estimate.imu.problem
         if problem is not Problem.NONE:
             self._problem, self._problem_time = problem, now
@@ -158,7 +160,7 @@ class ImuEstimator(ManagedNode):
             self._known, self._known_stamp_ns = (v.x, v.y, v.z), messages.stamp_ns(message.header)
 
     def _on_temperature(self, message: Temperature) -> None:
-        self._estimator.add_temperature(messages.stamp_ns(message.header), message.temperature)
+        self._estimator.add_temperature(messages.stamp_ns(message.header) + self._counter.passed, message.temperature)
         self._heater.update(time.monotonic_ns(), message.temperature)
 
     # Status and heater.
@@ -210,6 +212,7 @@ class ImuEstimator(ManagedNode):
             temperature_ready=heater.ready,
             rest=status.rest,
             rejected=status.rejected,
+            counter_wraps=self._counter.wraps,
             stream="; ".join(finding.text for finding in self._monitor.findings()),
         )
 

@@ -3,11 +3,12 @@
 from array import array
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseArray
+from geometry_msgs.msg import Point, Pose, PoseArray
 from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
+from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.inverse import Target, TargetError, bend_target
 from gravcomp.simulation import Response, Shape
 from gravcomp.view.backbone import Backbone
@@ -36,8 +37,23 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
     message.residual = float(shape.residual)
     message.error_estimate = float(shape.error_estimate)
     message.solve_time = float(shape.solve_time)
-    message.contact = shape.contacts.sentence
+    contact = shape.contacts.by_obstacle()
+    message.contact_obstacle = list(contact.names)
+    message.contact_force = doubles(contact.force)
+    message.contact_position = doubles(contact.position)
+    message.contact_force_change = doubles(contact.change)
     return message
+
+
+def contact_of(message: Deformation) -> ObstacleForces:
+    """Return the obstacles that a message names. Raises ValueError when its arrays do not match, or a number is not finite."""
+    count, cables = len(message.contact_obstacle), len(message.cable_tension)
+    return ObstacleForces(
+        names=tuple(message.contact_obstacle),
+        force=_matrix(message.contact_force, 1, count, "contact_force")[0],
+        position=_matrix(message.contact_position, count, 3, "contact_position"),
+        change=_matrix(message.contact_force_change, count, cables, "contact_force_change"),
+    )
 
 
 def response_of(message: Deformation) -> Response:
@@ -90,6 +106,12 @@ def bend_message(angle: float, plane: float, tip_direction_weight: float, frame:
     )
     message.header.frame_id = frame
     return message
+
+
+def point_message(position: np.ndarray) -> Point:
+    """Return a point; position (3,) in m."""
+    x, y, z = map(float, position)
+    return Point(x=x, y=y, z=z)
 
 
 def pose_message(position: np.ndarray, orientation: np.ndarray) -> Pose:

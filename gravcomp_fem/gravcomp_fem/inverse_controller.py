@@ -22,7 +22,7 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
-from gravcomp_fem.conversion import doubles, pose_target, response_of, seconds, shape_target
+from gravcomp_fem.conversion import contact_of, doubles, point_message, pose_target, response_of, seconds, shape_target
 from gravcomp_fem.tracker_input import TrackerInput
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
@@ -50,7 +50,8 @@ class InverseController(ManagedNode):
         # Compile before the first deformation arrives.
         robot, transmission = self.robot_file.robot, self._transmission()
         warm_up(robot, self.parameters.inverse, transmission)
-        self._problem = InverseProblem(robot, self.parameters.inverse, transmission)
+        file = self.robot_file
+        self._problem = InverseProblem(robot, self.parameters.inverse, transmission, file.scene, file.zones)
         self._tracker = TrackerInput(self, robot, self.parameters.frame)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
@@ -134,7 +135,7 @@ class InverseController(ManagedNode):
             self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
             return
         try:
-            response = response_of(message)
+            response, contact = response_of(message), contact_of(message)
         except ValueError as error:
             self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
             return
@@ -157,7 +158,8 @@ class InverseController(ManagedNode):
                 tension=message.cable_tension,
                 interval=interval,
                 followed=message.status != Deformation.NOT_CONVERGED,
-                contact=message.contact,
+                contact=contact,
+                gravity=np.array([message.gravity.x, message.gravity.y, message.gravity.z]),
             )
         else:
             self._publish_code(
@@ -258,20 +260,25 @@ class InverseController(ManagedNode):
         if code == self._published_code and 0.0 <= stamp - self._published_at < _STATUS_PERIOD:
             return
         self._published_code, self._published_at = code, stamp
-        self._status.publish(
-            ControllerStatus(
-                header=header,
-                code=int(code),
-                message=message,
-                distance=float(command.distance),
-                lateral=float(command.lateral),
-                axial=float(command.axial),
-                tilt=float(command.tilt),
-                solve_time=float(command.solve_time),
-                holdable=int(self._holdable),
-                hold_message=self._hold_message,
-            )
+        status = ControllerStatus(
+            header=header,
+            code=int(code),
+            message=message,
+            distance=float(command.distance),
+            lateral=float(command.lateral),
+            axial=float(command.axial),
+            tilt=float(command.tilt),
+            solve_time=float(command.solve_time),
+            holdable=int(self._holdable),
+            hold_message=self._hold_message,
+            nearest_tip=point_message(command.tip),
         )
+        if len(command.forces):
+            strongest = command.forces.largest
+            status.contact_obstacle = command.forces.names[strongest]
+            status.contact_force = float(command.forces.force[strongest])
+            status.contact_position = point_message(command.forces.position[strongest])
+        self._status.publish(status)
 
     def _with_refusal(self, code: ControllerCode, sentence: str) -> tuple[ControllerCode, str]:
         """Return the status to publish: a refusal stays visible for a while, also together with a repeated other status."""

@@ -41,6 +41,7 @@ class TrackerInput:
             np.array([q.x, q.y, q.z, q.w]),
             response,
             np.array(doubles(message.cable_tension)),
+            bool(message.contact_obstacle),
         )
 
     def corrected(self, target: Target, header: Header) -> Target:

@@ -7,9 +7,10 @@ import sys
 import numpy as np
 import pytest
 from geometry_msgs.msg import Pose
-from gravcomp_fem.conversion import deformation_message, pose_target, response_of, shape_target
+from gravcomp_fem.conversion import contact_of, deformation_message, pose_target, response_of, shape_target
 from std_msgs.msg import Header
 
+from gravcomp.contact.contacts import Contacts
 from gravcomp.inverse import TargetError
 from gravcomp.simulation import Response, Shape, ShapeStatus
 from gravcomp_msgs.msg import ShapeTarget
@@ -50,6 +51,24 @@ def test_the_response_survives_its_message_bit_for_bit(shape):
         assert np.array_equal(getattr(response, field.name), getattr(shape.response, field.name))
     assert (message.status, message.message, message.model) == (1, "beyond its range", "reduced")
     assert np.array_equal(np.reshape(message.backbone_position, (-1, 3)), shape.backbone_position)
+
+
+def test_what_the_robot_touches_survives_its_message(shape):
+    rng, cables = np.random.default_rng(2), len(shape.cable_tension)
+    contacts = Contacts(
+        obstacle=np.array([1, 0, 1]), station=np.array([0.4, 0.8, 1.0]), position=rng.normal(size=(3, 3)),
+        normal=np.tile([1.0, 0.0, 0.0], (3, 1)), force=np.array([[0.2, 0.0, 0.1], [0.3, 0.0, 0.0], [0.5, 0.0, 0.0]]),
+        gap=np.zeros(3), sliding=np.zeros(3, bool), by_tension=rng.normal(size=(3, cables)), names=("table", "ball", "table"),
+    )  # fmt: skip
+    message = deformation_message(dataclasses.replace(shape, contacts=contacts), Header())
+    found = contact_of(message)
+    assert found.names == ("ball", "table") and found.force == pytest.approx([0.3, 0.7])
+    assert np.array_equal(found.position, contacts.position[1:])
+    assert found.change == pytest.approx(np.stack([contacts.by_tension[1], contacts.by_tension[[0, 2]].sum(axis=0)]))
+    assert not len(contact_of(deformation_message(shape, Header())))
+    message.contact_force = [0.3]
+    with pytest.raises(ValueError, match="contact_force has 1 numbers; 1 x 2 are needed"):
+        contact_of(message)
 
 
 @pytest.mark.parametrize("field", ["compliance_aa", "compliance_ea", "cable_displacement_free", "effector_free"])
@@ -104,7 +123,7 @@ from std_msgs.msg import Header
 from gravcomp.description import load_robot_file
 from gravcomp.inverse import InverseController, bend_target, straight_target, warm_up
 from gravcomp.simulation import Simulator
-from gravcomp_fem.conversion import deformation_message, response_of
+from gravcomp_fem.conversion import contact_of, deformation_message, response_of
 
 def signatures():
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("gravcomp.inverse")]

@@ -50,6 +50,20 @@ def test_a_robot_that_fails_is_reported_and_the_others_go_on(short, tmp_path):
     assert [figure.reached for figure in figures] == [False, True] and math.isnan(figures[0].value)
 
 
+def test_what_was_measured_is_kept_until_the_robot_changes(short, tmp_path, monkeypatch):
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
+    count = iter(range(10))
+    monkeypatch.setattr(robots.robot_figures, "measure", lambda name, file, every: {name: next(count)})
+
+    def found(file, **options):
+        return robots.run(silent, files=[file], figures=["build_s"], **options)["robots"]["short"]["build_s"]
+
+    assert [found(short), found(short), found(short, every=2), found(short, again=True), found(short)] == [0, 0, 1, 2, 2]
+    stiffer = tmp_path / "stiffer.yaml"
+    stiffer.write_text(ROBOT.replace("youngs_modulus_mpa: 2", "youngs_modulus_mpa: 3"))
+    assert found(str(stiffer)) == 3
+
+
 def test_a_figure_that_does_not_exist_is_refused():
     with pytest.raises(ConfigError, match="allowed: mesh_error_pct"):
         robots.run(silent, figures=["speed"])

@@ -9,7 +9,7 @@ from gravcomp.bench.contact import scene_of, slender_rod
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file
-from gravcomp.inverse import ControllerCode, InverseController, Target
+from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target
 from gravcomp.references.contact_beams import over_peg
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -130,7 +130,9 @@ def test_contact_is_a_constraint_in_the_response_to_the_cables(model):
     step = np.array([0.0, 1e-4, 0.0, 2e-4, 0.0, 0.0])
     after = simulator.step(G, tension=tension + step)
     foreseen = base.response.compliance_ea[:3] @ step
-    assert len(base.contacts)
+    pressing, pressed = base.contacts.by_obstacle(), after.contacts.by_obstacle()
+    assert pressing.names == ("plane 1",)
+    assert pressed.force - pressing.force == pytest.approx(pressing.change @ step, rel=2e-2)
     assert after.tip_position - base.tip_position == pytest.approx(foreseen, abs=2e-2 * np.abs(foreseen).max())
 
 
@@ -160,16 +162,27 @@ def test_a_scene_that_leaves_no_room_for_the_robot_is_refused(model, kinds, mess
         in_scene(model, **kinds)
 
 
-def test_a_target_behind_a_wall_gives_the_nearest_shape_and_names_the_wall(model):
+def test_a_target_behind_a_wall_gives_the_nearest_shape_and_its_force_is_bounded(model):
+    """The message names the wall. With a bound on the force the robot, which leans on the wall already, presses less."""
     simulator = in_scene(model, planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
-    controller, shape = InverseController(model.robot), simulator.solve(G)
-    behind = Target(np.array([-0.02, 0.0, 0.095]))
-    for _ in range(60):
+    controller, shape = InverseController(model.robot, scene=simulator.scene), simulator.solve(G)
+    behind, forces, distances = Target(np.array([-0.02, 0.0, 0.095])), [], []
+    for step in range(85):
+        if step == 50:
+            controller.options = InverseOptions(max_contact_force=0.5 * forces[-1])
         command = controller.step(
             shape.response, behind, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02,
-            followed=shape.is_equilibrium, contact=shape.contacts.sentence,
+            followed=shape.is_equilibrium, contact=shape.contacts.by_obstacle(),
         )  # fmt: skip
         shape = simulator.step(G, command.displacement)
-    assert command.code == ControllerCode.CONTACT
-    assert "leans on 'table' at (" in command.message
-    assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
+        forces.append(shape.contacts.normal_force.sum())
+        distances.append(command.distance)
+        if step in (49, 84):
+            assert command.code == ControllerCode.CONTACT
+            assert "leans on 'table' at (" in command.message
+            assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
+            assert command.forces.names == ("table",) and command.forces.force == pytest.approx([forces[-1]], rel=1e-2)
+    assert forces[49] > 1e-3
+    assert distances[-1] < 1.05 * min(distances)  # the cables do not pull the robot together to come nearer across it
+    assert forces[-1] < 1.02 * controller.options.max_contact_force
+    assert "the force on 'table' is held; max_contact_force is" in command.message

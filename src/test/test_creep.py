@@ -8,6 +8,7 @@ import pytest
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Elements, Material, PronyTerm, load_robot_file
 from gravcomp.full_model.viscosity import Viscosity
+from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction.memory import Memory
 from gravcomp.simulation import RobotModel, Simulator
@@ -110,3 +111,19 @@ def test_a_memory_in_reduced_coordinates_is_that_of_the_body():
 def test_wrong_constants_are_refused_with_key_and_range(keys, found):
     with pytest.raises(ConfigError, match=found):
         from_mapping(Material, keys, source="robot.yaml", key="robot.segments[0].material")
+
+
+def test_a_nearly_incompressible_material_is_damped_as_a_less_incompressible_one_is():
+    """A large strain without change of volume has tr E > 0, which lambda alone would resist: 55 mu at a ratio of 0.499."""
+    stretch = 1.3
+    forces = []
+    for ratio in (0.45, 0.4999):
+        model = RobotModel(robot(poissons_ratio=ratio))
+        across = np.array([stretch**-0.5, stretch**-0.5, stretch]) - 1.0
+        u = model.mesh.nodes * across
+        strain = model.elements.strains(u)
+        viscous = ViscousStrain(np.ones(len(model.mesh.elements)), np.zeros_like(strain))
+        force = model.elements.internal_force(u, viscous) - model.elements.internal_force(u)
+        shear = 1.0 / (2.0 * (1.0 + ratio))  # over Young's modulus
+        forces.append(np.abs(force[model.mesh.tip, 2].sum()) / shear)
+    assert forces[1] == pytest.approx(forces[0], rel=1e-6)

@@ -9,6 +9,7 @@ from gravcomp.description import Cap, Elements, Material, MeshBody, Robot, Segme
 from gravcomp.mesh import MeshError, body_mesh, tube_mesh
 from gravcomp.mesh.embedding import embed
 from gravcomp.mesh.quality import mesh_quality
+from gravcomp.mesh.refinement import refined
 from gravcomp.mesh.sections import section_functionals
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -105,3 +106,20 @@ def test_quality_sees_a_distorted_element():
     nodes[mesh.elements[0, 6]] = nodes[mesh.elements[0, 0]] + 0.3 * (nodes[mesh.elements[0, 6]] - nodes[mesh.elements[0, 0]])
     bad = mesh_quality(dataclasses.replace(mesh, nodes=nodes))
     assert bad.jacobian_ratio < 0.1 and "distorted" in bad.advice[0]
+
+
+def test_divided_tetrahedra_have_the_same_surface_and_contain_the_same_shapes():
+    """A rounded element, divided: the same volume, and a quadratic displacement of the old nodes is that of the new ones."""
+    body = load_robot_file("mesh_body").robot
+    mesh = body_mesh(body)
+    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
+    mesh = dataclasses.replace(mesh, nodes=mesh.nodes * (1.0 + 5.0 * radius[:, None] * [1.0, 1.0, 0.0]))  # curved sides
+    finer = refined(mesh)
+    assert len(finer.elements) == 8 * len(mesh.elements)
+    assert len(np.unique(finer.nodes.round(12), axis=0)) == len(finer.nodes)
+    coarse_model, fine_model = (RobotModel(body, one) for one in (mesh, finer))
+    assert fine_model.body_weight.sum() == pytest.approx(coarse_model.body_weight.sum(), rel=1e-12)
+    some = finer.nodes[len(mesh.nodes) :: 29]
+    place = embed(mesh, some)
+    assert np.einsum("pc,pci->pi", place.weights, mesh.nodes[place.nodes]) == pytest.approx(some, abs=1e-9 * mesh.length)
+    assert (place.outside < 1e-9).all()

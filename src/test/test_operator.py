@@ -16,7 +16,7 @@ LINE = np.stack([np.zeros(50), np.zeros(50), np.linspace(0.0, 0.2, 50)], axis=1)
 
 def camera(*balls) -> Camera:
     tube = TubeWall(points=((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, 0.2)), radius=(0.015,))
-    return Camera(Scene(SceneSection(tubes=(tube,), spheres=balls)), LINE, np.radians(70.0))
+    return Camera(Scene(SceneSection(tubes=(tube,), spheres=balls)).arrays, LINE, np.radians(70.0))
 
 
 def test_a_place_in_the_picture_is_its_direction_from_the_tip():

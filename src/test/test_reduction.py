@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from coarse_article import SMALL, built_once, cache_of_the_run, coarse
 
+from gravcomp.bench.contact import scene_of
 from gravcomp.description import Fibres, PronyTerm
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError, tube_mesh
@@ -348,3 +349,34 @@ def test_motion_beyond_the_trained_range_is_handed_to_the_full_model_and_back(bu
         apart.append(np.linalg.norm(shape.tip_position - exact.step(g).tip_position))
     assert (models[5], models[15], models[-1]) == ("reduced", "full", "reduced")
     assert max(apart) < 1e-3 and apart[-1] < 0.1e-3
+
+
+@pytest.mark.parametrize("friction", [0.0, 2.0])
+def test_contact_of_the_reduced_model_is_that_of_the_full_one(built, friction):
+    """A robot that sags onto a plane: places, forces, how they change with the tensions, and a step along the plane."""
+    model, _ = built
+    wall = scene_of(planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [-5.5, 0, 0], "friction": friction}])
+    gravity, found = np.array([-9.81, 0.0, 0.0]), []
+    for reduced in (False, True):
+        simulator = Simulator(model, reduced=reduced, scene=wall)
+        simulator.solve(gravity)
+        for _ in range(3):  # what the basis lacks slides first
+            shape = simulator.step(gravity)
+        pressing = shape.contacts.by_obstacle()
+        moved = simulator.step(gravity + np.array([0.0, 0.05, 0.0]))
+        assert shape.model == moved.model == ("reduced" if reduced else "full")
+        assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
+        found.append((shape, pressing, moved))
+    (full, pressing, full_moved), (reduced, own, moved) = found
+    assert np.linalg.norm(reduced.tip_position - full.tip_position) < 1e-3 * model.length
+    assert own.names == pressing.names == ("table",)
+    assert own.force == pytest.approx(pressing.force, rel=5e-2)  # little training
+    slid, own_slid = (
+        after.contacts.position[-1] - before.contacts.position[-1] for before, after in ((full, full_moved), (reduced, moved))
+    )
+    if friction:
+        assert not moved.contacts.sliding.any() and not full_moved.contacts.sliding.any()
+        assert np.linalg.norm(own_slid) < 1e-4 * model.length
+    else:
+        assert own.change == pytest.approx(pressing.change, abs=0.2 * np.abs(pressing.change).max())
+        assert own_slid == pytest.approx(slid, abs=0.1 * np.linalg.norm(slid))

@@ -125,8 +125,9 @@ def test_obstacles_in_the_world_keep_their_place_when_the_robot_turns():
     table = scene(planes=[{"normal": [0, 0, 1], "point_mm": [0, 0, -50], "frame": "world"}])
     point = np.array([[-0.03, 0.0, 0.1]])
     assert table.nearest(point)[0] == pytest.approx([0.02])  # the robot is horizontal, x of soft_base points up
-    table.under_gravity(np.array([0.0, 0.0, 9.81]))  # hanging: z of soft_base points down... the table is 50 mm below the base
-    assert table.nearest(np.array([[0.0, 0.0, 0.04]]))[0] == pytest.approx([0.01])
+    hanging = table.under_gravity(np.array([0.0, 0.0, 9.81]))  # z of soft_base points down: the table is 50 mm below the base
+    assert table.nearest(np.array([[0.0, 0.0, 0.04]]), hanging)[0] == pytest.approx([0.01])
+    assert table.nearest(point)[0] == pytest.approx([0.02])  # what others have of the scene stays
     for gravity in np.random.default_rng(0).standard_normal((5, 3)):
         rotation = world_rotation(gravity)
         assert rotation @ gravity == pytest.approx([0, 0, -np.linalg.norm(gravity)], abs=1e-12)

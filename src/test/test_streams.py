@@ -14,7 +14,7 @@ from gravcomp.orientation.inclination import inclination_rmse
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
 from gravcomp.recordings.imu import RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
-from gravcomp.stream_checks import StreamMonitor, check_recording, in_si
+from gravcomp.stream_checks import CounterStamps, StreamMonitor, check_recording, in_si
 
 TRIAL = "05_undisturbed_slow_rotation_with_breaks_B"
 LENGTH = 45.0  # s of motion
@@ -127,3 +127,13 @@ def test_fast_motion_is_not_taken_for_spikes():
     signal = 10.0 * np.sin(2.0 * np.pi * 8.0 * 0.01 * np.arange(400))  # 8 Hz, 570 deg/s, at 100 Hz
     counted, count = gated(signal)
     assert count == 0 and (counted[20:] == signal[20:]).all()
+
+
+def test_a_counter_that_wraps_is_continued_live():
+    span, period = 2**32 * 1000, 10_000_000  # ns, of a counter of 32 bits in us
+    stamps = [(span - 55 * period // 10 + k * period) % span for k in range(20)]
+    counter = CounterStamps()
+    continued = np.array([counter.continued(stamp) for stamp in stamps])
+    assert (np.diff(continued) == period).all() and counter.wraps == 1
+    # A clock that is set back is no counter.
+    assert counter.continued(stamps[-1] - 5 * period) < continued[-1] and counter.wraps == 1

@@ -30,7 +30,7 @@ class Model:
 
     def __init__(self, observer: TipObserver):
         self.observer, self.time, self.tip = observer, START, REST
-        self.down, self.held = np.array([-1.0, 0.0, 0.0]), 0.0
+        self.down, self.held, self.touching = np.array([-1.0, 0.0, 0.0]), 0.0, False
 
     def run(self, duration: float, held: float | None = None) -> None:
         before, after = self.held, self.held if held is None else held
@@ -46,7 +46,7 @@ class Model:
                 displacement_free=np.array([-5e-4]),
                 effector_free=np.append(REST + sag, [0.0, 0.0, 1.0]),
             )
-            self.observer.predict(self.time, self.tip, UPRIGHT, response, np.array([self.held]))
+            self.observer.predict(self.time, self.tip, UPRIGHT, response, np.array([self.held]), self.touching)
             self.observer.corrected(straight_target(ROBOT.length), self.time)
 
     def measure(self, position: np.ndarray, late: float = 0.0, frame: str = "soft_base") -> bool:
@@ -129,6 +129,38 @@ def test_moved_tracker_begins_again() -> None:
     follow(made, np.array([-5e-3, 2e-3, 0.0]), 5.0, seed=1)
     assert made.status.restarts == 1
     np.testing.assert_allclose(made.status.offset, [-5e-3, 2e-3, 0.0], atol=0.5e-3)
+
+
+def test_a_robot_that_something_holds_is_not_pressed_on_by_the_correction() -> None:
+    """The model's tip rises by 6 mm, the robot's stays: it is not corrected by these 6 mm. Later it follows again."""
+    made, random = model(), np.random.default_rng(5)
+    made.run(0.5, held=1.0)
+    follow(made, np.array([1e-3, 0.0, 0.0]), 4.0)
+    held = made.tip + np.array([1e-3, 0.0, 0.0])
+    for step in range(30):
+        made.run(0.2, held=1.0 + 0.02 * min(step, 10))
+        made.measure(held + 0.5e-3 * random.standard_normal(3))
+    assert made.status.state == TrackerState.REFUSED
+    assert "measured and predicted motion disagree at (" in made.status.sentence
+    assert "something that the scene does not have there holds the robot" in made.status.sentence
+    assert np.linalg.norm(made.status.offset - [1e-3, 0.0, 0.0]) < 1.5e-3
+    made.run(1.0, held=1.0)
+    follow(made, np.array([1e-3, 0.0, 0.0]), 2.0, seed=2)
+    assert made.status.state == TrackerState.USED and not made.status.sentence
+
+
+def test_a_robot_that_moves_where_its_model_leans_is_reported() -> None:
+    """An obstacle that is not where the scene has it; without one it is a load, which the correction is there for."""
+    for touching in (True, False):
+        made, random = model(), np.random.default_rng(6)
+        made.run(0.5, held=1.0)
+        follow(made, np.zeros(3), 4.0)
+        made.touching = touching
+        for step in range(30):
+            made.run(0.2)
+            made.measure(made.tip + [-5e-4 * min(step, 12), 0.0, 0.0] + 0.5e-3 * random.standard_normal(3))
+        assert ("is not where the scene has it" in made.status.sentence) == touching
+        np.testing.assert_allclose(made.status.offset, [-6e-3, 0.0, 0.0], atol=1e-3)
 
 
 def test_correction_never_exceeds_its_authority() -> None:

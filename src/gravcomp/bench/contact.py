@@ -1,4 +1,7 @@
-"""Contact of the model with a scene: accuracy against closed forms, penetration, energy, and the time of a step."""
+"""Contact of the model with a scene: accuracy against closed forms, penetration, energy, and the time of a step.
+
+What a scene that is wrong does to the loop is in `wrong_scene`.
+"""
 
 import dataclasses
 import time
@@ -30,8 +33,10 @@ _SMALL = 0.01  # deflection of the closed forms, of the length
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """Return all figures, with every `every`-th of the scenes; see the functions below."""
-    return {**accuracy(progress), **motion(progress, every), **step_time(progress, every)}
+    """Return all figures, with every `every`-th of the scenes; see the functions below, and `wrong_scene`."""
+    from gravcomp.bench.wrong_scene import wrong_scene  # the closed loop, which tests of `scene_of` do not need
+
+    return {**accuracy(progress), **motion(progress, every), **step_time(progress, every), **wrong_scene(progress)}
 
 
 def scene_of(**kinds: Any) -> Scene:

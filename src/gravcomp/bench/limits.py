@@ -85,6 +85,9 @@ ROWS = {
         Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
         Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
         Row("lost_steps", "steps without an equilibrium, share", ""),
+        Row("wrong_scene_said", "wall 2 mm off the scene's: cases that say so, share", "", 1, at_least=True),
+        Row("right_scene_said", "wall where the scene has it: cases that say it is not, share", "", 0),
+        Row("wrong_scene_ripple_mm", "wall 2 mm off the scene's or where it has it: motion of the tip at rest, worst", "mm", 0.5),
         Row("unsolved_scenes", "scenes of 200 that are not entered from the straight robot", ""),
     ),
     "robots": (

@@ -2,7 +2,7 @@
 
 Of each robot: the error of its mesh, its shape at rest without load, the time of its reduced model's build and step, and the
 reduced model's error; or, asked for, the loop on its virtual robot. Robots are computed one after the other, each with an empty
-cache; one that fails does not stop the others.
+cache; one that fails does not stop the others. What was measured before is not measured again (`measured_before`).
 """
 
 import logging
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gravcomp.bench import robot_figures, robot_loop, whole_figures
+from gravcomp.bench.measured_before import measured_before
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
 from gravcomp.experiments.measured import default_folder
@@ -23,14 +24,21 @@ Progress = Callable[[str], None]
 
 
 def run(
-    progress: Progress, *, files: Sequence[str] = (), figures: Sequence[str] = (), every: int = 1, loop: bool = False
+    progress: Progress,
+    *,
+    files: Sequence[str] = (),
+    figures: Sequence[str] = (),
+    every: int = 1,
+    loop: bool = False,
+    again: bool = False,
 ) -> dict:
     """Return `robots`, the figures of `robot_figures.FIGURES` of every robot by name, and the figures of `whole_figures`.
 
     files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists. The
     figures of `whole_figures` are computed if no file is given, or if they are asked for. figures: names of the figures wanted,
     none: all; every: compute every `every`-th row and path only; loop: the figures of `robot_loop.FIGURES` in place of all
-    others. Raises ConfigError for a figure that does not exist.
+    others; again: measure the robots' figures again that were measured before. Raises ConfigError for a figure that does not
+    exist.
     """
     if loop:
         return {"robots": robot_loop.run([str(file) for file in files or _all_files()], figures, progress, every)}
@@ -41,8 +49,13 @@ def run(
     wanted = [name for name in robot_figures.FIGURES if not figures or name in figures]
     result: dict[str, Any] = {"robots": {}}
     if wanted:
-        for file in files or _all_files():
-            name, measured = _of(str(file), wanted, progress, every)
+        chosen = list(files or _all_files())
+        for number, file in enumerate(chosen, start=1):
+
+            def show(stage: str, number: int = number) -> None:
+                progress(f"robot {number} of {len(chosen)}, {stage}")
+
+            name, measured = _of(str(file), wanted, show, every, again)
             result["robots"][name] = measured
     whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
     return result | whole_figures.run(progress, whole, every)
@@ -57,7 +70,7 @@ def _all_files() -> list[str]:
     return [*shipped_robots(), *map(str, others)]
 
 
-def _of(file: str, wanted: Sequence[str], progress: Progress, every: int) -> tuple[str, dict[str, Any]]:
+def _of(file: str, wanted: Sequence[str], progress: Progress, every: int, again: bool) -> tuple[str, dict[str, Any]]:
     """Return name and figures of one robot; a figure that fails is None, and `errors` says why."""
     measured: dict[str, Any] = dict.fromkeys(wanted)
     try:
@@ -65,27 +78,42 @@ def _of(file: str, wanted: Sequence[str], progress: Progress, every: int) -> tup
     except ConfigError as error:
         return Path(file).stem, measured | {"errors": {"file": str(error)}}
     errors: dict[str, str] = {}
-    with _empty_cache():
+    with tempfile.TemporaryDirectory(prefix="gravcomp_bench_") as folder:
         for name in wanted:
+            if measured[name] is not None:  # the same computation as that of another figure gave it
+                continue
             progress(f"{robot.name}: {robot_figures.FIGURES[name]}")
-            try:
-                measured |= robot_figures.measure(name, file, every)
-            except (ConfigError, MeshError, ArithmeticError, ValueError) as error:
-                errors[name] = str(error)
-                logging.getLogger(__name__).warning("%s, %s: %s", robot.name, name, error)
+
+            def outcome(name: str = name) -> dict[str, Any]:
+                with _cache(folder):
+                    return _outcome(name, file, every)
+
+            found = measured_before(robot, name, every, outcome, again=again)
+            if "error" in found:
+                errors[name] = found["error"]
+                logging.getLogger(__name__).warning("%s, %s: %s", robot.name, name, found["error"])
+            else:
+                measured |= found
     return robot.name, measured | ({"errors": errors} if errors else {})
 
 
+def _outcome(name: str, file: str, every: int) -> dict[str, Any]:
+    """Return the figure, or why it could not be measured, as `error`."""
+    try:
+        return robot_figures.measure(name, file, every)
+    except (ConfigError, MeshError, ArithmeticError, ValueError) as error:
+        return {"error": str(error)}
+
+
 @contextmanager
-def _empty_cache() -> Iterator[None]:
-    """Context with an empty cache of its own."""
+def _cache(folder: str) -> Iterator[None]:
+    """Context in which the cache is in the folder."""
     before = os.environ.get("GRAVCOMP_CACHE")
-    with tempfile.TemporaryDirectory(prefix="gravcomp_bench_") as folder:
-        os.environ["GRAVCOMP_CACHE"] = folder
-        try:
-            yield
-        finally:
-            if before is None:
-                del os.environ["GRAVCOMP_CACHE"]
-            else:
-                os.environ["GRAVCOMP_CACHE"] = before
+    os.environ["GRAVCOMP_CACHE"] = folder
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["GRAVCOMP_CACHE"]
+        else:
+            os.environ["GRAVCOMP_CACHE"] = before

@@ -31,7 +31,7 @@ from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
-from gravcomp.inverse import InverseController, Target
+from gravcomp.inverse import Command, InverseController, Target
 from gravcomp.inverse.limits import within_limits
 from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
@@ -62,7 +62,7 @@ _RELEASE_SLACK = 0.05
 
 
 class ClosedLoop:
-    """State of the loop. `shape` is the last result of the simulator."""
+    """State of the loop. `shape` is the last result of the simulator, `command` that of the inverse problem."""
 
     def __init__(
         self,
@@ -104,8 +104,10 @@ class ClosedLoop:
         # The first reading of a board that starts warm is not the ambient temperature.
         ambient = _thermal(setup).ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
-        self._simulator = Simulator(setup.robot)
-        self._problem = InverseController(setup.robot, setup.controller.inverse, setup.hardware.transmission)
+        self._simulator = Simulator(setup.robot, scene=setup.modelled_scene)
+        self._problem = InverseController(
+            setup.robot, setup.controller.inverse, setup.hardware.transmission, setup.modelled_scene, setup.zones
+        )
         self._tracker = None if tracker is None else VirtualTracker(tracker, setup.robot.length, setup.seed)
         self.observer = TipObserver(setup.robot, setup.controller.tracker)
         limits = setup.robot.limits
@@ -123,6 +125,7 @@ class ClosedLoop:
         self._steps = 0
         self._gravity = np.zeros(3)
         self.shape: Shape | None = None
+        self.command: Command | None = None
         self._bridge.configure()
         self._bridge.activate(0.0)
         self._settle()
@@ -244,7 +247,9 @@ class ClosedLoop:
         if self._tracker is None:
             return self._target
         now = self.time
-        self.observer.predict(now, shape.tip_position, shape.tip_orientation, shape.response, shape.cable_tension)
+        self.observer.predict(
+            now, shape.tip_position, shape.tip_orientation, shape.response, shape.cable_tension, bool(len(shape.contacts))
+        )
         for measured in self._tracker.observe(self._virtual.truth):
             self.observer.measure(measured.time, now, "soft_base", measured.position)
             if self._load is not None:
@@ -285,7 +290,10 @@ class ClosedLoop:
             tension=shape.cable_tension,
             interval=SAMPLE_PERIOD,
             followed=shape.is_equilibrium,
+            contact=shape.contacts.by_obstacle(),
+            gravity=shape.gravity,
         )
+        self.command = command
         return command.displacement, command.tension
 
     def _idle_released(self, tension: np.ndarray) -> np.ndarray:

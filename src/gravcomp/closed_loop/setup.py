@@ -40,6 +40,8 @@ class Setup:
     seed: int
     nominal_hardware: Hardware | None = None
     scene: Scene | None = None  # around the virtual robot
+    modelled_scene: Scene | None = None  # in the model, fixed to its base or to the world's axes
+    zones: Scene | None = None  # forbidden
 
     @classmethod
     def of(cls, file: RobotFile, seed: int | None = None) -> "Setup":
@@ -62,6 +64,8 @@ class Setup:
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,
             scene=file.scene or None,
+            modelled_scene=file.scene or None,
+            zones=file.zones or None,
         )
 
     @property

@@ -44,7 +44,10 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "seed": (1, "seed of the messages and of the virtual robot"),
     },
     "graph": {"composed": (False, "compare the delay with the inner nodes in one process with that as processes")},
-    "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
+    "robots": {
+        "loop": (False, "measure the loop on each robot's virtual robot instead of its model"),
+        "again": (False, "measure again what was measured before with the same robots and the same program"),
+    },
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "loads": {"seeds": (3, "number of seeds of the virtual robot")},
     "streams": {"seed": (1, "seed of the faults")},

@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " measured/tip (geometry_msgs/PoseStamped in soft_base); or the table that --plan writes, filled in. With --mapping, DATA"
         " is a table of poses at rest with any"
         " columns, measured by markers anywhere on the robot, under tensions or displacements and hung weights."
+        " With --material, DATA is a relaxation or creep test of the robot's material."
     )
     parser.add_argument(
         "data",
@@ -91,6 +92,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="YAML",
         help="DATA is a table of poses at rest with any columns; this file says what they mean, and what is fitted",
     )
+    parser.add_argument(
+        "--material",
+        action="store_true",
+        help="DATA is a relaxation or creep test: time_s, and stress, force, strain or displacement; gives the material's prony",
+    )
     parser.add_argument("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
 
 
@@ -105,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--mass-g is {args.mass_g:g} g; allowed: 0.001 to 1000000 g")
     if (args.data is not None) + args.plan + args.live != 1:
         raise ConfigError("give one of DATA (a CSV file, a bag or 'virtual'), --plan and --live")
+    if args.material and (args.mapping or args.data in (None, "virtual")):
+        raise ConfigError("--material needs a CSV file as DATA, and excludes --mapping, --plan and --live")
     file = load_robot_file(args.robot)
     if args.plan:
         return _plan(args, file)
@@ -113,6 +121,8 @@ def run(args: argparse.Namespace) -> int:
         if found is None:
             return INTERRUPTED
         args.data = str(found)
+    if args.material:
+        return _material(args, file)
     return _poses(args, file) if args.mapping else _fit(args, file)
 
 
@@ -275,6 +285,15 @@ def _poses(args: argparse.Namespace, file: "RobotFile") -> int:
     result = pose_result(poses, fit, str(target))
     result.seconds = time.perf_counter() - started
     page = write_report(result, Path(args.out).expanduser())
+    output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))
+    return 0
+
+
+def _material(args: argparse.Namespace, file: "RobotFile") -> int:
+    """Fit to a test of the material, and write. Returns 0. Raises ConfigError."""
+    from gravcomp.commands.material_calibration import fit_material
+
+    result, target, page = fit_material(args, file)
     output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))
     return 0
 

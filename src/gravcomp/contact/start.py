@@ -6,7 +6,7 @@ from gravcomp.config import ConfigError
 from gravcomp.contact.places import deepest
 from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Robot
-from gravcomp.scene.distance import TUBE
+from gravcomp.scene.distance import TUBE, gap_to
 from gravcomp.scene.scene import Scene
 
 # Of the radius: a base that is deeper in an obstacle is refused.
@@ -33,7 +33,10 @@ def refuse_start(scene: Scene, robot: Robot) -> None:
                 )
         if scene.in_world[row]:
             continue  # it turns with the base
-        depth = -deepest(arrays, row, surface, 0, base, own, normal)
+        depth, middle = -deepest(arrays, row, surface, 0, base, own, normal), np.zeros(3)
+        inside = -gap_to(arrays, row, base[0], middle)
+        if inside > depth:  # the obstacle is smaller than the robot
+            depth, normal = inside, middle
         if depth > _TOUCHING * surface.radius[0]:
             way = ", ".join(f"{1e3 * depth * x:+.3g}" for x in normal)
             raise ConfigError(

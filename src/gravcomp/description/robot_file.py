@@ -44,10 +44,18 @@ class RobotFile:
 
     @functools.cached_property
     def scene(self) -> "Scene":
-        """What the section `scene` describes; without one, a scene without obstacles. Its files are read. Raises ConfigError."""
+        """The walls of the section `scene`; without one, a scene without obstacles. Its files are read. Raises ConfigError."""
+        return self._scene(forbidden=False)
+
+    @functools.cached_property
+    def zones(self) -> "Scene":
+        """The forbidden zones of the section `scene`, as `scene`."""
+        return self._scene(forbidden=True)
+
+    def _scene(self, forbidden: bool) -> "Scene":
         from gravcomp.scene.scene import Scene
 
-        scene = Scene(_scene_section(self.sections, self.source), self.source)
+        scene = Scene(_scene_section(self.sections, self.source), self.source, forbidden)
         scene.refuse_other_units(self.robot.length)
         return scene
 

@@ -39,6 +39,11 @@ class LoopParameters:
             section(InverseControllerParameters, "inverse_controller"),
         )
         assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
+        if file.zones or controller.inverse.max_contact_force is not None:
+            raise ConfigError(
+                f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
+                " that on the board has neither"
+            )
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         return cls(file.source, file.robot, estimator, controller, hardware)
 

@@ -1,13 +1,16 @@
-"""A deformed shape on one mesh of a robot's segments, carried to another mesh of the same robot.
+"""A deformed shape on one mesh of a robot, carried to another mesh of the same robot.
 
-In every cross-section between two layers the displacements are fitted by polynomials of second degree in the place in the
-section, which contain its motion as a rigid body, its bending and its contraction across. Their coefficients are interpolated
-along the robot. The result is no equilibrium, but so near to one that Newton's method needs only a few steps from there.
+In a body from a file, nodes move with the elements in which they lie. In a robot of segments, in every cross-section between
+two layers the displacements are fitted by polynomials of second degree in the place in the section, which contain its motion as
+a rigid body, its bending and its contraction across. Their coefficients are interpolated along the robot. The result is no
+equilibrium, but so near to one that Newton's method needs only a few steps from there.
 """
 
 import numpy as np
 
 from gravcomp.mesh import Mesh
+from gravcomp.mesh.elements import is_hexahedron
+from gravcomp.mesh.embedding import embed
 
 _DEGREE = 2
 # Nodes of a section may be too few for all terms: those that they do not determine are left out.
@@ -15,8 +18,17 @@ _UNDETERMINED = 1e-9
 
 
 def carried_shape(u: np.ndarray, source: Mesh, target: Mesh) -> np.ndarray:
-    """Return displacements (n, 3) in m of the target mesh, from those of the source (m, 3). Both are of the same segments."""
+    """Return displacements (n, 3) in m of the target mesh, from those of the source (m, 3). Both are of the same body.
+
+    Raises MeshError if a node of a body from a file lies outside the other mesh.
+    """
     from scipy.interpolate import CubicSpline
+
+    if not is_hexahedron(source.kind):
+        place = embed(source, target.nodes)
+        moved: np.ndarray = np.einsum("nc,nci->ni", place.weights, u[place.nodes])
+        moved[target.clamped] = 0.0
+        return moved
 
     here, there = source.straight, target.straight
     size = float(np.abs(here[:, :2]).max())

@@ -28,7 +28,7 @@ from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.turning_loads import TurningFactor
 from gravcomp.mechanics.block_matrix import BlockCholesky
 from gravcomp.mesh.sections import section_functionals
-from gravcomp.scene.distance import gap_to
+from gravcomp.scene.distance import SceneArrays, gap_to
 from gravcomp.scene.scene import Scene
 
 # Parts of the radius: a place nearer than the first is a candidate; one nearer than the second at the last equilibrium rubs.
@@ -38,10 +38,10 @@ NEAR, TOUCHED = 0.02, 1e-3
 class FullContact:
     """Contact of a model with a scene. Remembers the forces at the places as guesses for the next solution.
 
-    Attributes: scene; surface; sections_at_rest (s, 3, 3); margin: m, nearer places are candidates; rubbing: whether any obstacle
-    has friction; allowed: depth in m by which obstacles are lowered, for loads applied in steps; of the last
-    solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of contact hold; longest: largest step
-    in m that cannot pass over an obstacle.
+    Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
+    nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
+    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of
+    contact hold; longest: largest step in m that cannot pass over an obstacle.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -49,6 +49,7 @@ class FullContact:
         from scipy.sparse import csr_matrix
 
         self.scene, self.surface, self._model = scene, contact_surface(model.robot), model
+        self.arrays = scene.arrays
         rows = section_functionals(model.mesh, self.surface.place)
         self._rows = csr_matrix(rows)
         self._of_vectors = [csr_matrix(rows[v::3, : model.n_free]) for v in range(3)]
@@ -60,11 +61,11 @@ class FullContact:
 
     def reset(self) -> None:
         """Forget the forces: nothing touches."""
-        self._force = np.zeros((len(self.scene.arrays.kind), len(self.surface.place), 3))
+        self._force = np.zeros((len(self.arrays.kind), len(self.surface.place), 3))
         self._start = self.sections_at_rest
         self.longest = np.inf
         self.pull, self.settled = np.zeros(3 * self._model.n_free), True
-        self._last: tuple[Places, np.ndarray, np.ndarray] | None = None
+        self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def sections(self, u: np.ndarray) -> np.ndarray:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
@@ -72,8 +73,13 @@ class FullContact:
 
     def begin(self, u: np.ndarray, gravity: np.ndarray) -> None:
         """Start a step from the equilibrium u (n, 3): friction counts from there. gravity (3,) places what is in the world."""
-        self.scene.under_gravity(gravity)
+        self.place(gravity)
         self._start = self.sections(u)
+
+    def place(self, gravity: np.ndarray) -> SceneArrays:
+        """Place what is in the world for gravity (3,), and return the obstacles."""
+        self.arrays = self.scene.under_gravity(gravity)
+        return self.arrays
 
     def changes(self, fields: np.ndarray) -> np.ndarray:
         """Return changes (s, 3, 3, r) of the stations' p, f_1, f_2 by fields (r, n, 3) of displacements."""
@@ -84,7 +90,7 @@ class FullContact:
         shape = self._force.shape[:2]
         reach = np.full(shape[1], self.margin)
         own, normal = np.zeros((*shape, 2)), np.zeros((*shape, 3))
-        gaps = all_gaps(self.scene.arrays, self.surface, self.sections(u), reach, own, normal)
+        gaps = all_gaps(self.arrays, self.surface, self.sections(u), reach, own, normal)
         return max(0.0, -float(gaps.min(initial=0.0)))
 
     def respond(
@@ -103,15 +109,15 @@ class FullContact:
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.scene.arrays, self.surface, sections, moved, self.margin + self.allowed, self._force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self._force)
         if not len(places.row):
             state.compliance, state.answer = compliance, answer
-            self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(len(y)))
+            self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m)), np.zeros(len(y)))
             return y + answer @ tension, tension
         pressed, rub = remembered(places, self._force)
         rocks, bend = turning(places, pressed)
         directions, friction, slid = self._directions(places, rocks), np.zeros(0), np.zeros(0)
-        arrays, count = self.scene.arrays, len(places.row)
+        arrays, count = self.arrays, len(places.row)
         if self.rubbing:
             friction, slid = rubbing(arrays, self.surface, places, self._start, sections, TOUCHED)
         columns = np.hstack([answer, factor.solve(directions.T)])
@@ -128,7 +134,7 @@ class FullContact:
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
         remember(places, forces, self._force)
-        self._keep(places, forces, held, force[m:] @ directions)
+        self._keep(places, forces, held, change[m : m + count], force[m:] @ directions)
         return y + columns @ force, force[:m]
 
     def contacts(self, u: np.ndarray) -> Contacts:
@@ -137,29 +143,32 @@ class FullContact:
             return Contacts.none()
         return self.described(*self._last, self.sections(u))
 
-    def described(self, places: Places, forces: np.ndarray, held: np.ndarray, sections: np.ndarray) -> Contacts:
+    def described(
+        self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, sections: np.ndarray
+    ) -> Contacts:
         """Return the places that are pressed by forces (c, 3), where the stations are at `sections` (s, 3, 3).
 
-        held (c,): states of `contact.condensed`.
+        held (c,): states of `contact.condensed`; by_tension (c, m): changes of the normal forces by the tensions.
         """
         pressed = np.flatnonzero((forces * places.normal).sum(axis=1) > 0.0)
         position, row = positions(places, sections)[pressed], places.row[pressed]
         along, normal = self.surface.place / self._model.length, np.zeros(3)
         return Contacts(
-            obstacle=self.scene.arrays.obstacle[row],
+            obstacle=self.arrays.obstacle[row],
             station=(places.share[pressed] * along[places.first[pressed, None] + np.arange(3)]).sum(axis=1),
             position=position,
             normal=places.normal[pressed],
             force=forces[pressed],
-            gap=np.array([gap_to(self.scene.arrays, k, point, normal) for k, point in zip(row, position)]),
+            gap=np.array([gap_to(self.arrays, k, point, normal) for k, point in zip(row, position)]),
             sliding=held[pressed] == SLIDING,
-            names=tuple(self.scene.names[self.scene.arrays.obstacle[k]] for k in row),
+            by_tension=by_tension[pressed],
+            names=tuple(self.scene.names[self.arrays.obstacle[k]] for k in row),
         )
 
-    def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, pull: np.ndarray) -> None:
+    def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray) -> None:
         if not len(places.row):
             self._force[:], self.settled = 0.0, True
-        self._last, self.pull = (places, forces, held), pull
+        self._last, self.pull = (places, forces, held, by_tension), pull
         self.longest = float(self.surface.radius.min()) if len(places.row) else np.inf
 
     def _directions(self, places: Places, rocks: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ import numpy as np
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
-from gravcomp.full_model.mesh_loads import LoadedShapes, mesh_loads, shapes_under
+from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, mesh_loads, shapes_under
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.mesh.layers import least_layers
 from gravcomp.mesh.mesh import MeshError
@@ -41,8 +41,6 @@ _ORDER = {"along": 1.0, "around": 1.5, "radial": 1.0}
 _ALONG_FIRST = 1.0
 _START_ALONG = 8
 _MOST_UNKNOWNS = 15000
-# A load that a finer mesh does not carry is made smaller by this factor, so often.
-_LESS, _TIMES = 0.7, 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,12 +164,12 @@ class _Tips:
 
     def change(self, one: Elements, other: Elements) -> np.ndarray:
         """Return the change of the tips (l, 3) from one mesh to another, over the length."""
-        for _ in range(_TIMES):
+        for _ in range(TIMES):
             change = (self._tips(other, one) - self._tips(one)) / self._robot.length
             if not np.isnan(change).any():
                 break
             self._known.clear()
-            self._loads = [dataclasses.replace(load, tension=_LESS * load.tension) for load in self._loads]
+            self._loads = less_tension(self._loads)
         return change
 
     def _tips(self, elements: Elements, near: Elements | None = None) -> np.ndarray:

@@ -15,6 +15,10 @@ from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.statics import StaticSolver
 
+TIMES = 4
+"""How often tensions that a finer mesh does not carry are made smaller."""
+
+_LESS = 0.7
 _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
@@ -44,6 +48,11 @@ def mesh_loads(model: MeshedModel) -> list[MeshLoad]:
     if tension is not None:
         loads.append(MeshLoad("bent", np.zeros(3), tension))
     return loads
+
+
+def less_tension(loads: list[MeshLoad]) -> list[MeshLoad]:
+    """Return the loads with smaller tensions: near a limit point a finer mesh has no equilibrium where a coarse one has."""
+    return [dataclasses.replace(load, tension=_LESS * load.tension) for load in loads]
 
 
 @dataclasses.dataclass(frozen=True)

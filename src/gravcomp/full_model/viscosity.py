@@ -2,11 +2,12 @@
 
     S = S_elastic(E) + C : (beta dE/dt + sum_i rho_i H_i),      dH_i/dt = dE/dt - H_i / T_i,
 
-H_i is the strain that branch i still holds: the body is stiffer by the fraction rho_i at first, and that stiffness relaxes within
-some T_i. This is finite linear viscoelasticity with the linear law in the branches (J. C. Simo, Comput. Methods Appl. Mech. Eng.
-60, 1987; G. A. Holzapfel, Nonlinear Solid Mechanics, 2000, section 6.10). A Prony series of shares g_i of the instantaneous
-stiffness has rho_i = g_i / (1 - sum g). Over a step of length h the rate of strain is the second backward difference, dE/dt = (3
-E_(n+1) - 4 E_n + E_(n-1)) / (2 h), and H follows from a constant rate,
+H_i is the strain that branch i still holds: the body is stiffer by the fraction rho_i at first, and that stiffness relaxes
+within some T_i. This is finite linear viscoelasticity with the linear law in the branches (J. C. Simo, Comput. Methods Appl.
+Mech. Eng. 60, 1987; G. A. Holzapfel, Nonlinear Solid Mechanics, 2000, section 6.10). A Prony series of shares g_i of the
+instantaneous stiffness has rho_i = g_i / (1 - sum g). C has at most the lambda of Poisson's ratio 0.45 (`mechanics.assembly`).
+Over a step of length h the rate of strain is the second backward difference, dE/dt = (3 E_(n+1) - 4 E_n + E_(n-1)) / (2 h), and
+H follows from a constant rate,
 
     H_(n+1) = e^-x H_n + a (E_(n+1) - E_n),      x = h / T,   a = (1 - e^-x) / x,
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.inverse.status import ControllerCode
 
 
@@ -18,7 +19,8 @@ class Command(NamedTuple):
     """A command, with the predicted error to the target.
 
     displacement (m,) in m and tension (m,) in N of the cables; code and message: state of the controller; solve_time in s;
-    distance, lateral and axial in m and tilt in rad: predicted errors of the tip, NaN if nothing is predicted.
+    distance, lateral and axial in m and tilt in rad: predicted errors of the tip, NaN if nothing is predicted; tip (3,) in m:
+    predicted, the nearest to the target that this step reaches; forces: on the obstacles that the model touches.
     """
 
     displacement: np.ndarray
@@ -30,6 +32,8 @@ class Command(NamedTuple):
     lateral: float = np.nan
     axial: float = np.nan
     tilt: float = np.nan
+    tip: np.ndarray = np.full(3, np.nan)
+    forces: ObstacleForces = ObstacleForces.none()
 
 
 @njit(cache=True)

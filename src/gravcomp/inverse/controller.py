@@ -6,11 +6,15 @@ the result. The model takes the displacements with the next sample of gravity, s
 `retreat` recovers from states in which the iteration does not get closer to the target.
 """
 
+import dataclasses
+import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 
+from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
 from gravcomp.inverse.command import Command
@@ -24,7 +28,9 @@ from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.inverse.scaling import NO_BOUND, UNCOUPLED, Couplings
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, evaluate
+from gravcomp.inverse.surroundings import Surroundings, rows_of
 from gravcomp.inverse.target import Target
+from gravcomp.scene.scene import Scene
 
 if TYPE_CHECKING:
     from gravcomp.full_model.shape import Response
@@ -32,6 +38,7 @@ if TYPE_CHECKING:
 # Of the robot's length: farthest that the winches may move the tip in a step. The linear response is not valid farther, and the
 # model would have to search for the next shape. It counts after a pause between two steps; otherwise the winches are slower.
 _FARTHEST = 0.1
+_MORE_ENERGY = 30.0  # times the energy's weight where what is around the robot keeps it from its target
 _LONGEST_INTERVAL = 0.1  # s in which cables are paid out in one step after a pause
 
 
@@ -41,14 +48,28 @@ class InverseController:
     Attributes: robot, of which the names and limits of the cables are used; options, which may be replaced at any time.
     """
 
-    def __init__(self, robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None):
-        """options: default `InverseOptions()`; transmission: of motors that are shared, default: one motor for each cable."""
+    def __init__(
+        self,
+        robot: Robot,
+        options: InverseOptions | None = None,
+        transmission: Transmission | None = None,
+        scene: Scene | None = None,
+        zones: Scene | None = None,
+    ):
+        """Start without earlier steps.
+
+        options: default `InverseOptions()`; transmission: of motors that are shared, default: one motor for each cable; scene:
+        what the robot touches, of which a bound on its force needs to know; zones: forbidden to the robot. Raises ConfigError
+        for a scene around a robot that has no outlines along its axis.
+        """
         self.robot = robot
+        self._surroundings = Surroundings(robot, scene, zones)
         self.options = options or InverseOptions()
         self._transmission = None if transmission is None or transmission.direct else transmission
         self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
         rows = self._couplings.rows
         self._coupled = rows.any(axis=0) if len(rows) else np.zeros(len(robot.cables), bool)  # (m,)
+        self._least: tuple[float, np.ndarray] | None = None  # the option `pretension`, and the bounds that follow from it
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length, robot.limits.tension_max)
@@ -64,6 +85,7 @@ class InverseController:
         self._retreat.reset()
         self._displacement: np.ndarray | None = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
+        self._missed, self._held = 0.0, False
 
     def step(
         self,
@@ -74,7 +96,8 @@ class InverseController:
         tension: np.ndarray | None = None,
         interval: float = 0.01,
         followed: bool = True,
-        contact: str = "",
+        contact: ObstacleForces | None = None,
+        gravity: np.ndarray | None = None,
     ) -> Command:
         """Return the command that brings the modelled robot nearest to the target.
 
@@ -95,7 +118,9 @@ class InverseController:
         followed
             Whether the model's shape is its equilibrium under the last command; False: it found none and kept its last shape.
         contact
-            What the modelled robot leans on, in words; a target that it then misses has the code CONTACT.
+            What the modelled robot leans on; a target that it then misses has the code CONTACT.
+        gravity
+            (3,) in m/s^2, which places what is fixed in the world; None: that of the horizontal robot.
 
         """
         started = time.perf_counter()
@@ -115,6 +140,8 @@ class InverseController:
             interval *= self._retreat.stride
         if move != Move.ONWARD:
             return self._recovery_command(move, followed, response, target, previous, tension, interval, started)
+        forces = ObstacleForces.none() if contact is None else contact
+        demands = self._surroundings.demands(response, tension, backbone_station, gravity, forces, options.max_contact_force)
         try:
             programme = build_programme(
                 response,
@@ -125,9 +152,10 @@ class InverseController:
                 backbone_station=backbone_station,
                 interval=interval,
                 damping=self._damping.factor,
-                options=options,
+                options=self._options_at(len(forces) > 0 or self._held),
                 least_tension=self._least_tension(),
                 couplings=self._couplings,
+                around=rows_of(demands),
             )
             solution = self._solver.solve(programme)
         except SolverFailed as error:
@@ -157,12 +185,14 @@ class InverseController:
         displacement = self._possible(result.displacement, result.tension)
         errors = result.errors
         self._damping.observe(result.along, result.lengths)
-        self._retreat.observe(displacement - last, interval)
+        around = self._surroundings.met(demands, result.tension - tension)
+        self._retreat.observe(displacement - last, interval, around.holds)
         if self._retreat.stride < 1.0:
             result.met[0] = False  # the shorter stride limits the step, not the motors
         missed = max(
             errors.distance * (target.tip_position_weight > 0.0), backbone_missed(result.effector, target, backbone_station)
         )
+        self._missed, self._held = missed, around.holds
         code, message = evaluate(
             target=target,
             points_missed=missed,
@@ -171,7 +201,8 @@ class InverseController:
             names=self._names,
             tolerance=options.tolerance_of(self.robot.length),
             tilt_tolerance=options.tilt_tolerance,
-            contact=contact,
+            contact=forces.sentence,
+            around=around,
         )
         self._displacement, self._tension, self._change = displacement, result.tension, result.change
         return Command(
@@ -183,7 +214,25 @@ class InverseController:
             lateral=errors.lateral,
             axial=errors.axial,
             tilt=errors.tilt,
+            tip=result.effector[:3],
+            forces=forces,
             solve_time=time.perf_counter() - started,
+        )
+
+    def _options_at(self, held: bool) -> InverseOptions:
+        """Return the options of a step; held: what is around the robot may keep it from its target.
+
+        Then the nearest shape is sought also along the robot, by as much as the last step missed the target by more than the
+        tolerance: otherwise the cables would pull the robot together to come a little nearer across it.
+        """
+        options, tolerance = self.options, self.options.tolerance_of(self.robot.length)
+        if not held or self._missed <= tolerance:
+            return options
+        share = min(1.0, self._missed / tolerance - 1.0)
+        return dataclasses.replace(
+            options,
+            axial_weight=options.axial_weight + share * (1.0 - options.axial_weight),
+            energy_weight=options.energy_weight * _MORE_ENERGY**share,
         )
 
     @property
@@ -193,8 +242,7 @@ class InverseController:
 
     def _longest_interval(self, response: "Response") -> float:
         """Return the time in s in which no winch alone moves the tip farther than `_FARTHEST` of the length."""
-        ratio = np.linalg.norm(response.compliance_ea[:3], axis=0) / np.diag(response.compliance_aa)  # tip over cable
-        speed = self.robot.limits.displacement_rate * float(ratio.max(initial=0.0))
+        speed = self.robot.limits.displacement_rate * _tip_over_cable(response.compliance_ea, response.compliance_aa)
         return _FARTHEST * self.robot.length / speed if speed > 0.0 else _LONGEST_INTERVAL
 
     def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
@@ -211,9 +259,11 @@ class InverseController:
 
         A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
         """
-        limits, option = self.robot.limits, self.options.pretension
-        own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
-        return np.where(self._coupled, 0.0, np.maximum(own, limits.tension_min))
+        option = self.options.pretension
+        if self._least is None or self._least[0] != option:
+            own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
+            self._least = option, np.where(self._coupled, 0.0, np.maximum(own, self.robot.limits.tension_min))
+        return self._least[1]
 
     def _recovery_command(
         self,
@@ -276,6 +326,18 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
+
+
+@njit(cache=True)
+def _tip_over_cable(compliance_ea: np.ndarray, compliance_aa: np.ndarray) -> float:
+    """Return the largest motion of the tip over that of the cable which moves it, from the compliances (e, m) and (m, m)."""
+    largest = 0.0
+    for k in range(compliance_aa.shape[0]):
+        if not compliance_aa[k, k] > 0.0:
+            continue
+        moved = math.sqrt(compliance_ea[0, k] ** 2 + compliance_ea[1, k] ** 2 + compliance_ea[2, k] ** 2)
+        largest = max(largest, moved / compliance_aa[k, k])
+    return largest
 
 
 def _couplings(transmission: Transmission) -> Couplings:

@@ -50,6 +50,15 @@ class InverseOptions:
         description="largest angle to the direction of a reached target, if the direction has a weight",
     )
 
+    max_contact_force: float | None = parameter(
+        None,
+        unit="N",
+        minimum=1e-3,
+        maximum=1e3,
+        description="largest force with which the cables press the robot on one obstacle of the scene: the sum of the normal"
+        " forces there; none: no bound",
+    )
+
     def slack_of(self, length: float) -> float:
         """Return `slack` in m of a robot of `length` m."""
         return _SLACK * length if self.slack is None else self.slack

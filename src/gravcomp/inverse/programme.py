@@ -8,6 +8,7 @@ Escande and Duriez, IEEE RA-L 2017)
     s.t.  tension_lower <= lambda <= tension_upper,
           displacement_lower <= W_aa lambda + delta_free <= displacement_upper,
           n . (W_aa lambda + delta_free - s) >= 0 for antagonists on one motor, = 0 for cables that one motor pulls together,
+          what is around the robot (`surroundings`),
 
 where n and s are those of `description.transmission`, M contains the roots of the weights, D is the diagonal of W_aa, and c =
 trace(W_ea^T M^T M W_ea) / trace(W_aa) makes eps and rho independent of the robot's size. The energy term eps selects, among
@@ -37,7 +38,7 @@ from numba import njit
 from gravcomp.description import Limits
 from gravcomp.inverse.limits import step_bounds
 from gravcomp.inverse.options import InverseOptions
-from gravcomp.inverse.scaling import UNCOUPLED, Couplings, Programme, ScaledProgramme, scaled
+from gravcomp.inverse.scaling import NO_ROWS, UNCOUPLED, Couplings, Programme, ScaledProgramme, TensionRows, scaled
 from gravcomp.inverse.target import Target
 
 if TYPE_CHECKING:
@@ -57,12 +58,14 @@ def build_programme(
     options: InverseOptions,
     least_tension: np.ndarray | None = None,
     couplings: Couplings = UNCOUPLED,
+    around: TensionRows = NO_ROWS,
 ) -> ScaledProgramme:
     """Return the programme at the present state, for the next `interval` s.
 
     tension (m,): present tensions in N, reference of the proximal term; displacement (m,): last command in m; backbone_station
     (n,): stations of the effector's backbone rows; damping: factor of the proximal term; least_tension (m,) in N: lower bound of
-    each cable's tension, that of options and limits when not given; couplings: of cables that share motors.
+    each cable's tension, that of options and limits when not given; couplings: of cables that share motors;
+    around: of `surroundings`.
     """
     if least_tension is None:
         least_tension = np.full(len(tension), max(options.pretension, limits.tension_min))
@@ -93,6 +96,7 @@ def build_programme(
         options.energy_weight,
         damping * options.proximal_weight,
         couplings,
+        around,
     )
 
 
@@ -117,7 +121,7 @@ def _built(
     change: np.ndarray, free: np.ndarray, compliance_aa: np.ndarray, displacement_free: np.ndarray, tension: np.ndarray,
     displacement: np.ndarray, limits: tuple, tip: np.ndarray, tip_weight: float, direction: np.ndarray, direction_weight: float,
     stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray, less: float, energy: float,
-    proximal: float, couplings: Couplings,
+    proximal: float, couplings: Couplings, around: TensionRows,
 ) -> ScaledProgramme:  # fmt: skip
     """Compiled `build_programme`; limits: the last six arguments of `step_bounds`; `less` as in `_weighted_errors`."""
     jacobian, offset = _weighted_errors(
@@ -126,7 +130,7 @@ def _built(
     )  # fmt: skip
     hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
     bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
-    return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds, couplings))
+    return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds, couplings, around))
 
 
 @njit(cache=True)

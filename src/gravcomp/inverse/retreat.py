@@ -89,9 +89,12 @@ class Retreat:
             self._until, self.stride = None, 1.0
         return Move.ONWARD
 
-    def observe(self, change: np.ndarray, interval: float) -> None:
-        """Record a move onward: the change (m,) of the winches' displacement in m, within `interval` s."""
-        self._still = self._still + 1 if np.abs(change).max() <= self._slow * interval else 0
+    def observe(self, change: np.ndarray, interval: float, held: bool = False) -> None:
+        """Record a move onward: the change (m,) of the winches' displacement in m, within `interval` s.
+
+        held: what is around the robot keeps it where it is; another path does not lead past it.
+        """
+        self._still = self._still + 1 if not held and np.abs(change).max() <= self._slow * interval else 0
 
     def _try_again(self, tip: np.ndarray, tension: np.ndarray) -> None:
         """Start paying the cables out if another attempt from there may get nearer to the target."""

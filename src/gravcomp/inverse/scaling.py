@@ -30,6 +30,18 @@ UNCOUPLED = Couplings(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
 """Every cable has a motor of its own."""
 
 
+class TensionRows(NamedTuple):
+    """Bounds of p sums of tensions, least <= rows . tension <= most; a row (p, m) of zeros is no bound."""
+
+    rows: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+
+
+NO_ROWS = TensionRows(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+"""Nothing around the robot bounds its tensions."""
+
+
 class Programme(NamedTuple):
     """min 1/2 x^T hessian x + gradient^T x  s.t.  the bounds; x (m,): tensions in N; displacement = compliance x + offset."""
 
@@ -39,12 +51,14 @@ class Programme(NamedTuple):
     offset: np.ndarray
     bounds: StepBounds
     couplings: Couplings = UNCOUPLED
+    around: TensionRows = NO_ROWS
 
 
 class ScaledProgramme(NamedTuple):
     """min 1/2 y^T hessian y + gradient^T y  s.t.  lower <= rows y <= upper, box_lower <= y <= box_upper; tension = scale y.
 
-    tension_lower and tension_upper (m,): bounds of the tension in N; trace: a sum that is finite only if all numbers of the
+    rows: of the displacements, of the couplings, and, from `first_around` on, of what is around the robot; tension_lower and
+    tension_upper (m,): bounds of the tension in N; trace: a sum that is finite only if all numbers of the
     programme are.
     """
 
@@ -59,15 +73,16 @@ class ScaledProgramme(NamedTuple):
     tension_lower: np.ndarray
     tension_upper: np.ndarray
     trace: float
+    first_around: int
 
 
 @njit(cache=True)
 def scaled(programme: Programme) -> ScaledProgramme:
     """Return the programme in the solver's units."""
-    hessian, gradient, compliance, offset, bounds, couplings = programme
-    m, q = len(gradient), len(couplings.least)
-    to_hessian, to_gradient, rows = np.empty((m, m)), np.empty(m), np.zeros((m + q, m))
-    lower, upper, box_lower, box_upper = np.empty(m + q), np.empty(m + q), np.empty(m), np.empty(m)
+    hessian, gradient, compliance, offset, bounds, couplings, around = programme
+    m, q, p = len(gradient), len(couplings.least), len(around.least)
+    to_hessian, to_gradient, rows = np.empty((m, m)), np.empty(m), np.zeros((m + q + p, m))
+    lower, upper, box_lower, box_upper = np.empty(m + q + p), np.empty(m + q + p), np.empty(m), np.empty(m)
     # Millimetres make the cost of order one.
     scale = 1e-3 / np.sqrt(0.5 * np.diag(hessian))
     for i in range(m):
@@ -96,7 +111,17 @@ def scaled(programme: Programme) -> ScaledProgramme:
             rows[m + c, k] *= row
         lower[m + c] = max((couplings.least[c] - present) * row, -NO_BOUND)
         upper[m + c] = min((couplings.most[c] - present) * row, NO_BOUND)
-    trace = hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
+    for c in range(m + q, m + q + p):
+        length = 0.0
+        for k in range(m):
+            rows[c, k] = around.rows[c - m - q, k] * scale[k]
+            length += rows[c, k] ** 2
+        row = 1.0 / np.sqrt(length) if length > 0.0 else 0.0
+        for k in range(m):
+            rows[c, k] *= row
+        lower[c] = max(around.least[c - m - q] * row, -NO_BOUND) if row > 0.0 else -NO_BOUND
+        upper[c] = min(around.most[c - m - q] * row, NO_BOUND) if row > 0.0 else NO_BOUND
+    trace = around.rows.sum() + hessian.sum() + gradient.sum() + offset.sum() + compliance.sum()
     return ScaledProgramme(
         to_hessian,
         to_gradient,
@@ -109,6 +134,7 @@ def scaled(programme: Programme) -> ScaledProgramme:
         bounds.tension_lower,
         bounds.tension_upper,
         trace,
+        m + q,
     )
 
 

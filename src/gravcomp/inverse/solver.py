@@ -1,9 +1,9 @@
 """Solution of one step's programme with ProxQP (Bambade et al., RSS 2022), scaled for fast convergence (`scaling`).
 
 After a jump of gravity, no tensions within their bounds may satisfy the bounds on displacement. Then the programme is solved
-with elastic bounds on displacement: one more variable for each cable takes up the violation, at a cost high enough that it
-vanishes wherever the bounds can be satisfied. So there always is a solution, and the command is clamped to its limits
-afterwards.
+with elastic bounds: one more variable for each row takes up the violation, at a cost high enough that it vanishes wherever the
+bounds can be satisfied. What is around the robot costs less than what its winches can do, because a command that they cannot
+follow keeps it out of nothing. So there always is a solution, and the command is clamped to its limits afterwards.
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 
 from gravcomp.inverse.scaling import NO_BOUND, ScaledProgramme
 
-_ELASTIC_COST = 1e4
+_ELASTIC_COST, _AROUND_COST = 1e4, 1e2
 _ACCURACY = 1e-7
 # If the bounds are compatible, one iteration is typical, and ten when the active set changes.
 _MOST_ITERATIONS, _MOST_ELASTIC_ITERATIONS = 40, 300
@@ -49,6 +49,7 @@ class ProgrammeSolver:
         """Forget the last solution: the next solve starts cold."""
         self._exact: Any = None
         self._elastic: Any = None
+        self._rows = 0
 
     def solve(self, programme: ScaledProgramme) -> Solution:
         """Return the programme's solution. Raises SolverFailed; the next solve then starts cold."""
@@ -56,13 +57,17 @@ class ProgrammeSolver:
         if not math.isfinite(programme.trace):
             raise SolverFailed("the model's linear response contains numbers that are not finite")
         parts = programme[:7]
+        if len(programme.rows) != self._rows:
+            self.reset()
+            self._rows = len(programme.rows)
         self._exact, found = self._solved(self._exact, _MOST_ITERATIONS, *parts)
         results = self._exact.results
         if found:
             self._elastic = None
         else:
             self._exact = None
-            self._elastic, found = self._solved(self._elastic, _MOST_ELASTIC_ITERATIONS, *_with_elastic_bounds(*parts))
+            elastic = _with_elastic_bounds(*parts, first_around=programme.first_around)
+            self._elastic, found = self._solved(self._elastic, _MOST_ELASTIC_ITERATIONS, *elastic)
             results = self._elastic.results
             if not found:
                 self.reset()
@@ -98,12 +103,13 @@ class ProgrammeSolver:
 
 def _with_elastic_bounds(
     hessian: np.ndarray, gradient: np.ndarray, rows: np.ndarray, lower: np.ndarray, upper: np.ndarray, box_lower: np.ndarray,
-    box_upper: np.ndarray,
+    box_upper: np.ndarray, *, first_around: int,
 ) -> tuple[np.ndarray, ...]:  # fmt: skip
     """Return the programme's parts with one more variable for each row, which makes the row's bounds elastic."""
     count, m, free = len(rows), len(gradient), np.full(len(rows), NO_BOUND)
     larger = np.zeros((m + count, m + count))
-    larger[:m, :m], larger[m:, m:] = hessian, _ELASTIC_COST * np.eye(count)
+    larger[:m, :m] = hessian
+    larger[m:, m:] = np.diag(np.where(np.arange(count) < first_around, _ELASTIC_COST, _AROUND_COST))
     return (
         larger, np.append(gradient, np.zeros(count)), np.hstack([rows, np.eye(count)]), lower, upper,
         np.append(box_lower, -free), np.append(box_upper, free),

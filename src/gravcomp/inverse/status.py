@@ -4,6 +4,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from gravcomp.inverse.surroundings import NOTHING, Met
 from gravcomp.inverse.target import Target
 
 
@@ -19,6 +20,7 @@ class ControllerCode(IntEnum):
     SOLVER_FAILED = 6
     RELAXING = 7
     CONTACT = 8
+    ZONE = 9
 
 
 class Holdable(IntEnum):
@@ -39,13 +41,18 @@ def evaluate(
     tolerance: float,
     tilt_tolerance: float,
     contact: str = "",
+    around: Met = NOTHING,
 ) -> tuple[ControllerCode, str]:
     """Return code and message for a step.
 
     points_missed: largest predicted distance of a weighted point in m; tilt in rad; met (3, m): of `limits.limits_met`, None if
     no limit is reached; names (m,) of the cables; tolerance (m) and tilt_tolerance (rad): up to which a target is reached;
-    contact: what the robot leans on, in words.
+    contact: what the robot leans on, in words; around: zones and forces that the step meets.
     """
+    if around.entered:
+        return ControllerCode.ZONE, f"{around.entered}: it is led out"
+    if around.pressed:
+        return ControllerCode.CONTACT, f"{around.pressed}: it is lowered as far as the cables can"
     moving, at_tension, at_travel = (_listed(names, which) for which in met) if met is not None else ("", "", "")
     held = [f"{what} of {which}" for what, which in (("tension", at_tension), ("displacement", at_travel)) if which]
     if moving and not held:
@@ -53,6 +60,10 @@ def evaluate(
     reason = f"; at the limit: {', '.join(held)}" if held else ""
     missed = ControllerCode.CONTACT if contact else ControllerCode.UNREACHABLE
     reason += f"; the robot leans on {contact}" if contact else ""
+    reason += f"; {around.force}" if around.force else ""
+    if around.zone:
+        missed = ControllerCode.ZONE
+        reason += f"; the robot is kept out of {around.zone}"
     if points_missed > tolerance:
         return (
             missed,

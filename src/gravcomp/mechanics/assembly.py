@@ -18,6 +18,8 @@ from gravcomp.mechanics.kinematics import deformation_gradient, green_strain, st
 from gravcomp.mechanics.viscous_strain import add_viscous_stress
 from gravcomp.rounding import REORDERED
 
+_LARGEST_FIRST = 9.0  # lambda / mu of damping and creep: that of Poisson's ratio 0.45
+
 
 class Solid(NamedTuple):
     """Constant arrays of k elements with p quadrature points.
@@ -228,9 +230,11 @@ def _viscous_constants(solid: Solid, k: int) -> tuple[float, float]:
     """Return Lame's constants of damping and creep in element k.
 
     Where the pressure is that of the mean volume, damping and creep act on the shape alone: at single points they would lock.
+    Elsewhere they act on tr E at most as in a body of Poisson's ratio 0.45: tr E is the change of volume of small strains only,
+    and a large strain without change of volume has tr E > 0, which a nearly incompressible body would damp many times too much.
     """
     first, shear = solid.constants[k, 0], solid.constants[k, 1]
-    return (-2.0 / 3.0 * shear if solid.averaged[k] else first), shear
+    return (-2.0 / 3.0 * shear if solid.averaged[k] else min(first, _LARGEST_FIRST * shear)), shear
 
 
 @njit(cache=True, fastmath=REORDERED)

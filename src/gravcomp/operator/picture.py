@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.scene.scene import Scene
+from gravcomp.scene.distance import SceneArrays, nearest_of_all
 
 _SIGHTS = 40  # places along a line of sight at which it is looked for a wall
 
@@ -29,8 +29,8 @@ class Picture:
 class Camera:
     """A camera whose lens is the middle of the tip's face; it sees half the angle `half_view` rad to every side."""
 
-    def __init__(self, scene: Scene, line: np.ndarray, half_view: float):
-        """line (k, 3) m: the middle of the lumen, from its mouth inward."""
+    def __init__(self, scene: SceneArrays, line: np.ndarray, half_view: float):
+        """line (k, 3) m: the middle of the lumen, from its mouth inward; scene and line are in the same frame."""
         self._scene, self._line, self._half_view = scene, line, half_view
 
     def look(self, tip: np.ndarray, rotation: np.ndarray, target: np.ndarray) -> Picture:
@@ -50,7 +50,7 @@ class Camera:
         chosen = np.flatnonzero(within)
         share = np.linspace(0.0, 1.0, _SIGHTS, endpoint=False)[1:]
         sights = tip + share[None, :, None] * (points[chosen] - tip)[:, None]
-        gap = self._scene.nearest(sights.reshape(-1, 3))[0].reshape(len(chosen), -1)
+        gap = nearest_of_all(self._scene, sights.reshape(-1, 3))[0].reshape(len(chosen), -1)
         within[chosen] = (gap > 0.0).all(axis=1)
         return within
 

@@ -30,7 +30,7 @@ _KNOWN = 0.4  # of the prior: an offset that is less certain is not determined
 
 
 def calibrate_in_motion(recording: Recording, gravity: float = 9.81) -> ImuCalibration:
-    """Return scale and offset of the accelerometer (3,) each. Raises CalibrationError where the motion does not determine them."""
+    """Return scale and offset of the accelerometer (3,) each. Raises CalibrationError where the motion leaves it open."""
     from scipy.optimize import least_squares
 
     period = 1.0 / recording.rate

@@ -54,9 +54,9 @@ class ReducedContact:
 
     def forget(self) -> None:
         """Forget the forces, for a start from another shape."""
-        self._force = np.zeros((len(self._full.scene.arrays.kind), len(self._full.surface.place), 3))
+        self._force = np.zeros((len(self._full.arrays.kind), len(self._full.surface.place), 3))
         self._pull = np.zeros((1, self._change.shape[1]))
-        self._last: tuple[Places, np.ndarray, np.ndarray] | None = None
+        self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def sections(self, q: np.ndarray) -> np.ndarray:
         """Return p, f_1, f_2 (s, 3, 3) of the stations at q (r,)."""
@@ -65,16 +65,16 @@ class ReducedContact:
     def touching(self, q: np.ndarray, gravity: np.ndarray) -> Touching:
         """Return the arrays for a step from q (r,) under gravity (3,)."""
         full = self._full
-        scene = full.scene.under_gravity(gravity)
+        scene = full.place(gravity)
         return Touching(
             scene, full.surface, self._rest, self._change, self.sections(q), self._force.copy(), self._pull.copy(),
             full.rubbing, full.margin,
         )  # fmt: skip
 
-    def keep(self, touching: Touching, places: Places, forces: np.ndarray, held: np.ndarray) -> None:
+    def keep(self, touching: Touching, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray) -> None:
         """Keep what a step has found."""
         self._force, self._pull = touching.force, touching.pull
-        self._last = places, forces, held
+        self._last = places, forces, held, by_tension
 
     def contacts(self, q: np.ndarray) -> Contacts:
         """Return what touched in the last solution, with gaps at q (r,)."""
@@ -89,9 +89,9 @@ def tracked_touching(
     pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
     iterations: int, longest_step: float, tolerance: float, touching: Touching,
 ) -> tuple[
-    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray,
+    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray, np.ndarray,
 ]:  # fmt: skip
-    """Return what `tracking._tracked` returns, then the places, and the forces (c, 3) and states (c,) there.
+    """Return what `tracking._tracked` returns, then places, their forces (c, 3) and states (c,), and changes by tension (c, m).
 
     Writes the memory of `touching`.
     """
@@ -100,7 +100,7 @@ def tracked_touching(
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual, reuse = False, np.inf, False
     factor = np.zeros((r, r))
-    forces, held = np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+    forces, held, pressing = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m))
     sections = rest + (change @ q).reshape(stations, 3, 3)
     places = empty_places(0)
     for _ in range(iterations):
@@ -153,6 +153,7 @@ def tracked_touching(
         touching.pull[0] = force[m:] @ directions
         forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + count + len(slid)].copy())
         remember(places, forces, touching.force)
+        pressing = by_tension[m : m + count].copy()
         compliance = np.ascontiguousarray(whole[:m]) @ by_tension
         answer = np.ascontiguousarray((answers @ by_tension).T)
         step = y + answers @ force
@@ -173,7 +174,7 @@ def tracked_touching(
     if not converged:
         point = start
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
-    return converged, point, q, tension, displacement, compliance, answer, residual, places, forces, held
+    return converged, point, q, tension, displacement, compliance, answer, residual, places, forces, held, pressing
 
 
 @njit(cache=True)

@@ -145,13 +145,15 @@ class ReducedTracker:
         assert self.contact is not None
         state, (longest, _, tolerance) = self.state, self._limits
         touching = self.contact.touching(state.q, gravity)
-        converged, self._point, q, tension, displacement, compliance, answer, residual, places, forces, held = tracked_touching(
+        (
+            converged, self._point, q, tension, displacement, compliance, answer, residual, places, forces, held, by_tension,
+        ) = tracked_touching(
             self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
             self._kept, iterations, min(longest, touching.surface.radius.min()), tolerance, touching,
         )  # fmt: skip
         if not converged:
             return replace(state, residual=np.inf, converged=False)
-        self.contact.keep(touching, places, forces, held)
+        self.contact.keep(touching, places, forces, held, by_tension)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 

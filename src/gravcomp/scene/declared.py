@@ -22,6 +22,12 @@ class Wall:
     frame: str = parameter("soft_base", choices=_FRAMES, description="frame of its place; an obstacle in the world does not turn")
     friction: float = parameter(0.0, minimum=0.0, maximum=10.0, description="coefficient of Coulomb's friction with the robot")
     stiffness: float | None = parameter(None, edge="MPa", minimum=1e-6, maximum=1e6, description=_RIGID)
+    forbidden: bool = parameter(False, description="no wall but a zone: the controller keeps the robot out, nothing pushes it")
+
+    def __post_init__(self) -> None:
+        given = [key for key, value in (("friction", self.friction), ("stiffness_mpa", self.stiffness)) if value]
+        if self.forbidden and given:
+            raise ValueError(f"{given[0]} is given, but a forbidden zone touches nothing; leave it out, or leave out forbidden")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -32,6 +38,7 @@ class PlaneWall(Wall):
     normal: _Point = parameter((0.0, 0.0, 1.0), minimum=-1e6, maximum=1e6, description="out of the wall, of any length but 0")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not any(self.normal):
             raise ValueError("normal is (0, 0, 0), which is no direction; a vector other than zero is needed")
 
@@ -69,6 +76,7 @@ class TubeWall(Wall):
     closed: bool = parameter(False, description="a lumen's far end is closed by a half ball; else both ends are open")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.points) < 2:
             raise ValueError(f"points has {len(self.points)} entries; at least 2 are needed")
         if len(self.radius) not in (1, len(self.points)):

@@ -18,19 +18,20 @@ _UPRIGHT = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class Scene:
-    """Obstacles around a robot.
+    """Obstacles around a robot, or the zones that are forbidden to it. It does not change after it is made.
 
-    Attributes: names and walls of the obstacles; arrays: `SceneArrays` in soft_base, for compiled functions (`distance.nearest`,
-    `distance.gap_to`); in_world (k,): whether a row of them is in the world; source: the file in errors; notes: sentences on
-    what was repaired in files.
+    Attributes: names and walls of the obstacles; arrays: `SceneArrays` in soft_base of the horizontal robot, for compiled
+    functions (`distance.nearest`, `distance.gap_to`); in_world (k,): whether a row of them is in the world; source: the file in
+    errors; notes: sentences on what was repaired in files.
     """
 
-    def __init__(self, section: SceneSection, source: str = "scene"):
+    def __init__(self, section: SceneSection, source: str = "scene", forbidden: bool = False):
         """Read the files that the section names; `source`, the robot file, stands in errors, and paths are relative to it.
 
-        Raises ConfigError: a file that is missing, no closed surface, or of a size that another unit would explain.
+        forbidden: take the section's forbidden zones in place of its walls. Raises ConfigError: a file that is missing, no
+        closed surface, or of a size that another unit would explain.
         """
-        self.walls: tuple[Wall, ...] = section.walls
+        self.walls: tuple[Wall, ...] = tuple(wall for wall in section.walls if wall.forbidden == forbidden)
         self.names = tuple(_name(section, wall) for wall in self.walls)
         self.notes: list[str] = []
         self.source = source
@@ -49,27 +50,25 @@ class Scene:
         return bool(self.walls)
 
     def turned(self, rotation: np.ndarray) -> SceneArrays:
-        """Return the obstacles in soft_base where `rotation` (3, 3) turns soft_base into the world, and keep it in `arrays`."""
-        if self.in_world.any():
-            back = np.where(self.in_world[:, None, None], np.asarray(rotation).T, np.eye(3))
-            turned = self._own._replace(
-                rotation=np.ascontiguousarray(back @ self._own.rotation), origin=np.einsum("kij,kj->ki", back, self._own.origin)
-            )
-            self.arrays = turned
-        else:
-            self.arrays = self._own
-        return self.arrays
+        """Return the obstacles in soft_base where `rotation` (3, 3) turns soft_base into the world."""
+        if not self.in_world.any():
+            return self._own
+        back = np.where(self.in_world[:, None, None], np.asarray(rotation).T, np.eye(3))
+        return self._own._replace(
+            rotation=np.ascontiguousarray(back @ self._own.rotation), origin=np.einsum("kij,kj->ki", back, self._own.origin)
+        )
 
     def under_gravity(self, gravity: np.ndarray) -> SceneArrays:
-        """Return the obstacles in soft_base for gravity (3,) there, and keep it in `arrays`. See `world_rotation`."""
-        return self.turned(world_rotation(gravity)) if self.in_world.any() else self.arrays
+        """Return the obstacles in soft_base for gravity (3,) there. See `world_rotation`."""
+        return self.turned(world_rotation(gravity)) if self.in_world.any() else self._own
 
-    def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def nearest(self, points: np.ndarray, arrays: SceneArrays | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return gap (n,) in m, normal (n, 3) into free space, and number of the nearest obstacle (n,) for points (n, 3).
 
-        Points and normals are in soft_base. Without obstacles the gap is infinite and the number -1.
+        Points and normals are in soft_base. arrays: of `turned` or `under_gravity`, default: those of the horizontal robot.
+        Without obstacles the gap is infinite and the number -1.
         """
-        return nearest_of_all(self.arrays, np.ascontiguousarray(points, dtype=float).reshape(-1, 3))
+        return nearest_of_all(self.arrays if arrays is None else arrays, np.ascontiguousarray(points, dtype=float).reshape(-1, 3))
 
     def refuse_other_units(self, length: float) -> None:
         """Raise ConfigError for a surface of a size that does not suit a robot of this length in m, but would in m or mm."""

@@ -10,6 +10,8 @@ learnt about s in one direction of gravity holds in all others. A measurement gi
 outliers is that of Bar-Shalom, Li and Kirubarajan (Estimation with applications to tracking and navigation, 2001).
 """
 
+import copy
+
 import numpy as np
 
 GATE = 21.1
@@ -23,6 +25,12 @@ class ErrorFilter:
         """offset_std in m and scale_std: standard deviations before the first measurement."""
         self.state = np.zeros(4)
         self.covariance = np.diag([offset_std**2] * 3 + [scale_std**2])
+
+    def copy(self) -> "ErrorFilter":
+        """Return a filter in the same state; the steps of one do not change the other."""
+        other = copy.copy(self)
+        other.state, other.covariance = self.state.copy(), self.covariance.copy()
+        return other
 
     def error(self, sensitivity: np.ndarray) -> np.ndarray:
         """Return the model's error (3,) in m where its sensitivity is (3,) in m."""

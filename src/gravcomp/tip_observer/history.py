@@ -12,13 +12,17 @@ _KEPT = 1.5  # of the longest delay
 
 
 class Prediction(NamedTuple):
-    """The model at one time: stamp in s, tip (3,) in m, its orientation (4,) x y z w, response and tensions (m,) in N."""
+    """The model at one time: stamp in s, tip (3,) in m, its orientation (4,) x y z w, response and tensions (m,) in N.
+
+    touching: whether it leans on an obstacle.
+    """
 
     stamp: float
     tip_position: np.ndarray
     tip_orientation: np.ndarray
     response: "Response"
     tension: np.ndarray
+    touching: bool = False
 
     def gravity_part(self, rest_tip: np.ndarray) -> np.ndarray:
         """Return by how much (3,) in m gravity displaces the tip of the released robot, by the linear response.

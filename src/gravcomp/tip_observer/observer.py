@@ -23,6 +23,7 @@ from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.tip_observer.causes import wild, wrong_axes, wrong_stamp
 from gravcomp.tip_observer.error_filter import GATE, ErrorFilter
 from gravcomp.tip_observer.history import History, Prediction
+from gravcomp.tip_observer.motion_check import Disagreement, MotionCheck
 from gravcomp.tip_observer.options import TipObserverOptions
 
 if TYPE_CHECKING:
@@ -84,6 +85,8 @@ class TipObserver:
         self._last_used = self._last_stamp = -np.inf
         self._refusal, self._in_a_row = "", 0
         self._largest_sag = 0.0
+        self._motion = MotionCheck(self._length, options.std, options.response)
+        self._agreed: ErrorFilter | None = None  # estimate while measured and modelled tip moved alike
         self._equal, self._last_position = 0, np.full(3, np.nan)
         self._restart()
 
@@ -99,13 +102,21 @@ class TipObserver:
         return self.options.authority * self._length
 
     def predict(
-        self, stamp: float, tip_position: np.ndarray, tip_orientation: np.ndarray, response: "Response", tension: np.ndarray
+        self,
+        stamp: float,
+        tip_position: np.ndarray,
+        tip_orientation: np.ndarray,
+        response: "Response",
+        tension: np.ndarray,
+        touching: bool = False,
     ) -> None:
-        """Remember a shape of the model: stamp in s, tip (3,) in m, orientation (4,) x y z w, tensions (m,) in N."""
+        """Remember a shape of the model: stamp in s, tip (3,) in m, orientation (4,) x y z w, tensions (m,) in N.
+
+        touching: whether it leans on an obstacle.
+        """
         if self.options.use:
-            self._history.add(
-                Prediction(stamp, np.asarray(tip_position), np.asarray(tip_orientation), response, np.asarray(tension))
-            )
+            tip, turn = np.asarray(tip_position), np.asarray(tip_orientation)
+            self._history.add(Prediction(stamp, tip, turn, response, np.asarray(tension), touching))
 
     def measure(self, stamp: float, arrival: float, frame: str, position: np.ndarray) -> bool:
         """Take a measurement; return whether it was accepted. `status` says why not.
@@ -153,7 +164,7 @@ class TipObserver:
             state = TrackerState.STALE
             sentence = f"no measured/tip was accepted for {now - self._last_used:.1f} s: the last correction is kept"
         elif self._used:
-            state = TrackerState.USED
+            state, sentence = TrackerState.USED, self._motion.sentence
         return TrackerStatus(state, sentence, self._applied, self._used, self._refused, self._restarts)
 
     # One measurement.
@@ -200,6 +211,7 @@ class TipObserver:
             pairs = self._pairs
             self._restart()
             self._pairs = pairs  # until the motion agrees again
+            self._motion.forget()
             return axes
         if far:
             return wild(measured, modelled, self._length, self._allowed)
@@ -207,11 +219,18 @@ class TipObserver:
         # While the model moves, the robot is somewhere on the way behind it.
         behind = then.tip_position - self._history.at(time - self.options.response).tip_position
         noise = self.options.std**2 * np.eye(3) + np.outer(behind, behind)
+        motion = self._motion.observe(time, measured, modelled, then.touching)
+        if motion is Disagreement.HELD:
+            if self._agreed is not None:
+                self._filter = self._agreed.copy()
+            return self._motion.sentence
         self._diffuse(then)
         if self._filter.distance(residual, sensitivity, noise) > GATE:
             return self._outlier(then, residual, sensitivity, noise)
         self._outliers.clear()
         self._filter.update(residual, sensitivity, noise)
+        if self._motion.agrees:
+            self._agreed = self._filter.copy()
         return ""
 
     def _diffuse(self, then: Prediction) -> None:

@@ -39,6 +39,7 @@ _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
 _LONGEST_START = 5.0  # s
 _BRIEF, _FEWER = 0.2, 6  # of the budget; every so many of the orientations
+_BRIEFLY_FITTED = {"offsets", "compliance", "weight"}  # with the moduli: the others take most of the derivatives' time
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ def calibrate_on_virtual_robot(context: Context) -> Calibration:
     fit = fit_statics(
         setup.robot,
         still_windows(measured, still, WINDOWS),
+        groups=_BRIEFLY_FITTED if context.brief else None,
         mass=weighed(setup),
         creep_times=creep_times(plan.rest),
         progress=lambda stage: context.progress(f"calibrating: {stage}"),

@@ -50,7 +50,8 @@ def recover(context: Context) -> list[Recovered]:
     described = context.setup.robot.materials[0].youngs_modulus
     moduli = [ratio * described for ratio in (MODULI[1:2] if context.brief else MODULI)]
     poses = _POSES[:1] if context.brief else _POSES
-    jobs = [(context.setup, modulus, poses) for modulus in moduli]
+    pulls = _PULLS[1:] if context.brief else _PULLS
+    jobs = [(context.setup, modulus, poses, pulls) for modulus in moduli]
     fits = context.map(_fit_known, jobs, "fitting robots with known parameters")
     found = []
     for modulus, fit in zip(moduli, fits):
@@ -101,17 +102,22 @@ def known_setup(setup: Setup, modulus: float) -> Setup:
     return dataclasses.replace(setup, truth=dataclasses.replace(truth, body=body, tendons=tendons))
 
 
-def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES) -> StillWindows:
-    """Return tips at rest of the known robot: released, and with each cable pulled in, in each pose (inclination, roll, deg)."""
+def known_windows(
+    setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES, pulls: tuple[float, ...] = _PULLS
+) -> StillWindows:
+    """Return tips at rest of the known robot: released, and with each cable pulled in, in each pose (inclination, roll, deg).
+
+    pulls: of each cable, over the length.
+    """
     rod, random = build_rod(setup.true_robot), np.random.default_rng(setup.seed)
     count, rows = rod.tendons, []
     length, offset = setup.nominal.length, offsets(setup.nominal)
     for inclination, roll in poses:
         gravity = base_orientation(np.radians(inclination), np.radians(roll)).T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
-        pulls = [np.full(count, np.nan)] + [
-            np.where(np.arange(count) == c, length * pull, np.nan) for c in range(count) for pull in _PULLS
+        commands = [np.full(count, np.nan)] + [
+            np.where(np.arange(count) == c, length * pull, np.nan) for c in range(count) for pull in pulls
         ]
-        for command in pulls:
+        for command in commands:
             # A released cable is slack.
             displacement = np.where(np.isnan(command), _RELEASED * length, command + offset)
             shape = equilibrium(rod, gravity, displacement=displacement)
@@ -122,6 +128,6 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
     return StillWindows(gravity, displacement, tip, direction)
 
 
-def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...]]) -> StaticFit:
-    setup, modulus, poses = job
-    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses), groups=_FITTED)
+def _fit_known(job: tuple[Setup, float, tuple[tuple[float, float], ...], tuple[float, ...]]) -> StaticFit:
+    setup, modulus, poses, pulls = job
+    return fit_statics(setup.robot, known_windows(known_setup(setup, modulus), poses, pulls), groups=_FITTED)

@@ -113,9 +113,8 @@ def steer(job: tuple[Setup, Passage, bool, int]) -> Steered:
     handle = PushedHandle(passage.orientation, passage.first - length, seed)
     loop = ClosedLoop(dataclasses.replace(setup, scene=scene, seed=seed), handle)
     path = FollowedPath(length, robot.segments[-1].full_length, 2.0 * np.pi / (_BEND * length), setup.direction_weight)
-    scene.turned(np.eye(3))  # pictures are taken in the world
     line = passage.lumen.point(np.linspace(0.0, passage.depth + 0.2 * length, 80)) @ passage.orientation.T
-    camera = Camera(scene, line, _HALF_VIEW)
+    camera = Camera(scene.turned(np.eye(3)), line, _HALF_VIEW)  # pictures are taken in the world
     hand = Steering(person, _PERIOD, np.pi * (width / 2) ** 2, seed)
     target = passage.orientation @ passage.target(_RAISED * width)
     loop.hold(path.target(passage.first), weightless=not compensated)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from gravcomp.full_model.wrench import Wrench
     from gravcomp.inverse import Command
+    from gravcomp.scene.scene import Scene
     from gravcomp.simulation import Shape, Simulator
 
 
@@ -56,7 +57,7 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
     if args.target is not None:
-        shape, command = _reached(simulator, gravity, args.target, args.direction, wrenches)
+        shape, command = _reached(simulator, gravity, args.target, args.direction, wrenches, file.zones)
         return simulator, shape, command
     displacement = None if args.displacement is None else 1e-3 * np.array(args.displacement)
     shape = simulator.solve(gravity, displacement, args.tension, wrench=wrenches)
@@ -72,6 +73,7 @@ def _reached(
     target: list[float],
     direction: list[float] | None,
     wrenches: "tuple[Wrench, ...]",
+    zones: "Scene",
 ) -> "tuple[Shape, Command]":
     """Run the closed loop of model and inverse problem until the tip is at rest. `target` in mm."""
     import numpy as np
@@ -81,7 +83,7 @@ def _reached(
     weight = 0.01 if direction is not None else 0.0
     towards = None if direction is None else np.array(direction)
     wanted = Target(1e-3 * np.array(target), tip_direction=towards, tip_direction_weight=weight)
-    controller = InverseController(simulator.robot)
+    controller = InverseController(simulator.robot, scene=simulator.scene, zones=zones)
     shape = simulator.solve(gravity, wrench=wrenches)
     before = shape.tip_position
     for _ in range(2000):
@@ -92,7 +94,8 @@ def _reached(
             tension=shape.cable_tension,
             interval=0.02,
             followed=shape.is_equilibrium,
-            contact=shape.contacts.sentence,
+            contact=shape.contacts.by_obstacle(),
+            gravity=gravity,
         )
         shape = simulator.step(gravity, command.displacement, wrench=wrenches)
         if shape.is_equilibrium and np.linalg.norm(shape.tip_position - before) < 1e-8:

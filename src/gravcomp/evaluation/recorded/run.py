@@ -17,7 +17,8 @@ from gravcomp.recordings.bags.streams import CONTROLLER_STATUS, POSE, SHAPE_TARG
 
 # When a target is refused, the last one stays in force.
 _KEEPING = (
-    ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE, ControllerCode.CONTACT, ControllerCode.REFUSED
+    ControllerCode.OK, ControllerCode.AT_LIMIT, ControllerCode.UNREACHABLE, ControllerCode.CONTACT, ControllerCode.ZONE,
+    ControllerCode.REFUSED,
 )  # fmt: skip
 _RATE = 100.0  # Hz, largest rate of the tip that is kept
 _WANTED = {

@@ -11,7 +11,7 @@ LONGEST_WRAPPED_STEP = 20  # periods: a longer step is not the next sample of a 
 BURSTS_FROM = 0.1  # of the samples that repeat a stamp with other values: the driver reads in bursts
 
 
-def _wrapped_counter(step_ns: int, period_ns: float) -> int:
+def wrapped_counter(step_ns: int, period_ns: float) -> int:
     """Return the range in ns of the 32-bit counter that wrapped in a backward step of the stamps, 0 where none explains it."""
     for span in COUNTER_NS:
         if 0 < step_ns + span <= LONGEST_WRAPPED_STEP * period_ns:
@@ -57,7 +57,7 @@ def _unwrapped(stamp_ns: np.ndarray) -> tuple[np.ndarray, int]:
     period = float(np.median(forward))
     spans = np.zeros(len(step), np.int64)
     for i in np.flatnonzero(step < 0).tolist():
-        spans[i] = _wrapped_counter(int(step[i]), period)
+        spans[i] = wrapped_counter(int(step[i]), period)
     return stamp_ns + np.concatenate([[0], np.cumsum(spans)]), int(np.count_nonzero(spans))
 
 
