@@ -1,10 +1,10 @@
 """Does the measured tip move as the model's does? Where a scene is wrong, or something unknown is in the way, it does not.
 
-Both are compared with where they were when they last agreed; at first, where the model was at rest and leant on nothing. They
-disagree where their ways differ by more than noise explains, and by half of the longer one; by a fifth where the model leans on
-an obstacle, as the robot may lean on it elsewhere. A robot that does not move while its model moves on is held by something: a
-correction of the target by the difference would press it on, farther with every measurement. A robot that moves while its model
-leans on an obstacle is not held by it.
+Both are compared with where they were when they last agreed; at first, where the model was at rest and leant on nothing.
+They disagree where their ways differ by more than noise explains, and by half of the longer one; by a fifth where the model
+leans on an obstacle, as the robot may lean on it elsewhere. A robot that does not move while its model moves on is held by
+something: a correction of the target by the difference would press it on, farther with every measurement. A robot that
+moves while its model leans on an obstacle is not held by it.
 """
 
 import collections
