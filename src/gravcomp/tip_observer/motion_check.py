@@ -1,10 +1,10 @@
 """Does the measured tip move as the model's does? Where a scene is wrong, or something unknown is in the way, it does not.
 
-Both are compared with where they were when they last agreed, or last were at rest apart from obstacles. They disagree where their
-ways differ by more than noise explains, and by half of the longer one; by a fifth where the model leans on an obstacle, as the
-robot may lean on it elsewhere. A robot that does not move while its model moves on is held by something: a correction of the
-target by the difference would press it on, farther with every measurement. A robot that moves while its model leans on an
-obstacle is not held by it.
+Both are compared with where they were when they last agreed; at first, where the model was at rest and leant on nothing.
+They disagree where their ways differ by more than noise explains, and by half of the longer one; by a fifth where the model
+leans on an obstacle, as the robot may lean on it elsewhere. A robot that does not move while its model moves on is held by
+something: a correction of the target by the difference would press it on, farther with every measurement. A robot that
+moves while its model leans on an obstacle is not held by it.
 """
 
 import collections
@@ -43,7 +43,6 @@ class MotionCheck:
     def forget(self) -> None:
         """Begin again at the next measurement."""
         self._agreed: tuple[np.ndarray, np.ndarray] | None = None
-        self._leant = False  # whether the model leant on an obstacle there
         self._last: collections.deque[tuple[np.ndarray, np.ndarray]] = collections.deque(maxlen=_MEAN)
         self.agrees = True
         self._began()
@@ -59,8 +58,10 @@ class MotionCheck:
             return Disagreement.NONE
         measured, modelled = (np.mean(tips, axis=0) for tips in zip(*self._last))
         at_rest = max(float(np.linalg.norm(tip - modelled)) for _, tip in self._last) < _REST * self._way
-        if self._agreed is None or (self._leant and at_rest and not touching):
-            self._agreed, self._leant = (measured, modelled), touching
+        if self._agreed is None:
+            if not at_rest or touching:
+                return Disagreement.NONE
+            self._agreed = measured, modelled
         own, foreseen = measured - self._agreed[0], modelled - self._agreed[1]
         moved, expected = float(np.linalg.norm(own)), float(np.linalg.norm(foreseen))
         longer = max(moved, expected)
@@ -69,7 +70,7 @@ class MotionCheck:
         self.agrees = difference < 0.5 * allowed
         if difference < allowed:
             if difference < 0.5 * _TOUCHING * longer:
-                self._agreed, self._leant = (measured, modelled), touching
+                self._agreed = measured, modelled
             self._began()
             return Disagreement.NONE
         if self._count == 0:
@@ -79,7 +80,7 @@ class MotionCheck:
         if self._count < _LEAST or time - self._since < self._time:
             return Disagreement.NONE
         if self._kind is Disagreement.LOOSE and not touching:  # a load, or a tracker that was moved
-            self._agreed, self._leant = (measured, modelled), False
+            self._agreed = measured, modelled
             self._began()
             return Disagreement.NONE
         ways = f"the model's tip has moved by {1e3 * expected:.1f} mm, the measured one by {1e3 * moved:.1f} mm"
