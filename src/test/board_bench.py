@@ -3,7 +3,7 @@
 import can
 
 from gravcomp.canbus import c610
-from gravcomp.firmware import requests
+from gravcomp.firmware import model_transfer, requests
 from gravcomp.firmware.host_board import HOST_BUS, MOTOR_BUS
 
 STILL = (10, 20, 5460, 1, 2, 3)
@@ -54,6 +54,21 @@ class Bench:
         begin = len(self.host)
         self.run(2)
         return next((a for _, frame in self.host[begin:] if (a := requests.answer_of(frame))), None)
+
+    def transfer(self, steps, lose=lambda message: False, feedback=False):
+        """Let a host send a model, without the frames that `lose` names; each answer is in `answers`. Raises what `steps` does."""
+        self.answers = []
+        try:
+            messages = next(steps)
+            while True:
+                begin = len(self.host)
+                self.waiting += [message for message in messages if not lose(message)]
+                self.run(2, feedback=feedback)
+                found = [a for _, frame in self.host[begin:] if (a := model_transfer.answer_of(frame))]
+                self.answers += found
+                messages = steps.send(found[-1] if found else None)
+        except StopIteration:
+            pass
 
     def currents(self, motor=1, since=0):
         """Currents (mA) of a motor with the times (ms) at which they were sent."""

@@ -7,7 +7,9 @@ from pathlib import Path
 from gravcomp.commands import output
 from gravcomp.commands.parsers import add_subcommand
 
-_TESTS = ("src/test/test_firmware.py", "src/test/test_virtual_board.py", "src/test/test_standalone.py")
+_TESTS = (
+    "src/test/test_firmware.py", "src/test/test_virtual_board.py", "src/test/test_standalone.py", "src/test/test_model_transfer.py",
+)  # fmt: skip
 _FOLDER = "build/firmware"
 
 

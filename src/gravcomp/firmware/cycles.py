@@ -128,6 +128,11 @@ class Processor:
         uc.emu_start(self.symbols[name] | 1, _RETURN)
         return uc.reg_read(arm.UC_ARM_REG_R0), self._counter.result() if self._counter else None
 
+    def take_model(self, blob: bytes) -> bool:
+        """Let the loop at MEMORY_AT take the model; return whether it does."""
+        magic = int.from_bytes(blob[:4], "little")
+        return bool(self.call("gc_standalone_take", MEMORY_AT, MODEL_AT, len(blob), magic, 0)[0] & 0xFF)
+
     def block_at(self, address: int, size: int) -> tuple[int, int, bool, str]:
         """Return cost, end, whether it ends with a branch, and function of a block of instructions."""
         known = self._blocks.get(address)
@@ -207,8 +212,7 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
     """
     plain, counting = Processor(image, blob), Processor(image, blob, counts=True)
     sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
-    taken, _ = plain.call("gc_standalone_load", MEMORY_AT, MODEL_AT, len(blob))
-    if not taken & 0xFF:
+    if not plain.take_model(blob):
         raise RuntimeError("the image refuses the model")
     counted = []
     for number, data in enumerate(samples):

@@ -19,6 +19,7 @@ from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
+from gravcomp.firmware.host_board import HostBoard
 from gravcomp.scene.scene import Scene
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
@@ -57,12 +58,14 @@ class VirtualRobot:
         motion: BaseMotion | None = None,
         board: str = "virtual",
         scene: Scene | None = None,
+        model: bytes | None = None,
     ):
         """Start in the static equilibrium.
 
         `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
-        the robot horizontal; `board`: 'virtual', Python code, or 'emulated', the firmware's; `scene`: walls around the robot,
-        whose world begins where the base is at first. Where the robot in equilibrium would lie in a wall it starts unloaded.
+        the robot horizontal; `board`: 'virtual', Python code, 'emulated', the firmware's, or 'standalone', the firmware's with the
+        loop on the board, whose blob is `model`; `scene`: walls around the robot, whose world begins where the base is at first.
+        Where the robot in equilibrium would lie in a wall it starts unloaded.
         Raises ConfigError where the motors do not match the cables, where the parameters describe no robot, where the rod cannot
         represent it, and where the unloaded robot is in a wall.
         """
@@ -78,7 +81,7 @@ class VirtualRobot:
         self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true), around)
         self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
         self._board: VirtualBoard | EmulatedBoard = (
-            EmulatedBoard(true.board, imu, hardware) if board == "emulated" else VirtualBoard(true.board, imu)
+            VirtualBoard(true.board, imu) if board == "virtual" else EmulatedBoard(true.board, imu, hardware, model)
         )
         self._base = MovingBase(
             motion or StaticMotion(base_orientation(0.0)),
@@ -125,6 +128,12 @@ class VirtualRobot:
     def faults(self) -> tuple[Fault, ...]:
         """Faults that act at present."""
         return self._faults.all
+
+    @property
+    def firmware(self) -> HostBoard:
+        """The board's C code, of a robot whose board is not 'virtual'."""
+        assert isinstance(self._board, EmulatedBoard)
+        return self._board.firmware
 
     def turn_base(self, orientation: np.ndarray) -> None:
         """Turn the base to `orientation` (3, 3), world from soft_base, and keep it there; this ends the motion that it had."""

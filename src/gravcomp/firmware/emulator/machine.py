@@ -10,7 +10,7 @@ from typing import Any
 
 from gravcomp.firmware.elf import read_elf
 from gravcomp.firmware.emulator.can_controller import CanController, WireFrame
-from gravcomp.firmware.emulator.flash_memory import FlashMemory, SupplyLost
+from gravcomp.firmware.emulator.flash_memory import MODELS, MODELS_END, FlashMemory, SupplyLost
 from gravcomp.firmware.emulator.imu_device import ImuDevice
 from gravcomp.firmware.image import BOOT_START, CODE_START, Image
 from gravcomp.firmware.toolchain import provide
@@ -57,7 +57,8 @@ class Machine:
         self.symbols = elf.symbols
         self._uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
-        self.flash = FlashMemory()
+        self.flash = FlashMemory(self._erase_model)
+        self._unsettled: tuple[int, int, int] | None = None  # address, size and what was there, of a write to the models
         uc.mem_map(BOOT_START, PARAMETERS - BOOT_START)
         uc.mmio_map(PARAMETERS, CODE_START - PARAMETERS, self._read_parameters, None, self._write_parameters, None)
         uc.mem_map(CODE_START, FLASH_END - CODE_START)
@@ -67,7 +68,8 @@ class Machine:
         uc.mem_write(_UNIQUE + 0xA10, struct.pack("<3I", *unique_id))
         uc.mmio_map(_PERIPHERALS, 0x28000, self._read, None, self._write, None)
         uc.mmio_map(_SYSTEM, 0x1000, self._read_system, None, self._write_system, None)
-        self.code = image.code
+        if "gc_standalone_step" in self.symbols:
+            uc.hook_add(unicorn.UC_HOOK_MEM_WRITE, self._write_model, None, MODELS, MODELS_END - 1)
         self.load(image.boot, image.code)
         main = self.symbols["main"] & ~1
         self._wait = main + bytes(uc.mem_read(main, 4096)).index(_WFI)
@@ -89,6 +91,10 @@ class Machine:
         self._uc.ctl_remove_cache(BOOT_START, PARAMETERS)
         self._uc.ctl_remove_cache(CODE_START, FLASH_END)
 
+    def load_model(self, blob: bytes) -> None:
+        """Write a model into the first place for models; the other one is erased."""
+        self._uc.mem_write(MODELS, blob.ljust(MODELS_END - MODELS, b"\xff"))
+
     def read_memory(self, address: int, size: int) -> bytes:
         """Read memory."""
         return bytes(self._uc.mem_read(address, size))
@@ -106,6 +112,7 @@ class Machine:
             can.received.clear()
             can.sent.clear()
         self.resets.append(cause)
+        self._unsettled = None
         self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
         stack, start = struct.unpack("<2I", self.read_memory(BOOT_START, 8))
         self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
@@ -193,6 +200,7 @@ class Machine:
         self._failure: Exception | None = None
         try:
             self._uc.emu_start(start | 1, 0, timeout=patience)
+            self._guarded(self._settle)
         except self._error as error:
             at = self._uc.reg_read(self._arm.UC_ARM_REG_PC)
             raise ProcessorFault(f"at 0x{at:08X}: {error}") from error
@@ -221,6 +229,23 @@ class Machine:
     def _write_parameters(self, uc: Any, offset: int, size: int, value: int, _: Any) -> None:
         self._guarded(self.flash.write, offset, size, value)
 
+    def _erase_model(self, address: int, size: int) -> None:
+        self._uc.mem_write(address, b"\xff" * size)
+
+    def _write_model(self, uc: Any, _: int, address: int, size: int, value: int, __: Any) -> None:
+        """Take note of a write to the models: the emulator makes it, and `_settle` what the flash makes of it."""
+        self._guarded(self._settle)
+        self._unsettled = (address, size, int.from_bytes(uc.mem_read(address, size), "little"))
+
+    def _settle(self) -> None:
+        """Let the last place of the models that was written have what the flash has there then. Raises SupplyLost."""
+        if self._unsettled is None:
+            return
+        (address, size, before), self._unsettled = self._unsettled, None
+        value = int.from_bytes(self._uc.mem_read(address, size), "little")
+        self._uc.mem_write(address, before.to_bytes(size, "little"))
+        self._uc.mem_write(address, self.flash.written(before, value).to_bytes(size, "little"))
+
     def _read_system(self, uc: Any, offset: int, size: int, _: Any) -> int:
         return 0
 
@@ -247,6 +272,7 @@ class Machine:
         if offset == _PWR + 0x04:
             return 4 if self.supply_low else 0
         if _FLASH < offset < _FLASH + 0x20:
+            self._settle()
             return self.flash.read_register(offset - _FLASH)
         value = self._registers.get(offset, 0)
         if offset == _RCC:
@@ -269,6 +295,7 @@ class Machine:
         elif offset == _EXTI + 0x14:
             self._registers[offset] = self._registers.get(offset, 0) & ~value
         elif _FLASH < offset < _FLASH + 0x20:
+            self._settle()
             self.flash.write_register(offset - _FLASH, value)
         elif offset in (_GPIOA + 0x18, _GPIOB + 0x18):
             pin, device = _SELECTS[offset - 0x18]
