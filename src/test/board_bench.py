@@ -56,7 +56,7 @@ class Bench:
         return next((a for _, frame in self.host[begin:] if (a := requests.answer_of(frame))), None)
 
     def transfer(self, steps, lose=lambda message: False, feedback=False):
-        """Let a host send a model, without the frames that `lose` names; each answer is in `answers`. Raises what `steps` does."""
+        """Let a host send a model, without the frames that `lose` names; all answers are in `answers`. Raises as `steps`."""
         self.answers = []
         try:
             messages = next(steps)

@@ -1,4 +1,4 @@
-"""A new model over CAN, on the C code of this machine and on the image in the emulator: taken, or refused while the old one goes on."""
+"""A new model over CAN, on the C code of this machine and on the emulated image: taken, or refused while the old one goes on."""
 
 import struct
 

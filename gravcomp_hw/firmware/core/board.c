@@ -388,8 +388,8 @@ static void watch_twin(gc_board *board) {
 }
 
 static void watch_queues(gc_board *board) {
-  if (board->queues[0].dropped + board->queues[1].dropped != board->dropped) {
-    board->dropped = board->queues[0].dropped + board->queues[1].dropped;
+  if (gc_board_lost(board) != board->dropped) {
+    board->dropped = gc_board_lost(board);
     board->passing |= GC_FAULT_FRAMES;
   }
 }

@@ -24,6 +24,10 @@ bool gc_board_drives(const gc_board *board) {
   return board->state != GC_IDLE && board->state != GC_RELEASED && board->state != GC_FAULT;
 }
 
+uint32_t gc_board_lost(const gc_board *board) {
+  return board->queues[0].dropped + board->queues[1].dropped + board->lost;
+}
+
 bool gc_board_reserve(gc_board *board) {
   board->reserved = !gc_board_drives(board);
   return board->reserved;

@@ -96,7 +96,8 @@ typedef struct {
   bool supply_low;    // the supply is below its limit
   bool job_waits;     // the loop on the board has a sample to work on
   gc_sample job;
-  uint32_t dropped;   // frames that found a queue full
+  uint32_t lost;      // frames that the buses' rings of reception had no room for, set before each tick
+  uint32_t dropped;   // frames that were lost in rings or queues, as reported
   uint8_t clamped;    // motors whose current was limited since the last BoardState
   bool restart;       // a restart was requested
   bool reserved;      // the flash is written: no state begins in which the board drives
@@ -119,6 +120,9 @@ bool gc_board_motors_answer(const gc_board *board);
 
 // Whether currents go to the motors: those of the host, or of the board's own loops.
 bool gc_board_drives(const gc_board *board);
+
+// Frames that were lost because a queue or a ring was full.
+uint32_t gc_board_lost(const gc_board *board);
 
 // Keep the board from driving while the flash is written; false while it drives. Ends with gc_board_unreserve.
 bool gc_board_reserve(gc_board *board);

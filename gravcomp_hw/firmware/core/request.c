@@ -43,7 +43,7 @@ static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
       *value = board->slowest;
       return GC_DONE;
     case GC_KEY_DROPPED:
-      *value = board->queues[0].dropped + board->queues[1].dropped;
+      *value = gc_board_lost(board);
       return GC_DONE;
     case GC_KEY_HOMING:
       *value = (uint32_t)board->homing.phase << 8 | board->homing.motor;

@@ -83,7 +83,8 @@ class ClosedLoop:
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
         load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. The board
         "standalone" computes the commands and drives the motors by itself while the loop holds; the host then only listens, and
-        its simulator follows the board's commands. It needs a reduced model. Raises RuntimeError where the bridge does not start, ConfigError for a robot that does not fit the board.
+        its simulator follows the board's commands. It needs a reduced model. Raises RuntimeError where the bridge does not start,
+        ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(

@@ -1,8 +1,8 @@
 """The virtual board whose frames come from the firmware's own C code (`gravcomp.firmware`); its IMU is that of `VirtualBoard`.
 
 The board sits between the host and the motors of its bus: it limits currents, holds and releases the cables when the host dies.
-With a model it has the loop on the board as well, which the host's request `run` starts. The cables' zero positions are then known
-from the start, as after homing: there they are where the straight robot has them.
+With a model it has the loop on the board as well, which the host's request `run` starts. The cables' zero positions are then
+known from the start, as after homing: there they are where the straight robot has them.
 """
 
 import can
@@ -16,6 +16,9 @@ from gravcomp.firmware.host_board import HOST_BUS, MOTOR_BUS, HostBoard
 from gravcomp.firmware.settings import settings_of
 from gravcomp.virtual.imu_chip import SAMPLE_PERIOD, ImuChip
 from gravcomp.virtual.parameters import Board
+
+LOOP_FRAMES = range(0x328, 0x330)
+"""Ids of the frames to the loop on the board (canbus/FRAMES.md)."""
 
 _STATUS = 0x313
 _COUNTS_PER_DEGREE, _ZERO_DEGREES = 8.0, 23.0

@@ -28,7 +28,7 @@ from gravcomp.virtual.board import STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.dynamics import MovingRod
-from gravcomp.virtual.emulated_board import EmulatedBoard
+from gravcomp.virtual.emulated_board import LOOP_FRAMES, EmulatedBoard
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.frame_faults import FrameFaults
@@ -63,11 +63,11 @@ class VirtualRobot:
         """Start in the static equilibrium.
 
         `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
-        the robot horizontal; `board`: 'virtual', Python code, 'emulated', the firmware's, or 'standalone', the firmware's with the
-        loop on the board, whose blob is `model`; `scene`: walls around the robot, whose world begins where the base is at first.
-        Where the robot in equilibrium would lie in a wall it starts unloaded.
-        Raises ConfigError where the motors do not match the cables, where the parameters describe no robot, where the rod cannot
-        represent it, and where the unloaded robot is in a wall.
+        the robot horizontal; `board`: 'virtual', Python code, 'emulated', the firmware's, or 'standalone', the firmware's with
+        the loop on the board, whose blob is `model`; `scene`: walls around the robot, whose world begins where the base is at
+        first. Where the robot in equilibrium would lie in a wall it starts unloaded. Raises ConfigError where the motors do not
+        match the cables, where the parameters describe no robot, where the rod cannot represent it, and where the unloaded robot
+        is in a wall.
         """
         if hardware.cables != robot.cable_names:
             raise ConfigError(f"motors for the cables {', '.join(hardware.cables)}; the robot has {', '.join(robot.cable_names)}")
@@ -232,7 +232,10 @@ class VirtualRobot:
         try:
             name, values = decode(frame)
         except FrameError:
-            self.refused += 1
+            if isinstance(self._board, EmulatedBoard) and frame.arbitration_id in LOOP_FRAMES:
+                self._board.receive(frame)
+            else:
+                self.refused += 1
             return
         bus = self._bus_index.get(str(frame.channel), self._board_bus)
         if bus != self._board_bus or not self._board.between:

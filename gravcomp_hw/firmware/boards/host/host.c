@@ -86,7 +86,8 @@ void gc_host_attach(gc_host *host, gc_host_loop *loop) {
 
 void gc_host_put_model(gc_host *host, const uint8_t *blob, size_t size) {
   uint8_t *bytes = (uint8_t *)host->loop->models;
-  for (size_t i = 0; i < sizeof host->loop->models; i++) {
+  const size_t room = GC_MODEL_SLOTS * GC_MODEL_SLOT;
+  for (size_t i = 0; i < room; i++) {
     bytes[i] = i < size ? blob[i] : 0xFFu;
   }
 }

@@ -73,6 +73,7 @@ void gc_on_tick(void) {
     }
     gc_board_bus_off(&board, bus, gc_can_is_off(bus));
   }
+  board.lost = rings[0].lost + rings[1].lost;
   gc_board_supply(&board, (PWR->csr & PWR_CSR_PVDO) != 0u);
   gc_bmi088_tick(&imu, &board.parameters, now);
   gc_board_tick(&board, now);

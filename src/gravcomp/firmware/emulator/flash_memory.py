@@ -1,7 +1,8 @@
 """Model of the flash's controller and of the sectors that the firmware writes [RM0090, section 3.9].
 
-Writing can only clear bits, needs the bit PG, and is refused while the controller is locked. The supply can fail at any word. The
-two sectors of the parameters are here; those of the models are in the emulator's memory, because the image reads them all the time.
+Writing can only clear bits, needs the bit PG, and is refused while the controller is locked. The supply can fail at any word.
+The two sectors of the parameters are here; those of the models are in the emulator's memory, because the image reads them all
+the time.
 """
 
 from collections.abc import Callable

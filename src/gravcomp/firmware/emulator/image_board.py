@@ -55,7 +55,7 @@ class ImageBoard:
     def word(self, name: str) -> int:
         """Return the 32 bits of a parameter."""
         at = self.machine.symbols["board"] + 4 * keys()[name]
-        return int.from_bytes(self.machine.read_memory(at, 4), "little")
+        return int.from_bytes(self.machine.read(at, 4), "little")
 
     def lose_supply_after(self, words: int) -> None:
         """Let the supply fail after this number of writes to the flash; negative: never."""

@@ -8,22 +8,20 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from gravcomp.firmware.elf import read_elf
 from gravcomp.firmware.emulator.can_controller import CanController, WireFrame
+from gravcomp.firmware.emulator.core import CCM, RETURN, Core
 from gravcomp.firmware.emulator.flash_memory import MODELS, MODELS_END, FlashMemory, SupplyLost
 from gravcomp.firmware.emulator.imu_device import ImuDevice
 from gravcomp.firmware.image import BOOT_START, CODE_START, Image
-from gravcomp.firmware.toolchain import provide
 
 PARAMETERS, FLASH_END = 0x08008000, 0x08100000
-RAM, RAM_SIZE, CCM, CCM_SIZE, STACK_SIZE = 0x20000000, 0x20000, 0x10000000, 0x10000, 0x2000
+STACK_SIZE = 0x2000
 WATCHDOG = 40_000
 """us that the watchdog waits."""
 
 RESET_FLAGS = {"power": 1 << 27 | 1 << 25, "supply": 1 << 25, "watchdog": 1 << 29, "software": 1 << 28, "pin": 1 << 26}
 """RCC_CSR after a reset by cause."""
 
-_RETURN = 0x08007FF0  # nothing is there; a handler that returns comes to it
 _PAINT = 0xA5
 _START_PATIENCE = 30_000_000  # us
 _WFI = b"\x30\xbf"
@@ -38,7 +36,7 @@ class ProcessorFault(RuntimeError):
     """The image has done what the processor does not do: it hangs, or reads where nothing is."""
 
 
-class Machine:
+class Machine(Core):
     """The chip with an image.
 
     Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty, resets (their causes),
@@ -47,34 +45,25 @@ class Machine:
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
         """Raises SetupError without the emulator."""
-        provide()
-        import unicorn
-        from unicorn import arm_const
-
-        self._arm = arm_const
-        self._error = unicorn.UcError
-        elf = read_elf(image.path.read_bytes())
-        self.symbols = elf.symbols
-        self._uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
-        uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        super().__init__(image)
+        self._error = self._unicorn.UcError
+        uc = self._uc
         self.flash = FlashMemory(self._erase_model)
         self._unsettled: tuple[int, int, int] | None = None  # address, size and what was there, of a write to the models
         uc.mem_map(BOOT_START, PARAMETERS - BOOT_START)
         uc.mmio_map(PARAMETERS, CODE_START - PARAMETERS, self._read_parameters, None, self._write_parameters, None)
         uc.mem_map(CODE_START, FLASH_END - CODE_START)
-        uc.mem_map(RAM, RAM_SIZE)
-        uc.mem_map(CCM, CCM_SIZE)
         uc.mem_map(_UNIQUE, 0x1000)
         uc.mem_write(_UNIQUE + 0xA10, struct.pack("<3I", *unique_id))
         uc.mmio_map(_PERIPHERALS, 0x28000, self._read, None, self._write, None)
         uc.mmio_map(_SYSTEM, 0x1000, self._read_system, None, self._write_system, None)
         if "gc_standalone_step" in self.symbols:
-            uc.hook_add(unicorn.UC_HOOK_MEM_WRITE, self._write_model, None, MODELS, MODELS_END - 1)
+            uc.hook_add(self._unicorn.UC_HOOK_MEM_WRITE, self._write_model, None, MODELS, MODELS_END - 1)
         self.load(image.boot, image.code)
         main = self.symbols["main"] & ~1
         self._wait = main + bytes(uc.mem_read(main, 4096)).index(_WFI)
         uc.ctl_exits_enabled(True)
-        uc.ctl_set_exits([self._wait, _RETURN, self.symbols["gc_stuck"] & ~1])
+        uc.ctl_set_exits([self._wait, RETURN, self.symbols["gc_stuck"] & ~1])
         self.resets: list[str] = []
         self.supply_low = False
         self.main_stands = False
@@ -95,10 +84,6 @@ class Machine:
         """Write a model into the first place for models; the other one is erased."""
         self._uc.mem_write(MODELS, blob.ljust(MODELS_END - MODELS, b"\xff"))
 
-    def read_memory(self, address: int, size: int) -> bytes:
-        """Read memory."""
-        return bytes(self._uc.mem_read(address, size))
-
     def reset(self, cause: str) -> None:
         """Start the image as after a reset, and run it until it waits. `dead` where it does not come so far."""
         self.now = 0
@@ -114,7 +99,7 @@ class Machine:
         self.resets.append(cause)
         self._unsettled = None
         self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
-        stack, start = struct.unpack("<2I", self.read_memory(BOOT_START, 8))
+        stack, start = struct.unpack("<2I", self.read(BOOT_START, 8))
         self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
         self.dead = False
         try:
@@ -160,19 +145,15 @@ class Machine:
     def interrupt(self, handler: str) -> None:
         """Run the handler of an interrupt; what it may change of main's registers is kept."""
         kept = self._uc.context_save()
-        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
-        self._run(self.symbols[handler] | 1, _RETURN)
+        self._uc.reg_write(self._arm.UC_ARM_REG_LR, RETURN | 1)
+        self._run(self.symbols[handler] | 1, RETURN)
         if not self.dead:
             self._uc.context_restore(kept)
 
     def call(self, name: str, *arguments: int) -> int:
         """Call a function of the image and return its result."""
-        registers = (self._arm.UC_ARM_REG_R0, self._arm.UC_ARM_REG_R1, self._arm.UC_ARM_REG_R2, self._arm.UC_ARM_REG_R3)
         kept = self._uc.context_save()
-        for register, value in zip(registers, arguments):
-            self._uc.reg_write(register, value)
-        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
-        self._run(self.symbols[name] | 1, _RETURN)
+        self._run(self._enter(name, arguments), RETURN)
         result = self._uc.reg_read(self._arm.UC_ARM_REG_R0)
         self._uc.context_restore(kept)
         return result
@@ -180,7 +161,7 @@ class Machine:
     @property
     def stack_used(self) -> int:
         """Bytes of the stack that were used since the reset, without the frames of interrupts."""
-        stack = self.read_memory(CCM, STACK_SIZE)
+        stack = self.read(CCM, STACK_SIZE)
         return STACK_SIZE - next((k for k, byte in enumerate(stack) if byte != _PAINT), STACK_SIZE)
 
     def _flush(self) -> None:
