@@ -2,9 +2,8 @@
 
 import struct
 
-import numpy as np
 import pytest
-from board_bench import Bench
+from board_bench import Bench, blob_of
 
 from gravcomp.config import ConfigError
 from gravcomp.firmware import model_blob, model_transfer
@@ -14,33 +13,6 @@ from gravcomp.firmware.settings import FAULTS
 
 MOTORS = range(1, 7)
 KINDS = {"host": HostBoard, "image": ImageBoard}
-HEADER, FLOATS = 64, model_blob.SETTINGS
-
-
-def blob_of(modes: int = 4, motion: float = 1.0) -> bytes:
-    """A whole blob of six cables in one piece each, on modes that shorten none of them; `motion`: of the tip by the modes."""
-    pairs, cables, points = modes * (modes + 1) // 2, 6, 2
-    section = np.zeros((9, modes))
-    section[0, 0], section[1, 1], section[2, 2] = motion, motion, 0.1 * motion
-    change = np.zeros((cables, 3, modes))
-    for k in range(cables):
-        change[k, 2, :2] = 0.05 * np.cos(k * np.pi / 3.0), 0.05 * np.sin(k * np.pi / 3.0)
-    settings = np.zeros(FLOATS)
-    settings[:14] = 0.1, 10.0, 0.01, 5.0, 20.0, -0.03, 0.03, 0.025, 0.05, 3e-4, 0.02, 1e-4, 4e-3, 0.09
-    settings[14:22] = 0.0, 0.0, 0.1, 0.0, 0.0, 1.0, 1.0, 1e-3
-    settings[23], settings[27:30] = 1.0, 1.0
-    settings[36:40], settings[55:57] = (9.81, 1e-3, 1e-3, 0.05), (35.0, 60.0)
-    settings[-9:] = 1, 2, 3, 4, 5, 6, 0, 0, 0
-    tables = (
-        np.zeros((modes, pairs)), np.zeros((pairs, cables)), change, np.eye(3, modes), section,
-        (0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), np.tile((0.0, 0.0, 0.1), (cables, 1)), np.zeros((points, 3, modes)),
-        np.linspace((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), points), np.full(cables, 0.1), np.full(cables, 1e-4),
-        *[np.zeros(cables)] * 3, np.full(cables, 0.05), settings,
-    )  # fmt: skip
-    body = b"".join(np.asarray(table, "<f4").tobytes() for table in tables) + bytes(range(cables)) + bytes(2)
-    counts = struct.pack("<8I", modes, modes, cables, cables, FLOATS, points, 0, 0)
-    head = struct.pack("<4sIII", model_blob.MAGIC, model_blob.VERSION, HEADER + len(body), 0)
-    return model_blob.with_crc(head + b"a robot of tests" + counts + body)
 
 
 def changed(blob: bytes, at: int, value: int) -> bytes:

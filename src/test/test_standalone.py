@@ -8,6 +8,9 @@ import struct
 import numpy as np
 import pytest
 
+from gravcomp.closed_loop import loop as loop_module
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import Elements, PronyTerm, load_robot_file
 from gravcomp.firmware import model_blob
@@ -24,6 +27,7 @@ from gravcomp.reduction import load
 from gravcomp.simulation import RobotModel
 from gravcomp.training import BuildOptions, TrainingOptions, build
 from gravcomp.training.build import alone
+from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 # That of test_reduction, which shares its cache.
 SMALL = BuildOptions(
@@ -180,3 +184,18 @@ def test_the_image_computes_the_same_bits_as_the_host(found):
         ctypes.memmove(memory, data, 24)
         library().gc_standalone_step(ctypes.c_void_p(loop.address), memory, 0xFF, *on_host)
     assert any(on_host[0]) and processor.read(targets, 64) == bytes(on_host[0]) + bytes(on_host[1])
+
+
+def test_the_board_holds_the_virtual_robot_by_itself(parameters, built, found, monkeypatch):
+    monkeypatch.setattr(loop_module, "blob_for", lambda _: found.blob)
+    setup = dataclasses.replace(Setup.of(load_robot_file("article")), robot=parameters.robot)
+    loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(135.0))), board="standalone")
+    sagging = np.linalg.norm(loop.truth.tip_position[:2])
+    loop.hold(parameters.straight)
+    loop.run(1.5)
+    assert loop.virtual.firmware.word("motors") == 0b111111 and loop.virtual.firmware.loop().code == 1
+    assert np.linalg.norm(loop.truth.tip_position[:2]) < 0.06 * sagging
+    loop.release()
+    assert np.abs(loop.truth.current).max() > 0.0
+    loop.run(0.1)
+    assert not loop.truth.current.any()

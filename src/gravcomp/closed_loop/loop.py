@@ -81,8 +81,8 @@ class ClosedLoop:
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
-        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. The board
-        "standalone" computes the commands and drives the motors by itself while the loop holds; the host then only listens, and
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. From the first
+        `hold` on the board "standalone" computes the commands and drives the motors by itself; the host then only listens, and
         its simulator follows the board's commands. It needs a reduced model. Raises RuntimeError where the bridge does not start,
         ConfigError for a robot that does not fit the board.
         """
@@ -97,7 +97,7 @@ class ClosedLoop:
             scene=setup.scene,
             model=blob_for(_parameters(setup)) if board == _STANDALONE else None,
         )
-        self._has_loop = board == _STANDALONE
+        self._has_loop, self._alone = board == _STANDALONE, False  # alone: the board drives the motors by itself
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
@@ -165,7 +165,7 @@ class ClosedLoop:
         return self._load.estimate(self._gravity, self.time)
 
     def release(self) -> None:
-        """Pay the cables out: the robot is without compensation."""
+        """Pay the cables out: the robot is without compensation. A board that has held by itself lets go of the motors."""
         if self._alone:
             self._outgoing.append(requests.act("stop"))
         self._target = None
@@ -180,14 +180,10 @@ class ClosedLoop:
             self._problem.reset(self._cables)
             if self._has_loop:
                 self._outgoing.append(requests.act("run"))
+                self._alone = True
         options = self.setup.controller.inverse
         self._problem.options = dataclasses.replace(options, pretension=0.0) if weightless else options
         self._target, self._weightless = target, weightless
-
-    @property
-    def _alone(self) -> bool:
-        """Whether the board drives the motors by itself."""
-        return self._has_loop and self._target is not None
 
     def run(self, duration: float) -> None:
         """Advance by `duration` s. Raises RuntimeError where the bridge refuses a command."""

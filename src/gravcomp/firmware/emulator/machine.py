@@ -1,7 +1,8 @@
 """The processor and the peripherals around it: memory, registers by address, interrupts as calls of their handlers.
 
-Interrupts come while the image waits for them; a handler runs to its end. That is what the image's priorities give it, except for
-the interrupt of reception, which shares with the others nothing but rings with one writer and one reader.
+Interrupts come while the image waits for them, or where main's loop enters the function `preempted_in`; a handler runs to its
+end. That is what the image's priorities give it, except for the interrupt of reception, which shares with the others nothing but
+rings with one writer and one reader.
 """
 
 import struct
@@ -39,8 +40,9 @@ class ProcessorFault(RuntimeError):
 class Machine(Core):
     """The chip with an image.
 
-    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty, resets (their causes),
-    dead (nothing runs), symbols.
+    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), preempted_in (name of a function
+    in which main's loop is left until the next tick has interrupted it; empty: none), preemptions (number of these), duty,
+    resets (their causes), dead (nothing runs).
     """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
@@ -63,7 +65,10 @@ class Machine(Core):
         main = self.symbols["main"] & ~1
         self._wait = main + bytes(uc.mem_read(main, 4096)).index(_WFI)
         uc.ctl_exits_enabled(True)
-        uc.ctl_set_exits([self._wait, RETURN, self.symbols["gc_stuck"] & ~1])
+        self._exits = [self._wait, RETURN, self.symbols["gc_stuck"] & ~1]
+        uc.ctl_set_exits(self._exits)
+        self.preempted_in, self.preemptions = "", 0
+        self._left = 0  # address at which main's loop was left, 0: it waits
         self.resets: list[str] = []
         self.supply_low = False
         self.main_stands = False
@@ -98,6 +103,7 @@ class Machine(Core):
             can.sent.clear()
         self.resets.append(cause)
         self._unsettled = None
+        self._left = 0
         self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
         stack, start = struct.unpack("<2I", self.read(BOOT_START, 8))
         self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
@@ -114,8 +120,7 @@ class Machine(Core):
             return
         self.interrupt("gc_on_tick")
         self._flush()
-        if not self.dead and not self.main_stands:
-            self._run(self._wait + 2 | 1, self._wait)
+        self._run_main()
         if self._restart:
             self.reset("software")
         elif (self.now - self._fed) & 0xFFFFFFFF > WATCHDOG:
@@ -131,8 +136,7 @@ class Machine(Core):
         self.now = tick
         self.interrupt("gc_on_data_ready")
         self._flush()
-        if not self.dead and not self.main_stands:
-            self._run(self._wait + 2 | 1, self._wait)
+        self._run_main()
 
     def receive(self, bus: int, frames: list[WireFrame]) -> None:
         """Let frames come on a bus."""
@@ -171,6 +175,27 @@ class Machine(Core):
             while len(can.sent) != before and not self.dead and not can.off:
                 before = len(can.sent)
                 self.interrupt(handler)
+
+    def _run_main(self) -> None:
+        """Run main's loop until it waits, or until it enters `preempted_in`, from where the next call continues."""
+        if self.dead or self.main_stands:
+            return
+        start, stop = self._left or self._wait + 2, 0
+        if self.preempted_in and not self._left:
+            stop = self.symbols[self.preempted_in] & ~1
+            self._exit_at([*self._exits, stop])
+        waits = self._run(start, self._wait)
+        self._left = 0
+        if stop:
+            self._exit_at(self._exits)
+            if not waits and not self.dead and self._uc.reg_read(self._arm.UC_ARM_REG_PC) & ~1 == stop:
+                self._left = stop
+                self.preemptions += 1
+
+    def _exit_at(self, addresses: list[int]) -> None:
+        """End a run at these addresses: the emulator looks at them when it translates code."""
+        self._uc.ctl_set_exits(addresses)
+        self._uc.ctl_flush_tb()
 
     def _run(self, start: int, end: int, patience: int = 0) -> bool:
         """Run from an address until the image waits, returns or gives up; return whether that is `end`.
