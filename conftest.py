@@ -24,6 +24,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _COMMANDS = Path(__file__).parent / "test"
 _SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
+# Modules that take half a minute and more.
+_LONG = ("test_documented_", "test_demo", "test_arm_command", "test_docs", "test_colcon_workspace", "test_contact", "test_cal")
 _LOCK = "GRAVCOMP_TEST_LOCK"  # environment variable with the file that the processes of a run lock
 
 
@@ -72,11 +74,12 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put what takes longest first, so that no process is idle at the end; otherwise keep the order of pytest-randomly.
 
-    Rates; commands without a graph, which run next to them; other graphs; unit tests.
+    Rates; commands without a graph, which run next to them; other graphs; unit tests. Of each kind the long modules come first.
     """
 
-    def rank(item: pytest.Item) -> int:
-        return {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2}[_mark(item)]
+    def rank(item: pytest.Item) -> tuple[int, bool]:
+        kind = {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2}[_mark(item)]
+        return kind, not item.path.stem.startswith(_LONG)
 
     items.sort(key=rank)
 

@@ -24,6 +24,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "composed_loop = gravcomp_fem.composed_loop:main",
             "fem_simulator = gravcomp_fem.fem_simulator:main",
             "inverse_controller = gravcomp_fem.inverse_controller:main",
             "viewer = gravcomp_fem.viewer:main",

@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from gravcomp.launcher.node_process import ACTIVE_FILE, find_executable
 
-PATIENCE = 60.0  # s
+PATIENCE = 180.0  # s; events, which a machine that others load delays
 _HEARD = 3.0  # s that `topic hz` listens
 
 
@@ -86,7 +86,11 @@ class Ros2:
 
     def subscribers(self, topic: str) -> set[str]:
         """Return the names of the nodes that subscribe to a topic."""
-        return {found.node_name for found in self._node.get_subscriptions_info_by_topic(topic)}
+        return {found.node_name for found in self.subscriptions(topic)}
+
+    def subscriptions(self, topic: str) -> list:
+        """Return what the graph knows of the subscriptions of a topic."""
+        return self._node.get_subscriptions_info_by_topic(topic)
 
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)

@@ -79,19 +79,19 @@ def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder
     recorder = Shell(documented("./gravcomp record --out my_bag --duration 60"), folder, dict(os.environ))
     ros2.until(lambda: "recorder" in ros2.subscribers("/target/shape"), "the recorder does not find the topics")
     samples = ros2.listen(Imu, "/imu/data_raw")
-    ros2.until(lambda: len(samples) > 300, "no samples")
+    ros2.until(lambda: len(samples) > 100, "no samples")
     ros2.run(PUBLISHED_ONCE)
-    ros2.until(lambda: len(samples) > 700, "no samples")
+    ros2.until(lambda: len(samples) > 500, "no samples")
     assert recorder.ctrl_c() == 0, recorder.output.read_text()
     # A message that was published once, by a node that ended since, is recorded as well.
     topics = describe(folder / "my_bag")["topics"]
-    assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 500
+    assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 400
     code, output = type_in("./gravcomp reproduce all --bag my_bag")
     assert code in (0, 1) and "Keeping the shape, recorded" in output and "cables commanded, median" in output, output
 
 
 def test_an_imu_is_calibrated_from_a_recording(live, type_in, folder):
-    code, output = type_in("./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 8")
+    code, output = type_in("./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 5")
     assert code == 0, output
     # The base is at rest: one pose, which is too few for the scale but enough for the offset of the gyroscope.
     code, output = type_in("./gravcomp calibrate-imu poses --write my_robot.yaml", "--robot article")

@@ -48,7 +48,7 @@ MODEL_LINES = (
 
 @pytest.mark.parametrize("line", MODEL_LINES)
 def test_a_model_is_described_solved_drawn_and_built(type_in, folder, line):
-    code, output = type_in(line, ROBOT="ROBOT.yaml")
+    code, output = type_in(line, "--directions 4" if "info" in line else "", ROBOT="ROBOT.yaml")
     assert code == 0, output
     for picture in re.findall(r"\w+\.png", line):
         assert (folder / picture).read_bytes().startswith(b"\x89PNG")

@@ -19,21 +19,22 @@ from gravcomp.launcher.domain import reserve_domain
 pytestmark = [pytest.mark.graph, pytest.mark.timeout(900)]
 
 APART = reserve_domain()
+SHORTEST = "--duration 10"
 RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 
 def test_an_own_robot_is_demonstrated(type_in):
-    code, output = type_in("./gravcomp demo --robot src/examples/own_robot.yaml", "--duration 12")
+    code, output = type_in("./gravcomp demo --robot src/examples/own_robot.yaml", SHORTEST)
     assert code == 0 and "sag without compensation" in output, output
 
 
 def test_a_robot_with_joints_is_demonstrated(type_in):
-    code, output = type_in("./gravcomp demo --robot src/examples/joint_robot.yaml --headless", "--duration 12")
+    code, output = type_in("./gravcomp demo --robot src/examples/joint_robot.yaml --headless", SHORTEST)
     assert code == 0 and "sag without compensation" in output and "joint_bridge" in output, output
 
 
 def test_the_firmware_is_the_board_of_a_demonstration(type_in):
-    code, output = type_in("./gravcomp demo --board emulated", "--headless --duration 12")
+    code, output = type_in("./gravcomp demo --board emulated", f"--headless {SHORTEST}")
     assert code == 0 and "sag without compensation" in output, output
 
 
@@ -58,6 +59,7 @@ def test_a_bag_is_replayed(type_in, folder, own_domain, line):
         "ros2 run gravcomp_estimation imu_estimator --ros-args -p use_sim_time:=true",
         "ros2 run gravcomp_fem fem_simulator",
         "ros2 run gravcomp_fem inverse_controller",
+        "ros2 run gravcomp_fem composed_loop --ros-args -p robot:=article -p imu_estimator:prediction.horizon_ms:=10.0",
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -p source:=tf -p world_frame:=world -p base_frame:=soft_base -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation arm_gravity --ros-args -r __ns:=/soft -r joint_states:=/joint_states -r robot_description:=/robot_description -p use:=check",  # noqa: E501 (a whole line of a document)
         "ros2 run gravcomp_estimation imu_replay --ros-args -p file:=my_bag",

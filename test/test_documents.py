@@ -17,6 +17,7 @@ from gravcomp.config import declared_parameters, load_yaml
 from gravcomp.description import shipped_robots
 from gravcomp.description.hardware import Hardware
 from gravcomp.graph.nodes import NODES, node
+from gravcomp.launcher.robot_graph import COMPOSED, LOOP
 from gravcomp.virtual.parameters import VirtualRobotParameters
 
 # Values for the placeholders of the documents.
@@ -111,12 +112,15 @@ def check_ros2(words: list[str]) -> None:
                 assert re.search(rf"""["{{]\W*(name: )?{word.partition(":=")[0]}\b""", text), f"{file} has no argument {word}"
         case ["run", package, executable, *rest]:
             assert EXECUTABLES.get(executable) == package
-            entry = node(executable)
-            names = {port.name for port in (*entry.subscribes, *entry.publishes)} | {"__ns", "__node"}
+            inner = [name for _, name in LOOP[1:]] if (package, executable) == COMPOSED else [executable]
+            entries = [node(name) for name in inner]
+            names = {port.name for entry in entries for port in (*entry.subscribes, *entry.publishes)} | {"__ns", "__node"}
+            known = set().union(*(parameters_of(name) for name in inner)) | {"use_sim_time"}
+            known |= {f"{name}:{key}" for name in inner for key in parameters_of(name)}
             for option, word in zip(rest, rest[1:]):
                 key = word.partition(":=")[0]
                 if option == "-p":
-                    assert key in parameters_of(executable) | {"use_sim_time"}, f"{executable} has no parameter {key}"
+                    assert key in known, f"{executable} has no parameter {key}"
                 if option == "-r":
                     assert key in names, f"{executable} has no topic {key}"
         case ["service", "call", name, kind, *_]:

@@ -7,6 +7,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="it starts nodes: ./gravcomp test")
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import ReliabilityPolicy
 from ros2_line import Ros2
 from std_srvs.srv import SetBool, Trigger
 
@@ -46,6 +47,7 @@ def start(tmp_path, observer):
         observer.state_of(f"/{executable}")
         return processes[-1]
 
+    start.processes, start.folder = processes, tmp_path
     yield start
     for process in processes:
         process.stop()
@@ -117,3 +119,43 @@ def test_a_node_ends_without_error_messages(start, observer, tmp_path):
     process = start("gravcomp_fem", "inverse_controller")
     process.stop()
     assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text()
+
+
+def test_three_nodes_in_one_process_are_three_nodes(start, observer):
+    process = NodeProcess(
+        NodeSpec("gravcomp_fem", "composed_loop", {"robot": "article", "inverse_controller:inverse.tolerance_mm": 3.0}),
+        start.folder / "composed_loop.log",
+    )
+    start.processes.append(process)
+    for name in ("imu_estimator", "fem_simulator", "inverse_controller"):
+        assert observer.state_of(f"/{name}") == "active"
+    assert process.was_active
+    observer.run("ros2 param set /inverse_controller inverse.tolerance_mm 2.0")
+    observer.run("ros2 lifecycle set /fem_simulator deactivate")
+    assert observer.state_of("/fem_simulator") == "inactive" and observer.state_of("/imu_estimator") == "active"
+
+
+def test_an_override_of_the_quality_of_service_is_applied_or_named(start, observer):
+    wrong = "qos_overrides./no_topic.publisher.depth"
+    right = "qos_overrides./robot/deformation.subscription.reliability"
+    process = start("gravcomp_fem", "inverse_controller", **{right: "reliable", wrong: 3})
+    observer.until(lambda: "inverse_controller" in observer.subscribers("/robot/deformation"), "it does not subscribe")
+    (found,) = observer.subscriptions("/robot/deformation")
+    assert found.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+    assert f"parameter {wrong} overrides nothing" in process.log.read_text()
+
+
+def test_a_wrong_override_of_the_quality_of_service_ends_the_node(tmp_path):
+    spec = NodeSpec("gravcomp_fem", "inverse_controller", {"qos_overrides./cable/command.publisher.reliability": "often"})
+    process = NodeProcess(spec, tmp_path / "log")
+    end = time.monotonic() + 60.0
+    while process.exit_code is None:
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    assert process.exit_code == 2 and "`often`" in process.why()
+
+
+def test_a_node_reports_while_the_clock_of_a_replay_stands_still(start, observer):
+    start("gravcomp_fem", "inverse_controller", use_sim_time=True)
+    observer.diagnostics.clear()
+    observer.until(lambda: "inverse_controller" in observer.diagnostics, "no diagnostics")

@@ -41,7 +41,7 @@ def test_the_recorded_bag_is_whole():
 @pytest.mark.timeout(800)
 def test_a_replayed_bag_gives_the_offline_gravity_bit_for_bit_at_any_speed(gravcomp, tmp_path):
     again = []
-    for speed in ("1", "3"):
+    for speed in ("2", "6"):
         out = tmp_path / f"speed{speed}"
         answer = gravcomp("replay", str(RECORDED), "--speed", speed, "--out", str(out), "--json", timeout=380)
         assert answer.code == 0, answer.err
@@ -80,7 +80,7 @@ def test_a_recorder_that_is_killed_leaves_a_bag_that_can_be_replayed(gravcomp, g
     assert player.returncode == 2 and "recorder was ended by SIGKILL" in error
     saved = readable(bag)
     assert saved.problem and saved.messages > 100
-    answer = gravcomp("replay", str(bag), "--out", str(tmp_path / "again"), "--json", timeout=380)
+    answer = gravcomp("replay", str(bag), "--speed", "3", "--out", str(tmp_path / "again"), "--json", timeout=380)
     assert answer.code == 0 and "damaged" in answer.err
     assert answer.json["samples"] == len(read_recording(bag))
     kept, again = gravity(saved.path), gravity(tmp_path / "again")

@@ -7,13 +7,11 @@ heater, the status) does not enter it.
 import dataclasses
 import math
 import time
-from copy import copy
 from pathlib import Path
 
 from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from rclpy.clock import Clock, ClockType
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
@@ -46,12 +44,9 @@ class ImuEstimator(ManagedNode):
 
     def configure(self) -> None:
         """Create publishers, services, estimator and heater control."""
-        # To record every message of a replay: qos_overrides./gravity.publisher.reliability:=reliable and so on.
-        override = QoSOverridingOptions.with_default_policies()
-        # Copies, because rclpy writes the overrides of a topic into the given profile.
-        self._imu = self.create_publisher(Imu, "imu/data", copy(SENSOR), qos_overriding_options=override)
-        self._gravity = self.create_publisher(Vector3Stamped, "gravity", copy(SENSOR), qos_overriding_options=override)
-        self._bias = self.create_publisher(Vector3Stamped, "imu/bias", copy(SENSOR), qos_overriding_options=override)
+        self._imu = self.create_publisher(Imu, "imu/data", SENSOR)
+        self._gravity = self.create_publisher(Vector3Stamped, "gravity", SENSOR)
+        self._bias = self.create_publisher(Vector3Stamped, "imu/bias", SENSOR)
         self._status = self.create_publisher(ImuStatus, "imu/status", LATCHED)
         self._heater_duty = self.create_publisher(Float32, "imu/heater", COMMAND)
         self._reset_service = self.create_service(Trigger, "~/reset", self._on_reset)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from gravcomp_node.qos import SENSOR
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 # Every sample in order; a slow subscriber delays the publisher.
@@ -46,4 +47,6 @@ class SensorStream:
 
     def _subscribe(self) -> Subscription:
         qos = LOSSLESS if self.reliable else SENSOR
-        return self._node.create_subscription(self._kind, self._topic, self._callback, qos)
+        # Without overrides by parameters, which would fix the reliability that it follows.
+        none = QoSOverridingOptions([])
+        return self._node.create_subscription(self._kind, self._topic, self._callback, qos, qos_overriding_options=none)

@@ -1,21 +1,25 @@
 """Node calibrator: leads through a planned calibration, and writes the tips that a tracker measures.
 
-It stops the controller, pulls the cables as planned with the stamp of the gravity that caused it, and exits after the last pose.
+It pulls the cables as planned once the controller says that it has stopped, with the stamp of the gravity that caused it, and
+exits when the last pose is in the file.
 What to do, when it is done, and the file are those of `gravcomp.calibration.live`.
 """
 
+import contextlib
 import json
 from pathlib import Path
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import OK, WARN
+from rclpy.task import Future
 from std_srvs.srv import SetBool
 
 from gravcomp.calibration.bag import direction_of_poses
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan_file import load_plan
+from gravcomp.calibration.whole_file import write_whole
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.calibrator import CalibratorParameters
 from gravcomp_fem.conversion import seconds
@@ -23,6 +27,8 @@ from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 _PERIOD = 0.1  # s, between two looks at the state
+_ANSWER = 5.0  # s: a controller that has not answered by then is asked again
+_RETRY = 1.0  # s, between two attempts to write
 
 
 class Calibrator(ManagedNode):
@@ -45,8 +51,10 @@ class Calibrator(ManagedNode):
     def activate(self) -> None:
         """Stop the controller, and subscribe."""
         self._present: np.ndarray | None = None
-        self._shown, self._stopped = "", False
+        self._shown, self._stopped, self._refusal = "", False, ""
         self._controller = self.create_client(SetBool, "inverse_controller/enable")
+        self._asked: Future | None = None
+        self._asked_at, self._written_at = 0.0, 0.0
         self._inputs = [
             self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR),
             self.create_subscription(CableState, "cable/state", self._on_state, SENSOR),
@@ -55,10 +63,12 @@ class Calibrator(ManagedNode):
         self._watch = self.create_timer(_PERIOD, self._show)
 
     def deactivate(self) -> None:
-        """Unsubscribe; the motors hold."""
+        """Unsubscribe, and write what is not in the file yet; the motors hold."""
         self.destroy_timer(self._watch)
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
+        if not self._session.save():
+            self.get_logger().error(f"the last measured poses are lost: {self._session.unwritten}")
 
     def cleanup(self) -> None:
         """Destroy the publisher."""
@@ -85,30 +95,53 @@ class Calibrator(ManagedNode):
         time = seconds(message.header)
         place, turn = message.pose.position, message.pose.orientation
         values = np.array([[place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]])
-        if np.isfinite(values).all() and np.linalg.norm(values[0, 3:]) > 0.0:
-            self._session.on_tip(time, values[0, :3], direction_of_poses(values)[0])
+        # One and the same direction, where a tracker measures positions alone and leaves the orientation empty.
+        direction = direction_of_poses(values)[0] if np.linalg.norm(values[0, 3:]) > 0.0 else np.array([0.0, 0.0, 1.0])
+        self._session.on_tip(time, values[0, :3], direction)
 
     def _show(self) -> None:
-        """Stop the controller once it is there, and write what to do."""
-        if not self._stopped and self._controller.service_is_ready():
-            self._controller.call_async(SetBool.Request(data=False))
-            self._stopped = True
-        sentence = self._session.sentence() if self._stopped else "waiting for the controller, which is to stop"
-        if self._stopped and self._present is None:
+        """Stop the controller once it is there, write what to do, and end after the last pose."""
+        if not self._stopped:
+            self._stop_controller()
+        sentence = self._session.sentence()
+        if not self._stopped:
+            sentence = self._refusal or "waiting for the controller, which is to stop"
+        elif self._present is None:
             sentence = "waiting for cable/state: is the robot running?"
+        now = self._now()
+        saved = not self._session.unwritten
+        if not saved and now - self._written_at >= _RETRY:
+            self._written_at, saved = now, self._session.save()
         if sentence != self._shown:
             self._shown = sentence
             self._write(sentence)
-        self.report(OK if self._stopped else WARN, sentence, finished=self._session.finished)
-        self.finished = self._session.phase == Phase.DONE
+            if self._session.unwritten:  # the file of the state may be on the same full disk
+                self.get_logger().warning(sentence)
+        self.report(OK if self._stopped and saved else WARN, sentence, finished=self._session.finished)
+        self.finished = self._session.phase == Phase.DONE and saved
+
+    def _stop_controller(self) -> None:
+        """Ask the controller to stop, and again until it answers that it has."""
+        now = self._now()
+        if self._asked is not None and self._asked.done():
+            answer, self._asked = self._asked.result(), None
+            self._stopped = answer is not None and answer.success
+            self._refusal = "" if self._stopped or answer is None else f"the controller does not stop: {answer.message}"
+        elif self._asked is not None and now - self._asked_at > _ANSWER:
+            self._controller.remove_pending_request(self._asked)
+            self._asked = None
+        elif self._asked is None and now - self._asked_at > _RETRY and self._controller.service_is_ready():
+            self._asked, self._asked_at = self._controller.call_async(SetBool.Request(data=False)), now
+
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
 
     def _write(self, sentence: str) -> None:
         if not self.parameters.state_file:
             return
         state = {"do": sentence, "finished": self._session.finished, "done": self._session.phase == Phase.DONE}
-        partial = Path(self.parameters.state_file + ".partial")
-        partial.write_text(json.dumps(state), encoding="utf-8")
-        partial.replace(self.parameters.state_file)
+        with contextlib.suppress(OSError):  # a full disk must not end the measurement
+            write_whole(Path(self.parameters.state_file), json.dumps(state))
 
 
 def main() -> int:

@@ -182,13 +182,13 @@ class FemSimulator(ManagedNode):
                 f"gravity {gravity.tolist()} m/s^2 and the cable displacements give no finite shape; the simulator restarts"
             )
             return
-        message.header.frame_id = self.parameters.base_frame
-        self._deformation.publish(deformation_message(shape, message.header))
-        self._loads.observe(message.header, shape, self._simulator, carried, self._cables)
+        header = Header(stamp=message.header.stamp, frame_id=self.parameters.base_frame)
+        self._deformation.publish(deformation_message(shape, header))
+        self._loads.observe(header, shape, self._simulator, carried, self._cables)
         if self._tip.get_subscription_count():
             tip = pose_message(shape.tip_position, shape.tip_orientation)
-            self._tip.publish(PoseStamped(header=message.header, pose=tip))
-        self._show(shape, message.header)
+            self._tip.publish(PoseStamped(header=header, pose=tip))
+        self._show(shape, header)
         level = {ShapeStatus.OK: OK, ShapeStatus.FALLBACK: WARN}.get(shape.status, ERROR)
         of_loads, values = self._loads.report(gravity, stamp)
         self.report(

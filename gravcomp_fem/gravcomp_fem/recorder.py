@@ -12,6 +12,7 @@ from pathlib import Path
 
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rosbags.interfaces import Connection, Qos
 
@@ -110,7 +111,10 @@ class Recorder(ManagedNode):
                 recording.connection = self._bag.add_topic(topic, recording.type_name, offered)
             self._bag.write(recording.connection, time.time_ns(), message)
 
-        recording.subscription = self.create_subscription(recording.kind, topic, write, recording.qos, raw=True)
+        # Without overrides by parameters, which would fix what it follows.
+        recording.subscription = self.create_subscription(
+            recording.kind, topic, write, recording.qos, raw=True, qos_overriding_options=QoSOverridingOptions([])
+        )
 
 
 @dataclass

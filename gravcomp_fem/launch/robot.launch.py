@@ -16,6 +16,7 @@ ARGUMENTS = (
     ("channel", "", "channel of the interface, such as can0; with several buses one each, by commas"),
     ("namespace", "", "namespace of all nodes, such as /left, for several robots in one graph"),
     ("virtual", "false", "true: start the virtual robot as well, on a bus of its own"),
+    ("composed", "false", "true: run estimator, simulator and controller in one process"),
     ("viewer", "false", "true: start the live page"),
     ("use_sim_time", "false", "true: the nodes use the time of /clock"),
 )
@@ -36,7 +37,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
         # On the bus of the robot file, several virtual robots on one machine would receive each other's frames.
         interface, channel = "udp_multicast", private_channels(given["robot"])
     graph = RobotGraph(given["robot"], interface, channel, given["namespace"])
-    specs = graph.loop(virtual)
+    specs = graph.loop(virtual, _flag("composed", given["composed"]))
     if virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic"))
     if _flag("viewer", given["viewer"]):

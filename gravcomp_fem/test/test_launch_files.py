@@ -46,4 +46,5 @@ def test_the_python_file_follows_the_robot_file():
     loop = ["imu_estimator", "fem_simulator", "inverse_controller"]
     assert nodes_of() == ["can_bridge", *loop]
     assert nodes_of(virtual="true", viewer="true") == ["can_bridge", *loop, "virtual_robot", "viewer"]
+    assert nodes_of(composed="true") == ["can_bridge", "composed_loop"]
     assert nodes_of(virtual="true", robot=joints) == ["joint_bridge", *loop, "joint_robot", "virtual_robot"]

@@ -154,6 +154,7 @@ class JointBridgeNode(ManagedNode):
             for motor, scale in zip(self._joints.motors, driver.bridge.joints.scales)
             if scale.zero is not None
         )
+        loop = driver.bridge.loop_delay
         self.report(
             severity,
             sentence,
@@ -163,6 +164,7 @@ class JointBridgeNode(ManagedNode):
             commands_refused=driver.bridge.refused_commands,
             control_overruns=driver.overruns,
             command_delay_ms=round(1e3 * driver.delay, 2),
+            **({} if loop is None else {"loop_delay_ms": round(1e3 * loop, 1)}),
         )
         if sentence != self._logged:
             self._logged = sentence

@@ -3,10 +3,11 @@
     python -m gravcomp_hw.joint_guard TOPIC NUMBER NAMESPACE
 
 TOPIC: of the controller, NUMBER: of its joints. Heartbeats come through standard input (`gravcomp.motors.joint_guard`). It prints
-a line when it is ready.
+a line when it is ready, and then a byte for each time that it has read heartbeats, so that the bridge finds a guard that hangs.
 """
 
 import array
+import contextlib
 import os
 import select
 import signal
@@ -17,7 +18,8 @@ import rclpy
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64MultiArray
 
-from gravcomp.motors.joint_guard import JointGuard
+from gravcomp.canbus.precedence import take_precedence
+from gravcomp.motors.joint_guard import BEAT, JointGuard
 
 _PERIOD = 0.01  # s, between two messages of zeros
 
@@ -31,7 +33,9 @@ def main(arguments: list[str]) -> int:
     node = rclpy.create_node("joint_guard", namespace=namespace, enable_rosout=False, start_parameter_services=False)
     publisher = node.create_publisher(Float64MultiArray, topic, QoSProfile(depth=10))
     zeros = Float64MultiArray(data=array.array("d", [0.0] * int(number)))
+    take_precedence()
     print("ready", flush=True)
+    os.set_blocking(1, False)
     guard = JointGuard(time.monotonic())
     open_ = True
     while not guard.done(time.monotonic()):
@@ -39,6 +43,8 @@ def main(arguments: list[str]) -> int:
             data = os.read(0, 4096)
             open_ = bool(data)
             guard.on_bytes(data, time.monotonic())
+            with contextlib.suppress(OSError):  # a bridge that hangs does not read
+                os.write(1, BEAT)
         elif not open_:
             time.sleep(_PERIOD)
         if guard.acting(time.monotonic()):

@@ -12,11 +12,13 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from gravcomp_hw.joint_guard_client import JointGuardClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
+from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND
 
@@ -145,6 +147,35 @@ def test_a_killed_bridge_leaves_no_effort(tmp_path):
         bridge.kill()
         node.destroy_node()
         rclpy.try_shutdown()
+
+
+def test_a_guard_that_hangs_is_found_and_replaced():
+    guard = JointGuardClient("/alone/commands", 3, "/alone")
+    try:
+        assert beats(guard, 0.2)
+        time.sleep(ANSWER_TIMEOUT + 0.2)  # a bridge that has hung itself does not take the guard for one that hangs
+        assert beats(guard, 0.2)
+        first = guard.pid
+        os.kill(first, signal.SIGSTOP)
+        begin = time.monotonic()
+        assert not beats(guard, ANSWER_TIMEOUT + 2.0)
+        assert time.monotonic() - begin < ANSWER_TIMEOUT + 1.0
+        while Path(f"/proc/{first}").exists() or not guard.beat():
+            assert time.monotonic() - begin < 30.0
+            time.sleep(0.01)
+        assert guard.pid != first and beats(guard, 0.2)
+    finally:
+        guard.close()
+
+
+def beats(guard, duration):
+    """Send heartbeats; return whether all were taken."""
+    end = time.monotonic() + duration
+    while time.monotonic() < end:
+        if not guard.beat():
+            return False
+        time.sleep(0.004)
+    return True
 
 
 def test_a_robot_without_joints_is_refused():

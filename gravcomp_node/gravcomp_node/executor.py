@@ -1,5 +1,7 @@
 """An executor for nodes that process streams of messages, with little overhead between a message and its callback.
 
+It executes one node, or several of one process, between which messages go without the middleware (gravcomp_node.local_topics).
+
 For every message, rclpy's executor collects all entities of the node again, creates a task with three coroutines, and lets the
 middleware wait for about a dozen services. At 100 messages per second this costs several times as much as the callbacks. Here
 
@@ -23,16 +25,22 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
+from gravcomp_node.local_topics import LocalTopics
+
 _EVENT_PERIOD = 1.0  # s between two checks for events of the middleware, such as incompatible quality of service
 
 
 class StreamExecutor:
-    """Executes the callbacks of one node. Call `spin_once` from one thread only; it raises the exceptions of all callbacks."""
+    """Executes the callbacks of nodes. Call `spin_once` from one thread only; it raises the exceptions of all callbacks.
 
-    def __init__(self, node: Node):
-        self._node, self._context = node, node.context
+    local: topics between the nodes.
+    """
+
+    def __init__(self, *nodes: Node, local: LocalTopics | None = None):
+        self._nodes, self._context = nodes, nodes[0].context
+        self._local = local
         self._serial = threading.RLock()
-        self._guard = GuardCondition(callback=None, callback_group=None, context=node.context)
+        self._guard = GuardCondition(callback=None, callback_group=None, context=self._context)
         self._rare = _RareExecutor(self)
         self._changed = True
         self._held = contextlib.ExitStack()  # keeps the handles of the lists alive while the wait set uses them
@@ -41,7 +49,11 @@ class StreamExecutor:
         self._wait_set: Any = None
         self._error: BaseException | None = None
         self._ending = False
-        self._rare.add_node(node)
+        for node in nodes:
+            self._rare.add_node(node)
+        if local is not None:
+            local.changed, local.wake, local.spins = self.entities_changed, self._wake, True
+        self._main: int | None = None  # thread that spins
         self._thread = threading.Thread(target=self._serve, name="services", daemon=True)
         self._thread.start()
 
@@ -49,7 +61,11 @@ class StreamExecutor:
         """Wait up to `timeout` (s) for messages and timers, and call their callbacks."""
         if self._error is not None:
             raise self._error
+        self._main = threading.get_ident()
+        self._call_local()
         with self._serial:
+            if self._local is not None:
+                self._local.follow()
             if self._changed:
                 self._gather()
         wait_set = self._wait_set
@@ -64,10 +80,13 @@ class StreamExecutor:
             self._call_timer(self._timers[pointer])
         for pointer in wait_set.get_ready_entities("subscription"):
             self._call_subscription(self._subscriptions[pointer])
+            self._call_local()
 
     def shutdown(self) -> None:
         """Stop the second thread and release the node."""
         self._ending = True
+        if self._local is not None:
+            self._local.spins = False
         self._rare.wake()
         self._thread.join(5.0)
         self._rare.shutdown()
@@ -80,11 +99,16 @@ class StreamExecutor:
         self._trigger()
 
     def _gather(self) -> None:
-        """Rebuild the lists, without the entities whose callback group executes nothing (gravcomp_node.polled)."""
+        """Rebuild the lists, without what is polled (gravcomp_node.polled) or received locally."""
         self._changed = False
         self._held.close()
-        self._subscriptions = self._hold(self._node.subscriptions)
-        self._timers = self._hold(self._node.timers)
+        self._subscriptions = self._hold(
+            subscription
+            for node in self._nodes
+            for subscription in node.subscriptions
+            if self._local is None or not self._local.is_local(subscription)
+        )
+        self._timers = self._hold(timer for node in self._nodes for timer in node.timers)
         self._wait_set = rclpy_implementation.WaitSet(
             len(self._subscriptions), 1, len(self._timers), 0, 0, 0, self._context.handle
         )
@@ -108,7 +132,7 @@ class StreamExecutor:
 
     def _call_subscription(self, subscription: Subscription) -> None:
         with self._serial:
-            if self._changed and subscription not in list(self._node.subscriptions):
+            if self._changed and not any(subscription in list(node.subscriptions) for node in self._nodes):
                 return  # destroyed by a callback that ran before it
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
             if taken is None:
@@ -117,6 +141,17 @@ class StreamExecutor:
                 subscription.callback(taken[0])
             else:
                 subscription.callback(*taken)
+
+    def _call_local(self) -> None:
+        """Call the callbacks of the messages that wait between nodes, and of those that they publish."""
+        while self._local is not None and self._local.has_waiting:
+            with self._serial:
+                self._local.call_next()
+
+    def _wake(self) -> None:
+        """End the waiting, where another thread has published between nodes."""
+        if threading.get_ident() != self._main:
+            self._trigger()
 
     def _serve(self) -> None:
         """Body of the second thread."""

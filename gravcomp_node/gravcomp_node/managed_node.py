@@ -1,19 +1,27 @@
 """A lifecycle node with one frozen data class of parameters, which by default configures and activates itself."""
 
+import copy
 import gc
-import os
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.shared import SharedParameters
-from gravcomp.launcher.node_process import ACTIVE_FILE
 from gravcomp_node import ros_parameters
+from gravcomp_node.local_topics import LocalPublisher, LocalTopics
 
 OK, WARN, ERROR = (bytes([level]) for level in (0, 1, 2))
 
@@ -27,8 +35,13 @@ class ManagedNode(LifecycleNode):
     name: str
     parameters_class: type
 
-    def __init__(self) -> None:
+    def __init__(self, local: LocalTopics | None = None) -> None:
+        """local: topics between the nodes of this process, where there are several."""
+        self.local = local
+        self._steady: Clock | None = None
+        self._is_made = False  # what rclpy creates for itself before is left to it
         super().__init__(self.name)
+        self._is_made = True
         self.finished = False
         self.is_active = False
         self._is_configured = False
@@ -40,7 +53,7 @@ class ManagedNode(LifecycleNode):
         self.parameters = ros_parameters.declare(
             self, self.parameters_class, section, f"{self.robot_file.source}: nodes.{self.name}"
         )
-        ros_parameters.refuse_unknown_overrides(self)
+        ros_parameters.refuse_unknown_overrides(self, (SharedParameters, self.parameters_class))
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._apply_change)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -80,8 +93,6 @@ class ManagedNode(LifecycleNode):
         for transition in (self.trigger_configure, self.trigger_activate):
             if transition() != TransitionCallbackReturn.SUCCESS:
                 raise ConfigError(self.failure or "could not be started")
-        if note := os.environ.get(ACTIVE_FILE):
-            Path(note).touch()
 
     def shut_down(self) -> None:
         """Deactivate and clean up from any state. Logs exceptions instead of raising them."""
@@ -92,6 +103,72 @@ class ManagedNode(LifecycleNode):
                 except Exception as error:  # the remaining steps must still run
                     self.get_logger().error(f"error during shutdown: {error!r}")
         self.is_active = self._is_configured = False
+
+    # Publishers, subscriptions and timers, whose quality of service may be overridden by parameters.
+
+    def create_publisher(self, msg_type: type, topic: str, qos_profile: QoSProfile | int, **options: Any) -> Publisher:
+        """Create a publisher, as rclpy does. Raises ConfigError for an override of its quality of service that is not allowed."""
+        if not self._is_made:
+            return super().create_publisher(msg_type, topic, qos_profile, **options)
+        publisher = self._create(
+            super().create_publisher, msg_type, topic, qos_profile, publisher_class=LocalPublisher, **options
+        )
+        if self.local is not None:
+            self.local.add_publisher(self, publisher)
+        return publisher
+
+    def create_subscription(
+        self, msg_type: type, topic: str, callback: Callable, qos_profile: QoSProfile | int, **options: Any
+    ) -> Subscription:
+        """Create a subscription, as rclpy does. Raises ConfigError for an override that is not allowed."""
+        if not self._is_made:
+            return super().create_subscription(msg_type, topic, callback, qos_profile, **options)
+        subscription = self._create(super().create_subscription, msg_type, topic, callback, qos_profile, **options)
+        if self.local is not None and not subscription.raw:
+            called = subscription.callback_group.can_execute(subscription)
+            self.local.add_subscription(self, subscription, callback if called else None)
+        return subscription
+
+    def destroy_publisher(self, publisher: Publisher) -> bool:
+        """Destroy a publisher."""
+        if self.local is not None:
+            self.local.remove(publisher)
+        return super().destroy_publisher(publisher)
+
+    def destroy_subscription(self, subscription: Subscription) -> bool:
+        """Destroy a subscription."""
+        if self.local is not None:
+            self.local.remove(subscription)
+        return super().destroy_subscription(subscription)
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable,
+        callback_group: CallbackGroup | None = None,
+        clock: Clock | None = None,
+        autostart: bool = True,
+    ) -> Timer:
+        """Create a timer of the steady clock, unless another one is given: a node watches also when /clock has stopped."""
+        self._steady = self._steady or Clock(clock_type=ClockType.STEADY_TIME)
+        return super().create_timer(timer_period_sec, callback, callback_group, clock or self._steady, autostart)
+
+    def _create(self, create: Callable, *arguments: Any, **options: Any) -> Any:
+        *first, qos = arguments
+        # A copy, because rclpy writes the overrides of a topic into the given profile.
+        qos = QoSProfile(depth=qos) if isinstance(qos, int) else copy.copy(qos)
+        options.setdefault("qos_overriding_options", QoSOverridingOptions.with_default_policies())
+        try:
+            return create(*first, qos, **options)
+        except (RuntimeError, TypeError, InvalidQosOverridesError, InvalidParameterTypeException) as error:
+            if "QoS override" not in str(error) and not isinstance(error, InvalidParameterTypeException):
+                raise
+            raise ConfigError(f"{self.get_name()}: {error}") from error
+
+    def _warn_of_unused_overrides(self) -> None:
+        for name in self._parameter_overrides:
+            if name.startswith("qos_overrides.") and not self.has_parameter(name):
+                self.get_logger().warning(f"parameter {name} overrides nothing: the node has no such publisher or subscription")
 
     # Lifecycle.
 
@@ -110,6 +187,8 @@ class ManagedNode(LifecycleNode):
         self.report(OK, "active")
         result = self._attempt(self.activate)
         self.is_active = result == TransitionCallbackReturn.SUCCESS
+        if self.is_active:
+            self._warn_of_unused_overrides()
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -13,6 +13,8 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
 
+from gravcomp_node.local_topics import LocalTopics
+
 
 @dataclass(frozen=True)
 class Received:
@@ -29,6 +31,7 @@ class Polled:
     def __init__(self, node: LifecycleNode, kind: type, topic: str, qos: QoSProfile):
         self._node = node
         self._kind = kind
+        self._local: LocalTopics | None = getattr(node, "local", None)
         self._subscription = node.create_subscription(kind, topic, _never_called, qos, callback_group=_NeverExecuted())
         self.last: Received | None = None
 
@@ -40,6 +43,11 @@ class Polled:
     def take_all(self) -> list[Received]:
         """Return all messages kept since the last call, oldest first."""
         fresh = []
+        if self._local is not None:
+            fresh = [Received(*taken) for taken in self._local.kept(self._subscription)]
+            if self._local.is_local(self._subscription):
+                self.last = fresh[-1] if fresh else self.last
+                return fresh
         with self._subscription.handle:
             while (taken := self._subscription.handle.take_message(self._kind, False)) is not None:
                 message, info = taken

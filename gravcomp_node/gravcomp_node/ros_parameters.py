@@ -19,7 +19,7 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
     check_defaults(cls, defaults, source)
     given = _flatten(defaults)
     for leaf in declared_parameters(cls):
-        override = node._parameter_overrides.get(leaf.key)
+        override = node._parameter_overrides.get(leaf.key) or _by_earlier_name(node, leaf)
         value = given.get(leaf.key, leaf.default)
         if override is not None:
             # Checked here instead of in rclpy, so that the error states what is allowed, and '1' is accepted for '1.0'.
@@ -30,10 +30,23 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
     return read(node, cls)
 
 
-def refuse_unknown_overrides(node: Node) -> None:
-    """Raise ConfigError for an override of an unknown parameter, which ROS would ignore."""
+def _by_earlier_name(node: Node, leaf: DeclaredParameter) -> Parameter | None:
+    """Return the override of a parameter by its earlier name, where this release still takes it, and warn."""
+    override = node._parameter_overrides.get(leaf.earlier_key) if leaf.parameter.accepts_earlier_name else None
+    if override is not None:
+        node.get_logger().warning(
+            f"parameter {leaf.earlier_key} has been renamed; write '{leaf.key}': the earlier name is taken until release"
+            f" {leaf.parameter.accepted_until}"
+        )
+    return override
+
+
+def refuse_unknown_overrides(node: Node, classes: tuple[type, ...]) -> None:
+    """Raise ConfigError for an override of an unknown parameter, which ROS would ignore; `classes`: those declared."""
+    earlier = {leaf.earlier_key for cls in classes for leaf in declared_parameters(cls) if leaf.parameter.accepts_earlier_name}
     for name in node._parameter_overrides:
         known = node.has_parameter(name) or name.startswith(("qos_overrides.", "start_type_description_service"))
+        known = known or name in earlier
         if not known:
             own = sorted(p for p in node._parameters if not p.startswith(("qos_overrides", "use_sim_time", "start_type")))
             raise ConfigError(f"{node.get_name()}: unknown parameter '{name}'; allowed: {', '.join(own)}")

@@ -1,14 +1,18 @@
 """Process of a node: from the command line to a clean shutdown on SIGINT or SIGTERM."""
 
 import gc
+import os
 import signal
 import sys
+from pathlib import Path
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from gravcomp.config import ConfigError
+from gravcomp.launcher.node_process import ACTIVE_FILE
 from gravcomp_node.executor import StreamExecutor
+from gravcomp_node.local_topics import LocalTopics
 from gravcomp_node.managed_node import ManagedNode
 
 USAGE = """{name}: a node of gravcomp. {purpose}
@@ -19,34 +23,42 @@ parameters (name, default, allowed, meaning):
 {parameters}"""
 
 
-def run(node_class: type[ManagedNode], argv: list[str] | None = None) -> int:
-    """Run the node until a signal arrives or the node has finished.
+def run(*node_classes: type[ManagedNode], argv: list[str] | None = None) -> int:
+    """Run the nodes until a signal arrives or one of them has finished; several share one executor and their messages.
 
     Return the exit code: 0, or 2 after an error, with one sentence on stderr.
     """
     argv = sys.argv if argv is None else argv
     if {"-h", "--help"} & set(argv[1:]):
-        print(_help(node_class))
+        print("\n".join(_help(node_class) for node_class in node_classes))
         return 0
+    local = LocalTopics() if len(node_classes) > 1 else None
     # These handlers only set a flag; rclpy's handlers would shut the context down during a callback.
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(True))
-    node = executor = None
+    nodes: list[ManagedNode] = []
+    executor = None
+    name = node_classes[0].name
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
-        node = node_class()
-        node.start()
-        executor = StreamExecutor(node)
-        while not stop and not node.finished:
+        for node_class in node_classes:
+            name = node_class.name
+            nodes.append(node_class(local))
+            nodes[-1].start()
+        note = os.environ.get(ACTIVE_FILE)
+        if note and all(node.autostart for node in nodes):
+            Path(note).touch()
+        executor = StreamExecutor(*nodes, local=local)
+        while not stop and not any(node.finished for node in nodes):
             executor.spin_once(timeout=0.1)
     except (ConfigError, rclpy.exceptions.ROSInterruptException, rclpy._rclpy_pybind11.RCLError) as error:
-        print(f"{node_class.name}: {error}", file=sys.stderr, flush=True)
+        print(f"{name}: {error}", file=sys.stderr, flush=True)
         return 2
     finally:
         if executor is not None:
             executor.shutdown()
-        if node is not None:
+        for node in nodes:
             node.shut_down()
             node.destroy_node()
         rclpy.try_shutdown()

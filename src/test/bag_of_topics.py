@@ -38,11 +38,11 @@ class TopicBag:
     def vector(self, topic: str, time: float, value) -> None:
         self._write(topic, "geometry_msgs/msg/Vector3Stamped", time, vector=self._types["Vector3"](*map(float, value)))
 
-    def pose(self, topic: str, time: float, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
+    def pose(self, topic: str, time: float, position, orientation=(0.0, 0.0, 0.0, 1.0), late: float = 0.0) -> None:
         pose = self._types["Pose"](
             self._types["Point"](*map(float, position)), self._types["Quaternion"](*map(float, orientation))
         )
-        self._write(topic, "geometry_msgs/msg/PoseStamped", time, pose=pose)
+        self._write(topic, "geometry_msgs/msg/PoseStamped", time, late, pose=pose)
 
     def state(self, topic: str, time: float, displacement, late: float = 0.0) -> None:
         none = np.zeros(0)

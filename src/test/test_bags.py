@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from gravcomp.recordings.bags import BagError
@@ -135,6 +135,23 @@ def test_a_bag_that_was_cut_off_is_read_up_to_the_last_complete_chunk(tmp_path, 
     # The index at the end takes part of the file, so more messages than `part` are readable.
     assert 300 * part - 20 <= bag.messages <= 300 and bag.messages % 20 == 0
     assert len(read_recording(path)) == bag.messages
+
+
+@pytest.mark.parametrize("part", [0.4, 0.7, 0.95])
+def test_an_sqlite_bag_that_was_cut_off_is_read_up_to_the_first_missing_page(tmp_path, store, part):
+    path = tmp_path / "bag"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        topic = bag.add_connection("/imu/data_raw", IMU, typestore=store)
+        for k in range(400):
+            bag.write(topic, 10**9 + k * 10**7, imu(store, k))
+    file = path / "bag.db3"
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(part * len(whole))])
+    bag = readable(path)
+    assert bag.problem
+    # The pages of other tables and of an index take part of the file.
+    assert 400 * part - 80 <= bag.messages <= 400
+    np.testing.assert_allclose(read_recording(path).gyro[:, 0], 0.001 * np.arange(bag.messages))
 
 
 def test_a_bag_with_damage_in_the_middle_is_read_up_to_it(tmp_path, store, definitions):

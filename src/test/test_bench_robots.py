@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from gravcomp.bench import limits, robots
+from gravcomp.bench import limits, robot_parts, robots
 from gravcomp.config import ConfigError
+from gravcomp.sweep import Sweep
 
 ROBOT = """
 robot:
@@ -58,3 +59,67 @@ def test_missing_data_make_a_figure_null(monkeypatch, tmp_path, caplog):
     monkeypatch.setenv("GRAVCOMP_DATA", str(tmp_path / "data"))
     assert robots.run(silent, figures=["tdcr_mm"]) == {"robots": {}, "tdcr_mm": None}
     assert "tdcr" in caplog.text
+
+
+@pytest.fixture
+def fake_parts(monkeypatch, tmp_path):
+    """Parts that take no time; returns the list of those that ran."""
+    ran = []
+
+    def loop(file, part):
+        ran.append(part)
+        run = {
+            "held": 0.02 * part.seed,
+            "moving": 0.03,
+            "held_m": 2e-4 * part.seed,
+            "moving_m": 3e-4,
+            "sag": 1e-2,
+            "settled": 0.5,
+        }
+        return run | ({"settled": None} if part.seed == 2 else {})
+
+    def calibration(file, part):
+        ran.append(part)
+        return {"held": 1.5, "moving": part.seed + 1.0, "modulus": 0.5, "compliance": None, "seconds": 170.0}
+
+    def broken(file, part):
+        ran.append(part)
+        raise RuntimeError("the bridge does not start")
+
+    kinds = {
+        "loop": loop,
+        "calibration": calibration,
+        "similarity": lambda file, part: {"difference": 0.01},
+        "holdability": broken,
+    }
+    monkeypatch.setattr(robot_parts, "KINDS", kinds)
+    monkeypatch.setattr("gravcomp.bench.robot_loop.Sweep", lambda: Sweep(1))
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
+    return ran
+
+
+def test_the_loop_has_the_worst_seed_and_goes_on_where_it_was(short, fake_parts):
+    first = robots.run(silent, files=[short], loop=True)["robots"]["short"]
+    assert first["uncalibrated_pct"] == 6.0 and first["calibrated_pct"] == 1.5 and first["similarity_pct"] == 1.0
+    assert first["moving_pct"] == 4.0 and first["uncalibrated_moving_pct"] == 3.0  # the limit is that of the calibrated model
+    assert first["settle_s"] is None and first["compliance_error_pct"] is None
+    assert first["unholdable"] is None and "bridge does not start" in first["errors"]["short: holdability, seed 1"]
+    assert len(fake_parts) == 3 + 3 + 1
+    again = robots.run(silent, files=[short], loop=True)["robots"]["short"]
+    assert again == first and len(fake_parts) == 3 + 3 + 1 + 1  # only what failed
+    with open(short, "a") as file:
+        file.write("virtual_robot: {body: {damping_time_ms: 20}}\n")
+    robots.run(silent, files=[short], loop=True, figures=["uncalibrated_pct"])
+    assert len(fake_parts) == 3 + 3 + 1 + 1 + 3
+
+
+def test_what_cannot_be_told_is_no_missed_figure():
+    measured = {"robots": {"x": {"compliance_error_pct": None, "calibrated_pct": None}, "y": {"compliance_error_pct": 3.0}}}
+    assert {figure.name[:1]: figure.reached for figure in limits.figures("robots", measured)} == {"x": False, "y": True}
+    measured["robots"]["x"]["errors"] = {"loop": "no"}
+    assert [figure.reached for figure in limits.figures("robots", measured)] == [False, False, True]
+
+
+def test_figures_of_the_loop_that_do_not_exist_are_refused():
+    with pytest.raises(ConfigError, match="allowed with --loop: uncalibrated_pct"):
+        robots.run(silent, figures=["build_s"], loop=True)

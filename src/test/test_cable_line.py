@@ -9,8 +9,7 @@ import pytest
 import yaml
 
 from gravcomp.calibration.apply import calibrated_robot, write_calibrated
-from gravcomp.calibration.fit import cable_compliance
-from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters, cable_compliance
 from gravcomp.canbus.codec import encode
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup

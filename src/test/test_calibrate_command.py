@@ -8,7 +8,7 @@ import pytest
 from bag_of_topics import TopicBag
 
 from gravcomp.calibration.files import read_measured, write_csv
-from gravcomp.calibration.measured import Measured, StillWindows, still_windows
+from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
@@ -30,7 +30,8 @@ def setup():
 
 @pytest.fixture(scope="module")
 def windows(setup):
-    return known_windows(setup, ((0.0, 0.0), (-45.0, 45.0)))
+    """One pose with each cable pulled in in turn."""
+    return known_windows(setup, ((0.0, 0.0),))
 
 
 def standing(windows: StillWindows, first: int = 0) -> list[Measured]:
@@ -63,7 +64,7 @@ def joined(trials: list[Measured]) -> Measured:
 @pytest.fixture(scope="module")
 def first_cable(windows):
     """The windows of one pose in which no cable but the first is taut."""
-    rows = [k for k, command in enumerate(windows.displacement[:13]) if np.isnan(command[1:]).all()]
+    rows = [k for k, command in enumerate(windows.displacement) if np.isnan(command[1:]).all()]
     return StillWindows(
         windows.gravity[rows], windows.displacement[rows], windows.tip_position[rows], windows.tip_direction[rows]
     )
@@ -71,8 +72,8 @@ def first_cable(windows):
 
 @pytest.fixture(scope="module")
 def measured(setup, windows):
-    """Resting tips under 26 states of the cables, and one free fall."""
-    fall = free_fall((setup, 20.0, 0.0, 0.8, 0))
+    """Resting tips under 13 states of the cables, and one free fall."""
+    fall = free_fall((setup, 20.0, 0.0, 0.5, 0))
     return joined([fall, *standing(windows, first=1)])
 
 
@@ -162,14 +163,31 @@ def test_unusable_data_end_in_a_sentence(here, capsys):
     assert "nowhere.csv: does not exist" in capsys.readouterr().err
 
 
-def write_bag(path: Path, measured: Measured) -> None:
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"clock": -1.7e9}, "'/measured/tip' are 1.7e.09 s behind those of gravity .do they count from the start of a machine"),
+        ({"clock": 5.0}, "'/measured/tip' are 5 s ahead of those of gravity; synchronise"),
+        ({"lost": np.nan}, "'/measured/tip' has values that are not finite numbers"),
+        ({"lost": 0.0}, "13 poses whose orientation is no quaternion"),
+    ],
+)
+def test_a_bag_of_another_clock_or_without_numbers_is_refused(here, first_cable, change, message):
+    write_bag(here / "bag", joined(standing(first_cable)[:2]), **change)
+    with pytest.raises(MeasurementError, match=message):
+        read_measured("bag", load_robot_file("article").robot.cable_names)
+
+
+def write_bag(path: Path, measured: Measured, clock: float = 0.0, lost: float | None = None) -> None:
     """Write the measurement as topics of the graph, two seconds between trials; released cables are paid out.
 
-    truth/gravity must not be taken for gravity.
+    truth/gravity must not be taken for gravity. clock: of the tracker, ahead of the robot's in s; lost: orientation of the tips
+    of the first trial.
     """
     with TopicBag(path) as bag:
-        start = 0.0
-        for trial in measured.trials():
+        start = max(0.0, -clock)
+        trials = measured.trials()
+        for trial in trials:
             for time, gravity, wound, tip, (x, y, z) in zip(
                 start + trial.time - trial.time[0],
                 trial.gravity,
@@ -181,5 +199,8 @@ def write_bag(path: Path, measured: Measured) -> None:
                 bag.vector("/truth/gravity", time, gravity)
                 bag.state("/cable/state", time, np.nan_to_num(wound, nan=LOOSE))
                 half = np.array([-y, x, 0.0, 1.0 + z])  # of the shortest turn of the z axis to the direction
-                bag.pose("/measured/tip", time, tip, half / np.linalg.norm(half))
+                turn = half / np.linalg.norm(half)
+                if lost is not None and trial is trials[0]:
+                    turn = np.full(4, lost)
+                bag.pose("/measured/tip", time + clock, tip, turn, late=-clock)
             start += trial.time[-1] - trial.time[0] + 2.0

@@ -101,7 +101,7 @@ def warming(monkeypatch):
         temperature_stamp_ns=stamp[::10],
         temperature=temperature[::10],
     )
-    monkeypatch.setattr("gravcomp.recordings.imu.read_recording", lambda path, topic: recording)
+    monkeypatch.setattr("gravcomp.recordings.imu.read_recording", lambda *_: recording)
 
 
 def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkeypatch):

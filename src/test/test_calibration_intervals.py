@@ -5,12 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gravcomp.calibration.estimates import unfit
 from gravcomp.calibration.fit import TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.calibration.standstill import Standstill, noise_of
 from gravcomp.calibration.statics import StaticPrediction
-from gravcomp.calibration.unknowns import Priors
+from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.description import load_robot_file
 
 SEEDS = 40
@@ -101,6 +102,27 @@ def test_what_the_data_do_not_show_keeps_its_value_with_a_reason(robot):
     assert any("compliance" in estimate.name for estimate in unseen)
     assert all(estimate.value == pytest.approx(estimate.initial, rel=1e-9) for estimate in unseen)
     assert any("cannot be told from these data" in warning and "compliance" in warning for warning in fit.warnings)
+
+
+def test_a_stretch_that_might_be_none_or_twice_as_much_is_not_told():
+    compliance = Unknown("compliance", (0,), 1e-5)
+    assert "± 100% of it" in unfit(compliance, 0.1, 0.3, 0.6, [], initial=0.5)
+    assert "more than all of it" in unfit(compliance, -0.5, 0.3, 0.6, [], initial=0.5)
+    assert not unfit(compliance, 0.1, 0.1, 0.2, [], initial=0.5)
+    assert not unfit(compliance, 0.9, 0.4, 0.8, [], initial=0.5)  # the described value is outside the interval
+
+
+def test_values_that_fit_worse_than_the_described_ones_are_refused(robot):
+    """Directions that want another modulus than the positions, which fit the described robot exactly."""
+    springs = measured_springs(robot, 0, 0.0)
+    described = np.array([material.youngs_modulus for material in robot.materials])
+    compliance = np.array([robot.cable_compliance(cable) for cable in robot.cables])
+    exact, other = (
+        springs.predict(StaticParameters(ratio * described, np.zeros(len(compliance)), compliance)).tip for ratio in (1.0, 1.1)
+    )
+    springs.windows = dataclasses.replace(springs.windows, tip_position=exact[:, :3], tip_direction=other[:, 3:])
+    with pytest.raises(MeasurementError, match=r"describe these data better than the robot file.*nothing is written"):
+        fit_statics(robot, springs.windows, groups=set(), predictor=springs)
 
 
 def test_a_winding_ratio_that_no_maker_delivers_is_refused(robot):

@@ -1,10 +1,14 @@
 """Planned calibrations: what is chosen, the table on paper, the session on a running robot, and how intervals cover the truth."""
 
 import dataclasses
+import errno
+import os
+import re
 
 import numpy as np
 import pytest
 
+from gravcomp.calibration import plan as planning
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
@@ -12,7 +16,7 @@ from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
-from gravcomp.trials.coverage import coverage
+from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
 
@@ -27,7 +31,11 @@ def robot():
 
 @pytest.fixture(scope="module")
 def plan(robot):
-    return make_plan(robot, PERIOD, options=PlanOptions(budget=60.0, fewest=6, most=9))
+    """A plan from half of the orientations, with small bends: the equilibria of neighbouring poses are near each other."""
+    options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(planning, "ORIENTATIONS", planning.ORIENTATIONS[::2])
+        return make_plan(robot, PERIOD, options=options)
 
 
 def test_a_plan_keeps_to_its_time_and_to_the_limits(robot, plan):
@@ -117,10 +125,63 @@ def test_a_base_that_leaves_its_pose_begins_it_again(robot, tmp_path):
     assert session.phase == Phase.TURN and not (tmp_path / "live.csv").exists()
 
 
+def test_no_pose_is_lost_on_a_full_disk(robot, tmp_path, monkeypatch):
+    out = tmp_path / "live.csv"
+    session = LiveSession(robot, session_plan(), out)
+    now = run(session, 0.0, 0.0, 3.5)
+    assert session.finished == 1
+    first, fsync = out.read_text(), os.fsync
+    monkeypatch.setattr(os, "fsync", full_disk)
+    now = run(session, 1.0, run(session, 0.0, now, 3.5), 3.5)
+    assert session.phase == Phase.DONE and not session.save()
+    assert "No space left" in session.sentence() and "are kept" in session.sentence()
+    assert out.read_text() == first and [path.name for path in tmp_path.iterdir()] == ["live.csv"]
+    monkeypatch.setattr(os, "fsync", fsync)
+    assert session.save() and session.unwritten == "" and "all 3 poses" in session.sentence()
+    assert out.read_text().startswith(first) and LiveSession(robot, session_plan(), out).finished == 3
+
+
+def full_disk(number):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    ("late", "tip", "message"),
+    [
+        (-1.7e9, [0.0, 0.0, 0.08], "behind those of gravity .do they count from the start of a machine"),
+        (0.0, [0.0, 0.0, 80.0], "a thousand times too large"),
+        (0.0, [np.nan, 0.0, 0.08], "not finite numbers"),
+        (0.0, [0.1, 0.1, 0.08], "another robot, or not in soft_base"),
+        (0.0, None, "no measured tip arrives"),
+    ],
+)
+def test_a_session_names_tips_that_cannot_be_of_the_robot(robot, tmp_path, late, tip, message):
+    session = LiveSession(robot, session_plan(), tmp_path / "live.csv")
+    for step in range(200):
+        time = 1.7e9 + 0.02 * step
+        session.on_gravity(time, gravity_of(0.0, 0.0))
+        session.command(time, np.zeros(3))
+        if tip is not None:
+            session.on_tip(time + late, np.array(tip), np.array([0.0, 0.0, 1.0]))
+    assert session.finished == 0 and session.phase == Phase.REST
+    assert re.search(message, session.sentence())
+
+
 def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     """Of a few seeds; `bench robots --figures coverage_pct` takes 50 and three robots."""
-    found = coverage(robot, plan.poses, range(12))
+    found = coverage(robot, plan, range(12))
     counted = sum(one.count for one in found.values())
     inside = sum(one.share * one.count for one in found.values())
     assert counted > 50 and inside / counted >= 0.9
     assert found["modulus"].share >= 0.9
+    assert all(np.isfinite(one.width) and one.count >= 5 for one in found.values())
+
+
+def test_kinds_that_few_seeds_tell_are_counted_together():
+    """Of one interval neither a share nor a scatter follows."""
+    errors = {"modulus": [0.1, -0.1] * 5, "friction": [0.3], "winding": [0.1, 0.1, 0.9]}
+    halves = {"modulus": [0.2] * 10, "friction": [0.4], "winding": [0.2] * 3}
+    found = counted(errors, halves, 10)
+    assert set(found) == {"modulus", RARE} and found[RARE].count == 4 and found[RARE].share == 0.75
+    assert found["modulus"].width == pytest.approx(2.0)
+    assert set(counted(errors, halves, 50)) == set()

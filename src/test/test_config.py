@@ -81,6 +81,23 @@ def test_a_renamed_key_is_refused_and_the_error_names_the_new_key():
 
 
 @dataclass(frozen=True)
+class Brake:
+    force: float = parameter(3.0, unit="N", description="force", renamed_from="strength", accepted_until="999.0")
+    torque: float = parameter(3.0, unit="N m", description="torque", renamed_from="moment", accepted_until="0.0")
+
+
+def test_an_earlier_key_is_taken_with_a_warning_for_a_release():
+    with pytest.warns(
+        FutureWarning, match=r"f.yaml: key 'brake\.strength' has been renamed; write 'force'.*until release 999\.0"
+    ):
+        assert from_mapping(Brake, {"strength": 4.0}, source="f.yaml", key="brake").force == 4.0
+    with pytest.raises(ConfigError, match=r"'brake\.strength' and its new name 'force' are both given"):
+        from_mapping(Brake, {"strength": 4.0, "force": 5.0}, source="f.yaml", key="brake")
+    with pytest.raises(ConfigError, match=r"key 'brake\.moment' has been renamed; write 'torque' instead"):
+        from_mapping(Brake, {"moment": 4.0}, source="f.yaml", key="brake")
+
+
+@dataclass(frozen=True)
 class Winch:
     drive: Drive = parameter(default_factory=Drive, description="drive")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from arc_robot import LENGTH, LIMITS, STATIONS, ArcRobot, closed_loop, controller
+from coarse_article import coarse
 
-from gravcomp.description import load_robot_file
 from gravcomp.inverse import ControllerCode, InverseController, Target, bend_target, straight_target
 from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.simulation import ShapeStatus, Simulator
@@ -15,7 +15,7 @@ GRAVITY = 9.81
 @pytest.mark.parametrize(("angle", "plane"), [(1.5, 0.0), (1.5, 0.7), (2.0, 1.57), (2.6, 0.4)])
 def test_a_bend_far_from_the_sagging_robot_is_reached(angle, plane):
     """Against gravity and by more than a right angle: the tip has to move along the target's direction."""
-    robot = load_robot_file("article").robot
+    robot = coarse()
     simulator, control, target = (
         Simulator(robot, reduced=False),
         InverseController(robot),
@@ -31,10 +31,10 @@ def test_a_bend_far_from_the_sagging_robot_is_reached(angle, plane):
 
 
 class ModelLoop:
-    """The full model of the article's robot and its controller in the closed loop; counts searches for a lost equilibrium."""
+    """The coarse full model of the article's robot and its controller in the closed loop; counts searches for an equilibrium."""
 
     def __init__(self, gravity, monkeypatch, law="svk"):
-        self.gravity, self.robot = gravity, load_robot_file("article").robot.with_material(law=law)
+        self.gravity, self.robot = gravity, coarse().with_material(law=law)
         self.simulator, self.control = Simulator(self.robot, reduced=False), InverseController(self.robot)
         self.shape, self.searches = self.simulator.step(gravity), 0
         solve = self.simulator.solver.solve

@@ -1,8 +1,8 @@
 """A simulator that starts on the full model changes over to the reduced model when that is built."""
 
-import dataclasses
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -10,26 +10,40 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse_article import built_once, cache_of_the_run, coarse
 
-from gravcomp.description import Elements, load_robot_file
+from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Robot
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction import load, path_of
 from gravcomp.simulation import DynamicSimulator, RobotModel, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
-from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training import TrainingOptions
 from gravcomp.training.samples import samples
 
-SHORT = BuildOptions(
-    modes=30, strains=30, training=TrainingOptions(paths=24, steps=30), test=TrainingOptions(paths=2, steps=10, seed=9)
-)
 GRAVITY = 9.81 * np.array([0.0, np.sin(0.4), np.cos(0.4)])
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory) -> Path:
+    """The file of the robot's reduced model."""
+    with cache_of_the_run(tmp_path_factory):
+        model, _ = built_once(coarse())
+        return path_of(model)
 
 
 @pytest.fixture
 def robot(tmp_path, monkeypatch) -> Robot:
+    """The robot, and a cache without its reduced model."""
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
-    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
+    return coarse()
+
+
+def store(robot: Robot, built: Path) -> Path:
+    """Put the reduced model into the cache at once, as a builder does at its end; returns its path."""
+    path = path_of(RobotModel(robot))
+    shutil.copy(built, path.with_suffix(".part"))
+    return path.with_suffix(".part").replace(path)
 
 
 def exchanged(late: LateReduction, patience: float = 60.0) -> bool:
@@ -42,7 +56,7 @@ def exchanged(late: LateReduction, patience: float = 60.0) -> bool:
 
 
 @pytest.mark.parametrize("kind", [Simulator, DynamicSimulator])
-def test_the_tip_does_not_jump_when_the_reduced_model_takes_over(robot, kind):
+def test_the_tip_does_not_jump_when_the_reduced_model_takes_over(robot, built, kind):
     simulator = kind(robot)
     late = LateReduction(simulator, period=0.02)
     wound = np.zeros(len(robot.cables))
@@ -51,7 +65,7 @@ def test_the_tip_does_not_jump_when_the_reduced_model_takes_over(robot, kind):
     assert before.model == "full" and late.missing
     if kind is DynamicSimulator:
         before = simulator.settle(GRAVITY, wound)
-    build(RobotModel(robot), SHORT)
+    store(robot, built)
     assert exchanged(late)
     tips, models = [before.tip_position], []
     for _ in range(3):
@@ -91,13 +105,12 @@ def test_an_interrupted_training_goes_on_and_finds_the_same_samples(robot, tmp_p
         np.testing.assert_array_equal(one.unknowns, other.unknowns)
 
 
-def test_a_second_builder_finds_the_model_of_the_first(robot, tmp_path):
+def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):
     shipped = Path(load_robot_file("article").source).read_text()
-    coarse = re.sub(r"(?m)^  elements: .*$", "  elements: {around: 4, along: 4}", shipped)
-    (tmp_path / "robot.yaml").write_text(coarse)
+    described = re.sub(r"(?m)^  elements: .*$", "  elements: {around: 4, along: 4}", shipped)
+    (tmp_path / "robot.yaml").write_text(described)
     assert load_robot_file(str(tmp_path / "robot.yaml")).robot == robot
-    build(RobotModel(robot), SHORT)
-    stamp = path_of(RobotModel(robot)).stat().st_mtime_ns
+    stamp = store(robot, built).stat().st_mtime_ns
     command = [sys.executable, "-m", "gravcomp.training.background", str(tmp_path / "robot.yaml")]
     done = subprocess.run(command, env=dict(os.environ), capture_output=True, text=True, timeout=120)
     assert done.returncode == 0 and not done.stderr

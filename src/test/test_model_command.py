@@ -29,7 +29,7 @@ def test_view_writes_a_picture(tmp_path, capsys):
 
 
 def test_info_tells_masses_modes_and_reach(capsys):
-    assert main(["model", "info", "mesh_body", "--json"]) == 0
+    assert main(["model", "info", "mesh_body", "--directions", "4", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["mass_g"] == pytest.approx(3.44, abs=0.05) and figures["mesh"]["kind"] == "tet10"
     assert len(figures["natural_frequency_hz"]) == 6 and len(figures["reach"]) == 3

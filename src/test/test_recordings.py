@@ -57,10 +57,12 @@ def test_files_of_other_kinds_are_refused(tmp_path):
     (tmp_path / "text.npz").write_text("hello")
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.csv").write_text("1,2")
+    (tmp_path / "a.jpg").write_text("")
     for name, words in (
         ("text.npz", "is not an .npz"),
         ("folder", "is not a bag"),
-        ("a.csv", "neither"),
+        ("a.csv", "lacks a rate and a specific force"),
+        ("a.jpg", "of no known kind"),
         ("none", "does not exist"),
     ):
         with pytest.raises(RecordingError, match=words):
@@ -74,6 +76,15 @@ def test_averaging_keeps_the_truth_at_the_end_of_each_window():
     assert recording.stamp_ns.tolist() == [2000, 5000]
     assert recording.gyro[0].tolist() == [3.0, 4.0, 5.0]
     assert recording.orientation.tolist() == [truth[2].tolist(), truth[5].tolist()]
+
+
+def test_the_beginning_of_a_recording_has_its_first_seconds():
+    stamp = 5 * 10**9 + np.arange(7) * 10**9
+    truth = np.arange(28.0).reshape(7, 4)
+    recording = Recording("x", stamp, np.arange(21.0).reshape(7, 3), np.ones((7, 3)), orientation=truth).beginning(2.0)
+    assert recording.stamp_ns.tolist() == stamp[:3].tolist()
+    assert recording.gyro[-1].tolist() == [6.0, 7.0, 8.0] and recording.accel.shape == (3, 3)
+    assert recording.orientation.tolist() == truth[:3].tolist() and recording.movement is None
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -1,12 +1,12 @@
 """The reduced model: exact polynomials, agreement with the full model, trained range, and fallback to the full model."""
 
 import dataclasses
-import os
 
 import numpy as np
 import pytest
+from coarse_article import SMALL, built_once, cache_of_the_run, coarse
 
-from gravcomp.description import Elements, Fibres, PronyTerm, load_robot_file
+from gravcomp.description import Fibres, PronyTerm
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
@@ -18,40 +18,24 @@ from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
 from gravcomp.reduction.reduced_model import project, section_changes
 from gravcomp.reduction.strain_polynomials import strain_at, strain_polynomials, tangent
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
-from gravcomp.training import BuildOptions, TrainingOptions, build
-from gravcomp.training.build import alone
-
-# Little training for a coarse mesh: enough to keep this robot straight.
-SMALL = BuildOptions(
-    modes=30,
-    strains=24,
-    training=TrainingOptions(paths=36, steps=12, bend=0.3),
-    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
-)
+from gravcomp.training import build
 
 
 @pytest.fixture(scope="module")
 def robot():
-    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
+    return coarse()
 
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
-    """A cache of this run, shared by the workers of pytest-xdist."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GRAVCOMP_CACHE", str(folder))
+    with cache_of_the_run(tmp_path_factory):
         yield
 
 
 @pytest.fixture(scope="module")
 def built(robot, cache):
-    """A model and its reduction, which one of the workers builds."""
-    model = RobotModel(robot)
-    with alone(model):
-        reduction = load(model) or build(model, SMALL)[0]
-    return model, reduction
+    """A model and its reduction."""
+    return built_once(robot)
 
 
 @pytest.fixture(scope="module")
@@ -267,9 +251,7 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
 
 def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(robot, cache):
     cables = tuple(dataclasses.replace(cable, friction=1.0) for cable in robot.cables)
-    model = RobotModel(dataclasses.replace(robot, cables=cables).with_material(law="yeoh"))
-    with alone(model):
-        reduction = load(model) or build(model, SMALL)[0]
+    model, reduction = built_once(dataclasses.replace(robot, cables=cables).with_material(law="yeoh"))
     assert 0 < len(reduction.cubature.weight) < model.elements.weights.size
     reduced, full = Simulator(model), Simulator(RobotModel(model.robot), reduced=False)
     without = Simulator(robot.with_material(law="yeoh"), reduced=False)

@@ -2,17 +2,17 @@
 
 import ctypes
 import dataclasses
-import os
 import struct
 
 import numpy as np
 import pytest
+from coarse_article import built_once, cache_of_the_run, coarse
 
 from gravcomp.closed_loop import loop as loop_module
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
-from gravcomp.description import Elements, PronyTerm, load_robot_file
+from gravcomp.description import PronyTerm, load_robot_file
 from gravcomp.firmware import model_blob
 from gravcomp.firmware.cycles import MEMORY_AT, Processor, sample_bytes
 from gravcomp.firmware.host_library import load as library
@@ -23,40 +23,23 @@ from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopPara
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
-from gravcomp.reduction import load
 from gravcomp.simulation import RobotModel
-from gravcomp.training import BuildOptions, TrainingOptions, build
-from gravcomp.training.build import alone
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-# That of test_reduction, which shares its cache.
-SMALL = BuildOptions(
-    modes=30,
-    strains=24,
-    training=TrainingOptions(paths=24, steps=12, bend=0.3),
-    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
-)
 STEPS = 120
 
 
 @pytest.fixture(scope="module")
 def parameters():
     file = load_robot_file("article")
-    return LoopParameters.of(
-        dataclasses.replace(file, robot=dataclasses.replace(file.robot, elements=Elements(around=4, along=4)))
-    )
+    return LoopParameters.of(dataclasses.replace(file, robot=coarse(file.robot)))
 
 
 @pytest.fixture(scope="module")
 def built(parameters, tmp_path_factory):
-    """A coarse model and its reduction, in a cache of this run."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GRAVCOMP_CACHE", str(folder))
-        model = RobotModel(parameters.robot)
-        with alone(model):
-            yield model, load(model) or build(model, SMALL)[0]
+    """A coarse model and its reduction."""
+    with cache_of_the_run(tmp_path_factory):
+        yield built_once(parameters.robot)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@
 #define SETTLE 0.25f         // s of winding before the current is sampled; the next such time gives the baseline
 #define SMOOTHING 0.02f      // s
 #define RISE_TIME 0.04f      // s above the threshold until the cable is taut
-#define ARRIVED 5e-5f        // m
+#define ARRIVED 0.01f        // of the slack, from the target
+#define FARTHEST 0.02f       // of the slack, before the end of the travel
 #define PHASE_TIMEOUT 60.0f  // s
 #define CANDIDATES 41u
 #define REFINEMENTS 3u
@@ -18,9 +19,10 @@ static void enter(gc_homing *homing, gc_homing_phase phase) {
 }
 
 static bool arrived(const gc_motor *motors, const gc_parameters *parameters, uint8_t present) {
+  const float near = ARRIVED * gc_parameter_real(parameters, GC_HOMING_SLACK);
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     const float at = gc_motor_displacement(&motors[index], parameters, index);
-    if (is_present(present, index) && gc_abs(at - motors[index].target) >= ARRIVED) {
+    if (is_present(present, index) && gc_abs(at - motors[index].target) >= near) {
       return false;
     }
   }
@@ -78,7 +80,7 @@ static void wind(gc_homing *homing, gc_motor *motors, const gc_parameters *param
   const float at = gc_motor_displacement(&motors[index], parameters, index);
   const float farthest =
       gc_parameter_real(parameters, GC_HOMING_TRAVEL) + gc_parameter_real(parameters, GC_HOMING_SLACK);
-  if (at - homing->from > farthest - 1e-4f) {
+  if (at - homing->from > farthest - FARTHEST * gc_parameter_real(parameters, GC_HOMING_SLACK)) {
     enter(homing, GC_HOMING_FAILED);  // broken, unhooked, or the wrong direction
     return;
   }

@@ -3,7 +3,7 @@
 #include "maths.h"
 
 #define COUNTS_PER_S_AND_RPM 136.5333333f  // 8192 / 60
-#define STANDSTILL 5e-4f                   // m/s
+#define STANDSTILL 0.0125f                 // of the velocity limit
 #define RUNAWAY_TIME 0.04f                 // s; a gear that breaks away is astray for some milliseconds
 
 int32_t gc_motor_direction(const gc_parameters *parameters, uint32_t index) {
@@ -98,7 +98,7 @@ bool gc_motor_is_astray(gc_motor *motor, const gc_parameters *parameters, uint32
   const int32_t limit = gc_parameter_int(parameters, GC_CURRENT_LIMIT);
   const bool full = 20 * gc_clamp_int(motor->current, -10000, 10000) >= 19 * limit || 20 * motor->current <= -19 * limit;
   motor->astray = far || fast ? motor->astray + dt : 0.0f;
-  motor->stalled = full && velocity < STANDSTILL ? motor->stalled + dt : 0.0f;
+  motor->stalled = full && velocity < STANDSTILL * fastest ? motor->stalled + dt : 0.0f;
   const float patience = 1e-3f * (float)gc_parameter_int(parameters, GC_STALL_TIME);
   return motor->astray >= RUNAWAY_TIME || motor->stalled >= patience;
 }

@@ -2,7 +2,7 @@
 
 #include "maths.h"
 
-#define REST_ERROR 4e-6f  // m; within it the integral is frozen, because gears stick
+#define REST_COUNTS 37.5f  // of the rotor; within them the integral is frozen, because gears stick
 
 void gc_position_loop_reset(gc_position_loop *loop, float displacement, float holding) {
   loop->setpoint = displacement;
@@ -38,7 +38,8 @@ float gc_position_loop_step(gc_position_loop *loop, const gc_parameters *paramet
   const float lag = wanted - input->velocity;
   const float proportional = gc_parameter_real(parameters, GC_VELOCITY_GAIN) * lag +
                              input->pull / gc_parameter_real(parameters, GC_NEWTON_PER_AMPERE);
-  const bool at_rest = gc_abs(error) < REST_ERROR && gc_abs(loop->setpoint_velocity) <= 0.0f;
+  const float rest_error = REST_COUNTS * gc_parameter_real(parameters, GC_TRAVEL_PER_COUNT);
+  const bool at_rest = gc_abs(error) < rest_error && gc_abs(loop->setpoint_velocity) <= 0.0f;
   float integral = loop->integral;
   if (!at_rest) {
     integral += gc_parameter_real(parameters, GC_VELOCITY_INTEGRAL) * lag * input->dt;

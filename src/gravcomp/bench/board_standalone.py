@@ -17,8 +17,8 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.offline import estimate_recording
-from gravcomp.recordings.imu import Recording, read_recording
-from gravcomp.recordings.imu.broad_folder import broad_files
+from gravcomp.recordings.imu import Recording
+from gravcomp.recordings.imu.broad_folder import broad_trials
 from gravcomp.reduction import load
 from gravcomp.training import build
 
@@ -32,7 +32,7 @@ _COUNTS_PER_RAD_S = 32767.0 / np.radians(2000.0)
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """Return all figures for the article's robot; `every`: of the paths and trials only every so many."""
+    """Return all figures for the article's robot; `every`: of the paths, steps and trials only every so many."""
     file = load_robot_file("article")
     progress("model of the board")
     found = model_of(file)
@@ -42,7 +42,7 @@ def run(progress: Progress, *, every: int = 1) -> dict:
         "board_basis_error_mm": round(1e3 * found.error, 4),
         **accuracy(progress, file, found, every),
         **memory(progress, found),
-        **step_time(progress, file, found),
+        **step_time(progress, file, found, every),
         **estimator(progress, file, found, every),
     }
 
@@ -65,7 +65,7 @@ def accuracy(progress: Progress, file: RobotFile, found: Fit, every: int = 1) ->
     for rate in _RATES:
         for seed in range(0, _SEEDS, every):
             progress(f"loop on the board at {rate:g} deg/s, path {seed + 1} of {_SEEDS}")
-            gravities = turning_gravity(np.radians(rate), seed, _STEPS)
+            gravities = turning_gravity(np.radians(rate), seed, _STEPS // every)
             host = run_on_host(model, parameters, gravities)
             loop = StandaloneLoop(found.blob)
             for _ in range(LOADING_STEPS - 1):
@@ -93,10 +93,14 @@ def memory(progress: Progress, found: Fit) -> dict:
     }
 
 
-def step_time(progress: Progress, file: RobotFile, found: Fit) -> dict:
-    """Return `board_ms`: estimated time of a whole step at 168 MHz, median and worst, while gravity turns at 90 deg/s."""
+def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:
+    """Return `board_ms`: estimated time of a whole step at 168 MHz, median and worst, while gravity turns at 90 deg/s.
+
+    every: more than 1: a path that is so many times shorter, and ends before gravity turns at its rate.
+    """
     progress("cycles of a step on the emulated processor")
     path = turning_gravity(np.radians(90.0), 0, 200)
+    path = path[: len(path) // every]
     samples = [sample_bytes(*_counts(file, path, step), 1, 0) for step in range(1, len(path))]
     first = len(samples) - _COUNTED
     cycles = loop_cycles(build_image(standalone=True), found.blob, samples, first)
@@ -123,11 +127,11 @@ def _counts(file: RobotFile, path: np.ndarray, step: int) -> tuple[list[int], in
 
 def estimator(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:
     """Return `board_deg`: largest angle between the gravity of both estimators over BROAD's trials; None: there are none."""
-    trials = broad_files()[::every]
+    trials = broad_trials(every)
     worst: float | None = None
-    for path in trials:
-        progress(f"estimator on the board, {path.stem}")
-        worst = max(worst or 0.0, gravity_difference(read_recording(path), file, found.blob))
+    for name, trial in trials.items():
+        progress(f"estimator on the board, {name}")
+        worst = max(worst or 0.0, gravity_difference(trial, file, found.blob))
     return {"board_deg": None if worst is None else round(float(np.degrees(worst)), 5), "board_trials": len(trials)}
 
 

@@ -26,6 +26,8 @@ Progress = Callable[[str], None]
 
 _GRAVITY = 9.81
 _RATE, _TURN = 100.0, np.deg2rad(10.0)  # steps per second, rad/s
+_FALL, _BRIEF_FALL = 0.6, 0.1  # s
+_SCALING_STEPS = 30
 _LAW = {"svk": "svk", "nh": "neo_hookean"}  # of the names in the table of the plain tube
 # The article's mesh has 4,788 linear tetrahedra; this grid has 4,752, six per cell.
 _TET4 = {"around": 12, "along": 33, "radial": 2}
@@ -35,14 +37,14 @@ def run(progress: Progress, *, every: int = 1) -> dict:
     """Return all figures, computed on every `every`-th of the rows, directions and steps; see the functions below."""
     return {
         **calculix_error(progress, every),
-        **full_step(progress),
+        **full_step(progress, every),
         **engine_control.reduced_model(progress, every),
         "neo_hookean": engine_control.reduced_model(progress, every, law="neo_hookean"),
         **engine_control.compensation(progress, every),
         **engine_control.extreme_targets(progress, every),
         **tet4_step(progress, every),
         **scaling(progress, every),
-        **dynamics(progress),
+        **dynamics(progress, every),
     }
 
 
@@ -67,10 +69,10 @@ def calculix_error(progress: Progress, every: int = 1) -> dict:
     }
 
 
-def full_step(progress: Progress) -> dict:
+def full_step(progress: Progress, every: int = 1) -> dict:
     """Return `full_step_ms`: one closed-loop step of the full model, median and p99."""
     progress("full model, closed loop")
-    return {"full_step_ms": _statistics(closed_loop(Simulator(_article(), reduced=False), steps=400))}
+    return {"full_step_ms": _statistics(closed_loop(Simulator(_article(), reduced=False), steps=400 // every))}
 
 
 def tet4_step(progress: Progress, every: int = 1) -> dict:
@@ -84,7 +86,7 @@ def tet4_step(progress: Progress, every: int = 1) -> dict:
     baseline = Simulator(RobotModel(robot, tube_mesh(robot, "tet4", **_TET4)), reduced=False)
     full = Simulator(robot, reduced=False)
     sag = [s.solve(np.array([-_GRAVITY, 0.0, 0.0])).tip_position[0] for s in (baseline, full)]
-    slow, fast = closed_loop(baseline, 60 // every, 50 // every), closed_loop(full, 200)
+    slow, fast = closed_loop(baseline, max(2, 60 // every), 50 // every), closed_loop(full, 200 // every)
     return {
         "tet4_step_ms": _statistics(slow),
         "speedup_over_tet4": round(float(np.median(slow) / np.median(fast)), 1),
@@ -100,12 +102,12 @@ def scaling(progress: Progress, every: int = 1) -> dict:
     for count in (10, 20, 40, 80)[: max(2, 4 // every)]:
         progress(f"scaling, {count} elements along the robot")
         finer = dataclasses.replace(robot, elements=dataclasses.replace(robot.elements or Elements(), along=count))
-        along[count] = _model_step(finer)
+        along[count] = _model_step(finer, every)
     cables = {}
     for count in (3, 6, 12, 24)[: max(2, 4 // every)]:
         progress(f"scaling, {count} cables")
         around = [dataclasses.replace(robot.cables[3], name=f"c{i}", angle=2.0 * np.pi * i / count) for i in range(count)]
-        cables[count] = _model_step(dataclasses.replace(robot, cables=tuple(around)))
+        cables[count] = _model_step(dataclasses.replace(robot, cables=tuple(around)), every)
     return {
         "scaling": {
             "elements_along_ms": along,
@@ -116,19 +118,19 @@ def scaling(progress: Progress, every: int = 1) -> dict:
     }
 
 
-def dynamics(progress: Progress) -> dict:
-    """Return the figures of a free fall of 0.6 s, from the straight horizontal robot.
+def dynamics(progress: Progress, every: int = 1) -> dict:
+    """Return the figures of a free fall of 0.6 s (every > 1: 0.1 s), from the straight horizontal robot.
 
     `dynamics_error_mm`, `dynamics_full_error_mm`: worst tip error of reduced and full model at steps of 10 ms, against the full
     model at 0.5 ms; `dynamics_step_ms`, `dynamics_full_step_ms`: one step.
     """
-    model = RobotModel(_article())
+    model, duration = RobotModel(_article()), _FALL if every == 1 else _BRIEF_FALL
     progress("dynamics, reference")
-    reference, _ = _fall(DynamicSolver(model), model, 0.5e-3)
+    reference, _ = _fall(DynamicSolver(model), model, 0.5e-3, duration)
     progress("dynamics, 10 ms")
     figures: dict = {}
     for name, solver in (("dynamics", engine_control.reduced_motion(model, progress)), ("dynamics_full", DynamicSolver(model))):
-        coarse, times = _fall(solver, model, 10e-3)
+        coarse, times = _fall(solver, model, 10e-3, duration)
         error = np.linalg.norm(coarse - reference[19::20], axis=1).max()
         figures |= {f"{name}_error_mm": round(1e3 * float(error), 3), f"{name}_step_ms": _statistics(times)}
     return figures
@@ -152,7 +154,9 @@ def closed_loop(simulator: Simulator, steps: int, warm_up: int = 50) -> np.ndarr
     return np.array(times[warm_up:])
 
 
-def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: float) -> tuple[np.ndarray, np.ndarray]:
+def _fall(
+    solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: float, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return tip positions (k, 3) in m of a free fall with released cables, and the time (k,) in s of each step."""
     gravity = np.array([-_GRAVITY, 0.0, 0.0])
     nodes = model.mesh.nodes
@@ -167,7 +171,7 @@ def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: fl
     solver.step(gravity, CableInput(), h)  # the first one compiles
     place()
     tips, times = [], []
-    for _ in range(round(0.6 / h)):
+    for _ in range(round(duration / h)):
         begin = time.perf_counter()
         motion = solver.step(gravity, CableInput(), h)
         times.append(time.perf_counter() - begin)
@@ -180,13 +184,13 @@ def _fall(solver: DynamicSolver | ReducedDynamicSolver, model: RobotModel, h: fl
     return np.array(tips), np.array(times)
 
 
-def _model_step(robot: Robot) -> float:
+def _model_step(robot: Robot, every: int) -> float:
     """Return the median ms of a model step while gravity turns and every third cable is taut."""
     simulator = Simulator(robot, reduced=False)
     tension = np.where(np.arange(len(robot.cables)) % 3 == 0, 0.2 * 3 / len(robot.cables), 0.0)
     simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]), tension=tension)
     times = []
-    for step in range(30):
+    for step in range(max(5, _SCALING_STEPS // every)):
         angle = _TURN * step / _RATE
         gravity = -_GRAVITY * np.array([np.cos(angle), 0.0, np.sin(angle)])
         times.append(simulator.step(gravity, tension=tension).solve_time)

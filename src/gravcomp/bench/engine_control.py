@@ -16,6 +16,7 @@ Progress = Callable[[str], None]
 
 _GRAVITY, _RATE = 9.81, 100.0  # m/s^2, steps per second
 _DIRECTIONS, _SETTLING = 200, 80
+_STEPS, _LEAST_STEPS = 400, 100  # of a path; the first 50 are not timed
 
 
 def reduced_model(progress: Progress, every: int = 1, law: str = "svk") -> dict:
@@ -39,7 +40,7 @@ def reduced_figures(model: RobotModel, progress: Progress, every: int = 1) -> di
     for rate in (10, 90):
         for seed in range(0, 3, every):
             progress(f"reduced model at {rate} deg/s, path {seed + 1} of 3")
-            gravities = random_path(np.radians(rate), 400, seed)
+            gravities = random_path(np.radians(rate), max(_LEAST_STEPS, _STEPS // every), seed)
             loop = list(closed_loop(Simulator(model), gravities, target))
             if rate == 10:
                 steps += [shape.solve_time + command.solve_time for shape, command in loop[50:]]
@@ -98,7 +99,7 @@ def compensation(progress: Progress, every: int = 1) -> dict:
 
 
 def extreme_targets(progress: Progress, every: int = 1) -> dict:
-    """Return the figures of unreachable targets and of very large bends, each for 6 s, followed by the straight target for 6 s.
+    """Return the figures of unreachable targets and very large bends, each for 6 s (over `every`), then of the straight one.
 
     `extreme_step_ms`: the longest step of the model; `extreme_back_mm`: worst final distance of the tip from its position in a
     run with the straight target only.
@@ -109,7 +110,7 @@ def extreme_targets(progress: Progress, every: int = 1) -> dict:
     targets += [
         Target(robot.length * np.array(tip)) for tip in ([0.0, 0.0, 0.0], [0.0, 0.2, -0.5], [0.9, 0.0, 0.0], [0.0, 0.0, 1.4])
     ]
-    longest, distances, steps = 0.0, [], int(6 * _RATE)
+    longest, distances, steps = 0.0, [], int(6 * _RATE) // every
     for number, target in list(enumerate(targets))[::every]:
         for gravity in _GRAVITY * np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]):
             progress(f"extreme targets, {number + 1} of {len(targets)}")

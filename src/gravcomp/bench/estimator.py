@@ -16,35 +16,34 @@ from gravcomp.bench.orientation_peers import run_peers
 from gravcomp.orientation import EstimatorOptions, FilterOptions, GravityEstimate, GravityEstimator, estimate_recording
 from gravcomp.orientation.options import SensorOptions
 from gravcomp.orientation.prediction import PredictionOptions
-from gravcomp.recordings.imu import Recording, read_recording
-from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
+from gravcomp.recordings.imu import Recording
+from gravcomp.recordings.imu.broad_folder import WHERE, broad_trials
 from gravcomp.thermal import HeaterOptions
 from gravcomp.thermal.plant import ThermalPlantOptions
-from gravcomp.trials.yaw_drift import DURATION, ablation, board_samples
+from gravcomp.trials.yaw_drift import DURATION, REST, ablation, board_samples
 from gravcomp.virtual.parameters import Board
 
 BIAS = math.radians(1.0) * np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)  # rad/s, added
 WARM_UP = math.radians(0.3) * np.array([1.0, 1.0, -1.0]) / math.sqrt(3.0)  # rad/s: 20 K at the BMI088's coefficient
 WARM_UP_TIME = 60.0  # s
 HORIZON = 0.02  # s
-CHUNK = 500  # samples
+CHUNK, CHUNKS = 500, 20  # samples, number
 
 
 def run(progress: Callable[[str], None], *, every: int = 1) -> dict:
     """Return all figures of the estimator, on every `every`-th of the trials and of the minutes; the keys give the units."""
     figures: dict = {}
-    files = broad_files()[::every]
-    if files:
-        full = {f.stem: read_recording(f) for f in files}
+    full = broad_trials(every)
+    if full:
         figures |= _on_broad({name: r.averaged(3) for name, r in full.items()}, full, progress)
     else:
         figures["broad"] = f"no recordings found. {WHERE}"
     progress("at rest on the virtual board")
     figures["virtual_rest_jitter_deg"] = _virtual_jitter()
-    figures["us_per_sample"] = _cost()
+    figures["us_per_sample"] = _cost(max(3, CHUNKS // every))
     progress("temperature control from 20 degC")
     figures["thermal"] = _thermal()
-    figures["ablation"] = ablation(progress, duration=DURATION / every)
+    figures["ablation"] = ablation(progress, duration=DURATION / every, rest=REST / every)
     return figures
 
 
@@ -139,10 +138,10 @@ def _virtual_jitter() -> float:
     return round(_jitter(np.array(gravity[1000:])), 4)
 
 
-def _cost() -> float:
+def _cost(chunks: int) -> float:
     """Return the CPU time of a sample in us at 100 Hz in motion, median over chunks."""
     random = np.random.default_rng(1)
-    count = 20 * CHUNK
+    count = chunks * CHUNK
     phase = 2.0 * math.pi * np.arange(count)[:, None] / 100.0 * np.array([0.3, 0.4, 0.5])
     gyro = (np.sin(phase) + random.normal(0.0, 0.002, (count, 3))).tolist()
     accel = (np.array([0.0, 0.0, 9.81]) + 2.0 * np.cos(phase) + random.normal(0.0, 0.02, (count, 3))).tolist()

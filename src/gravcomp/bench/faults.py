@@ -16,6 +16,7 @@ from gravcomp.launcher.virtual_graph import NODES, RunningGraph
 
 _RECOVERY = 5.0  # s, from the restart of a process to the first followed command
 _STOPS = 10
+_DIAGNOSTICS = 2.5  # s, in which the next ones arrive
 _MESSAGE_SHARE = 0.05  # of the hostile frames and messages
 
 
@@ -27,19 +28,20 @@ def run(
     seed: int = 1,
     every: int = 1,
     stops: int = _STOPS,
+    pause: float = 1.0,
 ) -> dict:
     """Run the campaign and return its figures; the names of the keys give their units.
 
     kills: of each process; frames: hostile frames and messages; every: only every `every`-th fault; stops: calls of
-    ~/stop.
+    ~/stop; pause: longest pause in s around a kill, and twice as long under a fault without a safe response.
     """
     with RunningGraph({"virtual_robot": {"motion": "tremor"}}) as graph:  # keeps the motors working
         progress("starting the graph")
         graph.wait_for_commands()
         campaign = Campaign(graph, seed)
         try:
-            safe, unanswered, stuck = _faults(campaign, CASES[::every], stops, progress)
-            recovery, kill_safe, late = _kills(campaign, kills, progress)
+            safe, unanswered, stuck = _faults(campaign, CASES[::every], stops, pause, progress)
+            recovery, kill_safe, late = _kills(campaign, kills, pause, progress)
             hostile = _hostile(campaign, frames, progress)
             if not campaign.make_active():
                 stuck.append("hostile frames and messages")
@@ -72,7 +74,7 @@ def run(
 
 
 def _faults(
-    campaign: Campaign, cases: tuple[Case, ...], stop_count: int, progress: Callable[[str], None]
+    campaign: Campaign, cases: tuple[Case, ...], stop_count: int, pause: float, progress: Callable[[str], None]
 ) -> tuple[dict, list, list]:
     """Return ms to the response by fault, the faults without one, and those after which commands were not followed again."""
     safe: dict[str, float | None] = {}
@@ -81,10 +83,10 @@ def _faults(
         if not campaign.make_active():
             stuck.append(f"before {case.name}")
         progress(f"fault: {case.name}")
-        time.sleep(campaign.random.uniform(0.0, 0.5))
+        time.sleep(campaign.random.uniform(0.0, 0.5 * pause))
         if case.zero is None:
             case.inject(campaign)
-            time.sleep(2.0)
+            time.sleep(2.0 * pause)
         else:
             elapsed = case.time_to_safe(campaign)
             if elapsed is None:
@@ -113,7 +115,7 @@ def _stop(campaign: Campaign) -> float | None:
 
 
 def _kills(
-    campaign: Campaign, kills: int, progress: Callable[[str], None]
+    campaign: Campaign, kills: int, pause: float, progress: Callable[[str], None]
 ) -> tuple[list[tuple[str, float | None]], dict, list[str]]:
     """Kill and restart processes at random.
 
@@ -134,7 +136,7 @@ def _kills(
         if elapsed is not None:
             key = f"{executable} killed"
             worst[key] = max(worst.get(key, 0.0), round(elapsed, 1))
-        time.sleep(campaign.random.uniform(0.0, 1.0))
+        time.sleep(campaign.random.uniform(0.0, pause))
         campaign.graph.restart(executable)
         begin = time.time()
         followed = campaign.monitor.trace_after(begin, _RECOVERY)
@@ -144,7 +146,7 @@ def _kills(
             followed = time.time() if campaign.monitor.trace_after(begin, 1.0) else None
         recovery.append((executable, None if followed is None else round(followed - begin, 2)))
         campaign.note_dead()
-        time.sleep(campaign.random.uniform(0.2, 1.0))
+        time.sleep(campaign.random.uniform(0.2 * pause, pause))
     return recovery, worst, late
 
 
@@ -152,8 +154,7 @@ def _hostile(campaign: Campaign, total: int, progress: Callable[[str], None]) ->
     """Send hostile frames and messages in rounds, and bring the bridge back to ACTIVE between them."""
     messages = int(total * _MESSAGE_SHARE)
     rounds = max(1, total // 50_000)
-    time.sleep(2.5)  # until the next diagnostics arrive
-    before = int(campaign.probe.count()["bridge"].get("frames_received", 0))
+    before = _received(campaign)
     for number in range(rounds):
         progress(f"hostile frames and messages: round {number + 1} of {rounds}")
         campaign.make_active(5.0)
@@ -161,6 +162,17 @@ def _hostile(campaign: Campaign, total: int, progress: Callable[[str], None]) ->
         campaign.probe.flood(messages // rounds)
         campaign.probe.fault()
         campaign.note_dead()
-    time.sleep(2.5)
-    taken = int(campaign.probe.count()["bridge"].get("frames_received", 0)) - before  # not meaningful after a crash
+    taken = _received(campaign) - before  # not meaningful after a crash
     return {"sent": rounds * ((total - messages) // rounds + messages // rounds), "taken": taken}
+
+
+def _received(campaign: Campaign) -> int:
+    """Return the frames that the bridge has received, by its next diagnostics: their number grows with each of them."""
+
+    def known() -> int:
+        return int(campaign.probe.count()["bridge"].get("frames_received", 0))
+
+    last, end = known(), time.monotonic() + _DIAGNOSTICS
+    while (now := known()) == last and time.monotonic() < end:
+        time.sleep(0.05)
+    return now

@@ -70,7 +70,7 @@ class _Attack:
         self._by_effort = hardware.joints.command == "effort"
         self._bridge = JointBridge(hardware)
         self._cables, self._names = len(hardware.cables), [motor.joint for motor in self._motors]
-        self._now, self._stamp = 1.0, 1
+        self._now, self._stamp = 1.0, 10**9
         self._angles = [motor.zero or 0.0 for motor in self._motors]
         self._last: list[float] | None = None
         self._last_time = 0.0
@@ -96,7 +96,6 @@ class _Attack:
 
     def _good(self) -> None:
         """One period of a good robot and controller, which moves slowly."""
-        self._stamp += 10**7
         self._bridge.controller(None)
         self._bridge.on_joint_states(self._names, self._angles, [], [], self._now, self._stamp)
         self._goal = [min(max(x + self._chance.uniform(-2e-4, 2e-4), 0.0), 0.01) for x in self._goal]
@@ -137,6 +136,7 @@ class _Attack:
         if self._chance.random() < 0.01:
             dt = self._chance.choice((-0.5, 0.05, 0.2, 2.0))
         self._now += dt
+        self._stamp += 1 + round(1e9 * max(dt, 0.0))  # the robot's clock does not jump
         output = self._bridge.tick(self._now)
         if output is None:
             return

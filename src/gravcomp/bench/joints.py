@@ -11,16 +11,22 @@ from gravcomp.bench.joint_campaign import with_joints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
 from gravcomp.description.joint_motors import COMMANDS
-from gravcomp.trials.turning_base import residuals
+from gravcomp.trials.turning_base import INCLINATIONS, residuals
 
 
 def run(
-    progress: Callable[[str], None], *, messages: int = 1_000_000, seed: int = 1, orientations: int = 5, loops: int = 3
+    progress: Callable[[str], None],
+    *,
+    messages: int = 1_000_000,
+    seed: int = 1,
+    orientations: int = 5,
+    loops: int = 3,
+    poses: int = 5,
 ) -> dict:
     """Return the figures; the names of the keys give their units.
 
-    messages: hostile messages; seed: of messages and virtual robot; orientations: of the base, in addition to the five poses;
-    loops: number of kinds of controllers whose loop is closed.
+    messages: hostile messages; seed: of messages and virtual robot; orientations: of the base, in addition to the first `poses`
+    of the article's five; loops: number of kinds of controllers whose loop is closed.
     """
     setup = Setup.of(load_robot_file("article"), seed)
     tallies = attack(setup.hardware, messages, seed, progress)
@@ -28,7 +34,8 @@ def run(
     for command in (None, *kinds):
         progress(f"closed loop, {command or 'CAN'}")
         hardware = setup.hardware if command is None else with_joints(setup.hardware, command)
-        found = residuals(dataclasses.replace(setup, hardware=hardware), orientations)
+        loop = dataclasses.replace(setup, hardware=hardware)
+        found = residuals(loop, orientations, inclinations=INCLINATIONS[:poses])
         found_loops[command or "can"] = {"held_mm": round(1e3 * found.held, 3), "moving_mm": round(1e3 * found.moving, 3)}
     can = found_loops["can"]
     return {

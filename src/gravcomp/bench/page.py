@@ -19,12 +19,15 @@ _FIRST_TRACE = 60.0  # s, longest wait for the first command on the bus
 _FRAMES = "window.gravcompFrames = 0; (function count() { window.gravcompFrames++; requestAnimationFrame(count) })()"
 
 
-def run(progress: Callable[[str], None], *, listen: float = 20.0, settle: float = 5.0) -> dict:
+def run(
+    progress: Callable[[str], None], *, listen: float = 20.0, settle: float = 5.0, window: tuple[int, int] = (1600, 900)
+) -> dict:
     """Return the figures of the page.
 
     `drawn_s`: from the start of all nodes until an open browser has drawn the page; `updates_hz`: updates sent to the page;
     `animation_hz`: frames drawn by the browser; `delay_ms` of the loop, median and p99: `without` a viewer, `served` without an
-    open page, `looked_at` with one. listen: duration (s) of each measurement; settle: time (s) before it.
+    open page, `looked_at` with one. listen: duration (s) of each measurement; settle: time (s) before it;
+    window: of the browser, width and height in px.
     """
     if find_chromium() is None:
         return {"page": "no Chromium on this machine: apt-get install chromium"}
@@ -33,7 +36,7 @@ def run(progress: Callable[[str], None], *, listen: float = 20.0, settle: float 
         progress("the loop without a viewer")
         graph.wait_for_commands()
         delays["without"] = _delays(graph, settle, listen)
-    with Browser() as browser:
+    with Browser(*window) as browser:
         begin = time.monotonic()
         with RunningGraph(_LIGHT, viewer=True) as graph:
             progress("start of the page")

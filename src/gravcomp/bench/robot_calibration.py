@@ -1,6 +1,5 @@
 """Figures of one robot's calibration: planned, measured on its virtual robot, fitted, and held with the calibrated model."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,16 +13,20 @@ from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
 from gravcomp.trials.turning_base import residuals
 
-FIGURES = ("calibrated_pct", "modulus_error_pct", "compliance_error_pct", "calibrate_s")
+FIGURES = ("calibrated_pct", "moving_pct", "modulus_error_pct", "compliance_error_pct", "calibrate_s")
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One seed: errors in percent, NaN where the data do not determine any; seconds of robot time; held: residual of the sag."""
+    """One seed: errors in percent; seconds of robot time.
+
+    held, moving: residuals of the sag, at rest and while the base turns; compliance None: the data do not determine any.
+    """
 
     held: float
+    moving: float
     modulus: float
-    compliance: float
+    compliance: float | None
     seconds: float
 
 
@@ -35,6 +38,7 @@ def measure(setup: Setup, orientations: int) -> Calibrated:
     time = found.measured.time
     return Calibrated(
         held=100.0 * run.held / run.sag,
+        moving=100.0 * run.moving / run.sag,
         modulus=modulus_error(setup, found.fit),
         compliance=compliance_error(setup, found.fit),
         seconds=float(time[-1] - time[0]),
@@ -47,8 +51,8 @@ def modulus_error(setup: Setup, fit: StaticFit) -> float:
     return float(100.0 * np.abs(fit.parameters.youngs_modulus / true - 1.0).max())
 
 
-def compliance_error(setup: Setup, fit: StaticFit) -> float:
-    """Return the largest error of a cable's compliance in percent, of those that the data determine; NaN: none.
+def compliance_error(setup: Setup, fit: StaticFit) -> float | None:
+    """Return the largest error of a cable's compliance in percent, of those that the data determine; None: there are none.
 
     One whose interval is wider than the limit of the figure cannot be told that well, and says so.
     """
@@ -61,7 +65,7 @@ def compliance_error(setup: Setup, fit: StaticFit) -> float:
         for e in fit.estimates
         if e.kind == "compliance" and e.seen and e.interval <= _TOLD * e.value
     ]
-    return max(errors, default=math.nan)
+    return max(errors, default=None)
 
 
 _TOLD = 0.1  # half interval over the value, up to which a compliance counts as determined
@@ -69,9 +73,10 @@ _TOLD = 0.1  # half interval over the value, up to which a compliance counts as 
 
 def worst(runs: list[Calibrated]) -> dict[str, Any]:
     """Return the figures of `FIGURES`, the worst of the runs; compliance_error_pct None: no interval is narrow enough to tell."""
-    compliance = [run.compliance for run in runs if not math.isnan(run.compliance)]
+    compliance = [run.compliance for run in runs if run.compliance is not None]
     return {
         "calibrated_pct": round(max(run.held for run in runs), 2),
+        "moving_pct": round(max(run.moving for run in runs), 2),
         "modulus_error_pct": round(max(run.modulus for run in runs), 2),
         "compliance_error_pct": round(max(compliance), 1) if compliance else None,
         "calibrate_s": round(max(run.seconds for run in runs), 1),

@@ -1,102 +1,127 @@
-"""Figures of one robot's loop: the controller as described, on virtual robots that seeds draw around the description.
+"""Figures of the loop on robots: the controller as described and calibrated, on virtual robots that seeds draw around them.
 
 The loop runs in one process, in virtual time. Rate and delay of commands belong to the running graph: `demo --json` has them.
 """
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from gravcomp.bench import robot_calibration
-from gravcomp.closed_loop.setup import Setup
-from gravcomp.description import RobotFile, load_robot_file
-from gravcomp.holdability import holdability
-from gravcomp.holdability.text import sentence
-from gravcomp.trials.similarity import SCALES, similarity
-from gravcomp.trials.turning_base import Residuals, residuals
+from gravcomp.bench.robot_calibration import Calibrated
+from gravcomp.bench.robot_parts import Part, compute, path_of
+from gravcomp.config import ConfigError
+from gravcomp.description import load_robot_file
+from gravcomp.sweep import Sweep
 
-FIGURES = (
-    "uncalibrated_pct",
-    "moving_pct",
-    "held_lateral_mm",
-    "moving_lateral_mm",
-    "sag_mm",
-    "settle_s",
-    "unholdable",
-    "similarity_pct",
-    *robot_calibration.FIGURES,
-)
-"""Keys of the result."""
+_OF_LOOP = (
+    "uncalibrated_pct", "uncalibrated_moving_pct", "held_lateral_mm", "moving_lateral_mm", "sag_mm", "settle_s",
+)  # fmt: skip
+FIGURES = (*_OF_LOOP, "unholdable", "similarity_pct", *robot_calibration.FIGURES)
+"""Keys of a robot's figures."""
 
 SEEDS = (1, 2, 3)
-_ORIENTATIONS = 20
 
 
-def measure(
-    file: str, every: int = 1, progress: Callable[[str], None] = lambda _: None, *, calibrated: bool = True
-) -> dict[str, Any]:
-    """Return the figures of `FIGURES`, the worst over `SEEDS`, and `seeds`: the two shares of each seed.
+def run(
+    files: Sequence[str], figures: Sequence[str], progress: Callable[[str], None], every: int = 1, sweep: Sweep | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return the figures of `FIGURES` of every robot by name, the worst over `SEEDS`; `seeds`: the shares of each seed.
 
-    Held: at the article's five poses and 20 random orientations of the base; moving: during the turns between them at 30 deg/s.
-    every > 1: one seed and so many times fewer random orientations; calibrated: calibrate as well. Raises ConfigError,
-    NoEquilibrium and RuntimeError where the loop does not run.
+    uncalibrated_pct: lateral residual of the sag at the article's five poses and 20 random orientations of the base, with the
+    model as described; calibrated_pct: with the calibrated one; moving_pct: with that one too, during the turns between them at
+    30 deg/s. figures: only these, none: all; every > 1: one seed and so many times fewer orientations. A robot that fails has
+    `errors`, and the others go on. Parts that an earlier run finished are not measured again. Raises ConfigError for a figure
+    that does not exist.
     """
-    robot_file = load_robot_file(file)
-    runs: dict[int, Residuals] = {}
-    calibrations = []
-    for seed in SEEDS[:1] if every > 1 else SEEDS:
-        setup, count = Setup.of(robot_file, seed), max(1, _ORIENTATIONS // every)
-        runs[seed] = residuals(setup, count, progress=_counted(f"{robot_file.robot.name}: loop, seed {seed}", progress))
-        progress(f"{robot_file.robot.name}: loop, seed {seed}: held {_pct(runs[seed].held, runs[seed].sag)} % of the sag")
-        if calibrated:
-            progress(f"{robot_file.robot.name}: calibration, seed {seed}")
-            calibrations.append(robot_calibration.measure(setup, count))
-    progress(f"{robot_file.robot.name}: whether it can be held")
-    shares = {seed: {"held_pct": _pct(run.held, run.sag), "moving_pct": _pct(run.moving, run.sag)} for seed, run in runs.items()}
-    return (
-        dict.fromkeys(FIGURES)
-        | {
-            "uncalibrated_pct": max(share["held_pct"] for share in shares.values()),
-            "moving_pct": max(share["moving_pct"] for share in shares.values()),
-            "held_lateral_mm": round(1e3 * max(run.held for run in runs.values()), 3),
-            "moving_lateral_mm": round(1e3 * max(run.moving for run in runs.values()), 3),
-            "sag_mm": round(1e3 * min(run.sag for run in runs.values()), 2),
-            "settle_s": _worst([run.settled for run in runs.values()]),
-            "unholdable": unholdable(robot_file),
-            "similarity_pct": similarity_pct(robot_file, every, progress),
-            "seeds": {str(seed): share for seed, share in shares.items()},
+    for name in figures:
+        if name not in FIGURES:
+            raise ConfigError(f"--figures has '{name}'; allowed with --loop: {', '.join(FIGURES)}")
+    wanted = list(figures) or list(FIGURES)
+    seeds = SEEDS[:1] if every > 1 else SEEDS
+    parts = [part for file in files for part in _parts(file, wanted, seeds, every)]
+    finished = sum(path is not None and path.is_file() for path in map(path_of, parts))
+    note = f"; {finished} were measured before" if finished else ""
+    progress(f"loop of {len(files)} robots (0 of {len(parts)} parts{note})")
+    own = sweep is None
+    sweep = sweep or Sweep()
+    try:
+        results = sweep.map(
+            compute, parts, lambda done, total: progress(f"{parts[done - 1].name} ({done} of {total} parts{note})")
+        )
+    finally:
+        if own:
+            sweep.close()
+    found = {}
+    for file in files:
+        of_file = [(part, result) for part, result in zip(parts, results) if part.file == file]
+        figures_of = _figures(of_file)
+        found[_name(file)] = {key: figures_of.get(key) for key in wanted} | {
+            key: figures_of[key] for key in ("seeds", "errors") if key in figures_of
         }
-        | (robot_calibration.worst(calibrations) if calibrations else {})
-    )
+    return found
 
 
-def unholdable(file: RobotFile) -> str | None:
-    """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
-    answer = holdability(file.robot, with_needed=False)
-    return None if answer.held else sentence(file.robot, answer)
+def _parts(file: str, wanted: Sequence[str], seeds: Sequence[int], every: int) -> list[Part]:
+    """Return the parts from which the wanted figures of a robot follow."""
+    kinds = {
+        "loop": (_OF_LOOP, seeds),
+        "calibration": (robot_calibration.FIGURES, seeds),
+        "similarity": (("similarity_pct",), seeds[:1]),
+        "holdability": (("unholdable",), seeds[:1]),
+    }
+    return [
+        Part(kind, str(file), seed, every)
+        for kind, (keys, of_kind) in kinds.items()
+        if any(key in wanted for key in keys)
+        for seed in of_kind
+    ]
 
 
-def similarity_pct(file: RobotFile, every: int, progress: Callable[[str], None]) -> float | None:
-    """Return by how many per cent robots of half to four times the size differ at most, see `trials.similarity`.
+def _figures(results: Sequence[tuple[Part, dict[str, Any]]]) -> dict[str, Any]:
+    """Return the figures of one robot from the results of its parts, the worst seed of each."""
+    errors = {part.name: result["error"] for part, result in results if "error" in result}
+    good = [(part, result) for part, result in results if "error" not in result]
+    failed = {part.kind for part, result in results if "error" in result}
+    found: dict[str, Any] = {"errors": errors} if errors else {}
 
-    None for a body from a file, whose mesh is not scaled.
-    """
-    if file.robot.body is not None:
-        return None
-    progress(f"{file.robot.name}: the same robot in other sizes")
-    differences = similarity(Setup.of(file, SEEDS[0]), SCALES[-1:] if every > 1 else SCALES)
-    return round(100.0 * max(differences.values()), 2)
+    def of(kind: str) -> list[dict[str, Any]]:
+        """Results of a kind of which no part failed."""
+        return [] if kind in failed else [result for part, result in good if part.kind == kind]
+
+    loops = of("loop")
+    if loops:
+        settled = [run["settled"] for run in loops]
+        found |= {
+            "uncalibrated_pct": _pct(loops, "held"),
+            "uncalibrated_moving_pct": _pct(loops, "moving"),
+            "held_lateral_mm": round(1e3 * max(run["held_m"] for run in loops), 3),
+            "moving_lateral_mm": round(1e3 * max(run["moving_m"] for run in loops), 3),
+            "sag_mm": round(1e3 * min(run["sag"] for run in loops), 2),
+            "settle_s": None if None in settled else round(max(settled), 2),
+            "seeds": {
+                str(part.seed): {f"{key}_pct": round(100.0 * result[key], 2) for key in ("held", "moving")}
+                for part, result in good
+                if part.kind == "loop"
+            },
+        }
+    calibrations = of("calibration")
+    if calibrations:
+        found |= robot_calibration.worst([Calibrated(**run) for run in calibrations])
+    for run in of("similarity"):
+        found["similarity_pct"] = None if run["difference"] is None else round(100.0 * run["difference"], 2)
+    for run in of("holdability"):
+        found["unholdable"] = run["reason"]
+    return found
 
 
-def _counted(name: str, progress: Callable[[str], None]) -> Callable[[int, int], None]:
-    """Return the progress of `residuals` as a text that begins with `name`."""
-    return lambda done, total: progress(f"{name} ({done} of {total} orientations)")
+def _pct(runs: Sequence[dict[str, Any]], key: str) -> float:
+    return round(max(100.0 * run[key] for run in runs), 2)
 
 
-def _pct(residual: float, sag: float) -> float:
-    return round(100.0 * residual / sag, 2)
-
-
-def _worst(times: list[float]) -> float | None:
-    """The longest time in s; None where one run never settled."""
-    return None if any(math.isnan(time) for time in times) else round(max(times), 2)
+def _name(file: str) -> str:
+    """Return the robot's name; the file's, where it cannot be read."""
+    try:
+        return load_robot_file(file).robot.name
+    except ConfigError:
+        return Path(file).stem

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gravcomp.bench import robot_calibration, robot_figures, robot_loop, whole_figures
+from gravcomp.bench import robot_figures, robot_loop, whole_figures
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
 from gravcomp.experiments.measured import default_folder
@@ -33,7 +33,7 @@ def run(
     others. Raises ConfigError for a figure that does not exist.
     """
     if loop:
-        return {"robots": _loops(files, figures, progress, every)}
+        return {"robots": robot_loop.run([str(file) for file in files or _all_files()], figures, progress, every)}
     allowed = [*robot_figures.FIGURES, *whole_figures.FIGURES]
     for name in figures:
         if name not in allowed:
@@ -46,24 +46,6 @@ def run(
             result["robots"][name] = measured
     whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
     return result | whole_figures.run(progress, whole, every)
-
-
-def _loops(files: Sequence[str], figures: Sequence[str], progress: Progress, every: int) -> dict[str, dict[str, Any]]:
-    """Return the figures of the loop of every robot by name."""
-    unknown = [name for name in figures if name not in robot_loop.FIGURES]
-    if unknown:
-        raise ConfigError(f"--figures has '{unknown[0]}'; allowed with --loop: {', '.join(robot_loop.FIGURES)}")
-    found = {}
-    for file in files or _all_files():
-        try:
-            name = load_robot_file(str(file)).robot.name
-            calibrated = not figures or any(key in figures for key in robot_calibration.FIGURES)
-            measured = robot_loop.measure(str(file), every, progress, calibrated=calibrated)
-        except (ConfigError, MeshError, ArithmeticError, ValueError, RuntimeError) as error:
-            name, measured = Path(str(file)).stem, dict.fromkeys(robot_loop.FIGURES) | {"errors": {"loop": str(error)}}
-            logging.getLogger(__name__).warning("%s: %s", name, error)
-        found[name] = {key: value for key, value in measured.items() if not figures or key in figures or key == "errors"}
-    return found
 
 
 def _all_files() -> list[str]:

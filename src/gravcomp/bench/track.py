@@ -20,25 +20,26 @@ POSES = ((0.0, 0.0), (-45.0, 45.0))  # inclination, roll, deg
 _TURNING = 30.0  # deg/s
 
 
-def run(progress: Callable[[str], None], *, files: Sequence[str] = (), seeds: int = 3) -> dict:
+def run(progress: Callable[[str], None], *, files: Sequence[str] = (), seeds: int = 3, brief: bool = False) -> dict:
     """Return `robots`: figures of each robot by its name, worst over seeds and poses.
 
     `tracked_mm` and `untracked_mm`: RMS of the lateral error, held; `tracked_pct`: of the released sag in the same case;
     `tracked_moving_mm` and `untracked_moving_mm`: while the base turns. files: robot files or names of shipped robots, none:
-    article. Raises ConfigError.
+    article; brief: one pose and shorter runs, in this process. Raises ConfigError.
     """
-    sweep = Sweep()
-    return {"robots": dict(_of(file, seeds, sweep, progress) for file in files or ["article"])}
+    sweep = Sweep(1 if brief else None)
+    return {"robots": dict(_of(file, seeds, brief, sweep, progress) for file in files or ["article"])}
 
 
-def _of(file: str, seeds: int, sweep: Sweep, progress: Callable[[str], None]) -> tuple[str, dict[str, Any]]:
+def _of(file: str, seeds: int, brief: bool, sweep: Sweep, progress: Callable[[str], None]) -> tuple[str, dict[str, Any]]:
     described = load_robot_file(file)
     name = described.robot.name or Path(file).stem
+    poses = POSES[:1] if brief else POSES
     cases = {
-        "tracked": [TrackedCase(*pose, tracker=TRACKER) for pose in POSES],
-        "untracked": [TrackedCase(*pose) for pose in POSES],
-        "tracked_moving": [TrackedCase(0.0, turning=_TURNING, tracker=TRACKER)],
-        "untracked_moving": [TrackedCase(0.0, turning=_TURNING)],
+        "tracked": [TrackedCase(*pose, tracker=TRACKER, brief=brief) for pose in poses],
+        "untracked": [TrackedCase(*pose, brief=brief) for pose in poses],
+        "tracked_moving": [TrackedCase(0.0, turning=_TURNING, tracker=TRACKER, brief=brief)],
+        "untracked_moving": [TrackedCase(0.0, turning=_TURNING, brief=brief)],
     }
     setups = [with_wrong_model(Setup.of(described, seed), STIFFNESS[seed % 2]) for seed in range(1, seeds + 1)]
     jobs = [(key, (setup, case)) for key, of_key in cases.items() for case in of_key for setup in setups]

@@ -1,5 +1,6 @@
 """The model against computations and measurements of others: figures that belong to no single robot file."""
 
+import dataclasses
 import logging
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -22,11 +23,13 @@ FIGURES = {
     "tdcr_mm": "tdcr",
     "coverage_pct": "coverage",
     "coverage_width": "coverage",
+    "coverage": "coverage",
 }
 """Each figure and what it comes from: CalculiX' stored table, a part of `reproduce measured`, or `trials.coverage`.
 
 coverage_pct: share of the 95 % intervals of a calibration that contain the truth, of the worst kind of parameter and robot;
-coverage_width: half width of the intervals over the deviation of the errors, widest kind and robot.
+coverage_width: half width of the intervals over the deviation of the errors, widest kind and robot;
+coverage: share, width and number of intervals of each robot and kind.
 """
 
 _COVERED = ("tpu_3_long", "silicone_long")  # in addition to the article's, of ../shared/robots
@@ -64,7 +67,10 @@ def _coverage(progress: Progress, every: int) -> dict[str, Any]:
         logging.getLogger(__name__).warning("%s: not all of %s are there; fewer robots are covered", folder, ", ".join(_COVERED))
     found = coverage_of_robots(files[:1] if every > 1 else files, range(1, 1 + max(3, _SEEDS // every)), progress)
     covered = [one for kinds in found.values() for one in kinds.values()]
+    if not covered:
+        return {}
     return {
         "coverage_pct": round(100.0 * min(one.share for one in covered), 1),
         "coverage_width": round(max(one.width for one in covered), 2),
+        "coverage": {robot: {kind: dataclasses.asdict(one) for kind, one in kinds.items()} for robot, kinds in found.items()},
     }

@@ -9,7 +9,7 @@ from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.measured import Measured, StillWindows, still_windows
 from gravcomp.calibration.plan import creep_times
 from gravcomp.calibration.plan_table import is_plan_table, read_plan_table
-from gravcomp.calibration.plausible import check_units
+from gravcomp.calibration.plausible import check_time, check_units
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.description import Robot
 
@@ -55,6 +55,7 @@ def read_data(path: str | Path, robot: Robot, still: Standstill, mass: float | N
         check_units(robot, windows, str(path))
         return Data(str(path), windows, None, mass, (), None)
     measured = read_measured(path, robot.cable_names, tip_topic)
+    check_time(measured, still)
     check_units(robot, measured, measured.source)
     return Data.of(measured, still, mass)
 

@@ -12,6 +12,7 @@ from gravcomp.description import Robot
 SEEN = 0.7  # a posterior deviation above this fraction of the prior's means that the data do not determine the value
 SEEN_MODULUS = 0.1  # the same for a modulus, which has no prior of its own: relative deviation
 IMPLAUSIBLE = 4.0  # in deviations of the prior: no maker is so far off, so the value stands for something else
+TOLD = 0.5  # a stretch whose half interval is a larger share of it says little: none, or twice as much, would fit as well
 _WEAK = 1.0 / SEEN**2 - 1.0  # information in x, below which the prior outweighs the data
 _PARTNER = 0.3  # of the largest entry of a weak combination: what belongs to it
 
@@ -53,7 +54,7 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
     if unknown.kind in ("offset", "compliance", "radius", "angle"):
         return f"{unknown.kind} of {', '.join(robot.cables[c].name for c in unknown.index)}"
     if unknown.kind == "creep":
-        return f"creep within {times[first]:.3g} s"
+        return f"creep of about {times[first]:.3g} s"
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
         "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
@@ -61,10 +62,10 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
     return names[unknown.kind]
 
 
-def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: list[str]) -> str:
+def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: list[str], initial: float = 0.0) -> str:
     """Return why an unknown is not fitted, empty where data determine it; value, deviation and half interval are in x.
 
-    partners: names of what moves no tip if it changes together with this one.
+    partners: names of what moves no tip if it changes together with this one; initial: the described value, in units of x.
     """
     if unknown.kind == "modulus":
         return ""
@@ -72,6 +73,10 @@ def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: l
         if partners:
             return f"changed together with {', '.join(partners)}, it moves no tip: the data show one combination of them only"
         return f"its interval would be {half / 1.96:.0%} of what was assumed before; less than {SEEN:.0%} is needed"
+    found = initial + value
+    if unknown.kind == "compliance" and abs(value) <= half and half > TOLD * max(found, initial):
+        share = f"± {half / found:.0%} of it" if found > 0.0 else "more than all of it"
+        return f"its interval contains the described value and is {share}; less than ± {TOLD:.0%} is needed"
     if unknown.kind == "winding" and abs(value) > IMPLAUSIBLE:
         found, most = 1.0 + value * unknown.scale, IMPLAUSIBLE * unknown.scale
         return f"{found:.3f} fits best, and no capstan is wrong by more than {most:.0%}: the description is wrong elsewhere"

@@ -15,7 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.calibration.bag import read_bag
+from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import Measured, MeasurementError
+
+_VECTORS = (("gravity", ""), ("tip", "_mm"), ("direction", ""))
+"""Names and units of the columns with three components."""
 
 
 def read_measured(path: str | Path, cables: tuple[str, ...], tip_topic: str | None = None) -> Measured:
@@ -62,37 +66,17 @@ def csv_row(
 
 def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
     """Return the measurement in a CSV file. Raises MeasurementError."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header, rows = reader.fieldnames or [], list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MeasurementError(f"{path}: cannot be read as CSV: {error}") from error
+    table = CsvTable.read(path)
+    gravity, tip, direction = (tuple(f"{name}_{axis}{unit}" for axis in "xyz") for name, unit in _VECTORS)
     wound = [f"{name}_mm" for name in cables]
-    needed = ["time_s", "gravity_x", "gravity_y", "gravity_z", *wound, "tip_x_mm", "tip_y_mm", "tip_z_mm"]
-    missing = [name for name in needed if name not in header]
-    if missing:
-        raise MeasurementError(
-            f"{path}: the column '{missing[0]}' is missing; needed: {', '.join(needed)}; found: {', '.join(header)}"
-        )
-
-    def column(name: str, empty: float | None = None, scale: float = 1.0) -> np.ndarray:
-        values = []
-        for line, row in enumerate(rows, start=2):
-            text = (row[name] or "").strip()
-            try:
-                values.append(empty if not text and empty is not None else float(text))
-            except ValueError as error:
-                raise MeasurementError(f"{path}, line {line}: {name} is '{text}'; a number is needed") from error
-        return np.array(values, dtype=float) * scale
-
-    directions = [f"direction_{axis}" for axis in "xyz"]
+    table.require(["time_s", *gravity, *wound, *tip])
+    count = len(table.rows)
     return Measured(
         source=str(path),
-        trial=column("trial").astype(int) if "trial" in header else np.zeros(len(rows), dtype=int),
-        time=column("time_s"),
-        gravity=np.column_stack([column(f"gravity_{axis}") for axis in "xyz"]),
-        displacement=np.column_stack([column(name, empty=math.nan, scale=1e-3) for name in wound]),
-        tip_position=np.column_stack([column(f"tip_{axis}_mm", scale=1e-3) for axis in "xyz"]),
-        tip_direction=np.column_stack([column(name) for name in directions]) if set(directions) <= set(header) else None,
+        trial=table.numbers("trial").astype(int) if "trial" in table.header else np.zeros(count, dtype=int),
+        time=table.numbers("time_s"),
+        gravity=table.vectors(gravity),
+        displacement=table.vectors(wound, 1e-3, empty=math.nan),
+        tip_position=table.vectors(tip, 1e-3),
+        tip_direction=table.vectors(direction) if set(direction) <= set(table.header) else None,
     )

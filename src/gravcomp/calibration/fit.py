@@ -8,11 +8,12 @@ begin at declared values; a second round takes them from the residuals of the fi
 and says why (`estimates.unfit`).
 
 Intervals are at 95 %: cov = (J^T J + R^T R)^-1, with J scaled by those sigmas and with every unknown, those that are not fitted
-as well: what is not known of them widens the intervals of the others. Those of the moduli contain in addition what the model
-lacks (`TipNoise.stiffness`). Gravity bends the robot by density over modulus, so tips alone cannot tell both: without a balance
-the density keeps its value, and its uncertainty is part of the moduli's intervals.
+as well: what is not known of them widens the intervals of the others. Those of moduli and creep contain in addition what the
+model lacks (`TipNoise.stiffness`, `TipNoise.creep`). Gravity bends the robot by density over modulus, so tips alone cannot tell
+both: without a balance the density keeps its value, and its uncertainty is part of the moduli's intervals.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,11 +21,11 @@ import numpy as np
 
 from gravcomp.calibration.estimates import Estimate, estimate, name_of, partners_of, unfit, warnings
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
-from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
 from gravcomp.calibration.problem import Predictor, Problem
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
-from gravcomp.calibration.unknowns import Priors, parameters_at, prior_rows, unknowns_of
+from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_rows, unknowns_of
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
@@ -46,6 +47,12 @@ class TipNoise:
         minimum=0.0,
         maximum=0.5,
         description="error of the stiffness that no fit sees, relative: inner friction, the law at small strain",
+    )
+    creep: float = parameter(
+        0.15,
+        minimum=0.0,
+        maximum=2.0,
+        description="error of a branch of creep that no fit sees, relative: bodies creep by other times than the branches",
     )
     balance: float = parameter(5e-3, minimum=1e-6, maximum=0.5, description="deviation of a weighed mass, relative")
 
@@ -101,8 +108,8 @@ def fit_statics(
     initial = starting_parameters(robot, creep_times)
     before = predictor.predict(initial)
     if own:
-        coarse = with_coarse_elements(robot)  # exchanges show in centimetres
-        check_frame(robot, windows, before.tip, lambda other: StaticPredictor(coarse, other).predict(initial).tip)
+        exchanged = functools.cache(lambda: StaticPredictor(with_coarse_elements(robot), windows))  # they show in centimetres
+        check_frame(robot, windows, before.tip, lambda displacement: exchanged().tips_of(displacement))
     sigma = np.array([noise.position_share * robot.length, noise.direction])
     unknowns = unknowns_of(robot, before, initial, groups, priors)
     problem = Problem(predictor, initial, unknowns, prior_rows(unknowns, priors), sigma, progress)
@@ -122,15 +129,15 @@ def fit_statics(
     names = [name_of(robot, unknown, creep_times) for unknown in unknowns]
     partners = partners_of(problem.information(x), unknowns, priors)
     reasons = [
-        unfit(u, entry, half, quantile * half, [names[j] for j in others])
+        unfit(u, entry, half, quantile * half, [names[j] for j in others], float(initial.values(u.kind)[u.index[0]]) / u.scale)
         for u, entry, half, others in zip(unknowns, x, deviation, partners)
     ]
     fitted = np.array([not reason for reason in reasons])
     x = problem.solve(np.where(fitted, x, 0.0), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     deviation = np.sqrt(np.diag(problem.covariance(x)))
-    unseen = np.array([noise.stiffness * (unknown.kind == "modulus") for unknown in unknowns])
     after, parameters = problem.predict(x), parameters_at(x, unknowns, initial)
+    unseen = np.array([_unseen(unknown, parameters, noise) for unknown in unknowns])
     estimates = tuple(
         estimate(robot, unknown, initial, parameters, quantile * half, half, reason, creep_times)
         for unknown, half, reason in zip(unknowns, np.hypot(deviation, unseen), reasons)
@@ -143,7 +150,7 @@ def fit_statics(
             )
     rms_before, rms_after = (rms_distance(found.tip[:, :3] - windows.tip_position) for found in (before, after))
     if own:
-        check_explained(robot, rms_after)
+        check_explained(robot, windows, after.tip)
     if problem.worse(x, np.zeros(len(x))):
         raise MeasurementError(
             f"no values describe these data better than the robot file does (tip error {1e3 * rms_before:.2f} mm before,"
@@ -163,13 +170,13 @@ def fit_statics(
     )
 
 
-def starting_parameters(robot: Robot, creep_times: tuple[float, ...]) -> StaticParameters:
-    """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times."""
-    creep = np.zeros(len(creep_times))
-    for ratio, time in robot.materials[0].branches if creep_times else ():
-        creep[int(np.argmin(np.abs(np.log(np.array(creep_times) / time))))] += ratio
-    moduli = np.array([material.youngs_modulus for material in robot.materials])
-    return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep)
+def _unseen(unknown: Unknown, parameters: StaticParameters, noise: TipNoise) -> float:
+    """Return the deviation in x of an unknown that the scatter of the tips does not show."""
+    if unknown.kind == "modulus":
+        return noise.stiffness
+    if unknown.kind == "creep":
+        return noise.creep * float(parameters.creep[unknown.index[0]]) / unknown.scale
+    return 0.0
 
 
 def body_mass(robot: Robot) -> tuple[float, float, float]:
@@ -177,8 +184,3 @@ def body_mass(robot: Robot) -> tuple[float, float, float]:
     model = RobotModel(with_coarse_elements(robot))
     body, payload = float(model.body_weight.sum()), robot.payload.mass
     return body, payload, model.mass - body - payload
-
-
-def cable_compliance(robot: Robot) -> np.ndarray:
-    """Return (m,) the elongation in m/N of each cable from capstan to end, from the robot's description."""
-    return np.array([robot.cable_compliance(cable) for cable in robot.cables])

@@ -5,22 +5,30 @@
     rest    the robot is given its time; the samples since the turn ended are kept
     done    all poses are measured
 
-Each finished pose is appended to a CSV file in the form of `files`. A session that finds such a file goes on after its last pose.
-After a pause the course begins again: a new trial, whose robot counts as relaxed.
+Each finished pose is added to a CSV file in the form of `files`. A session that finds such a file goes on after its last pose.
+After a pause the course begins again: a new trial, whose robot counts as relaxed. Poses that cannot be written, because the disk
+is full, are kept while the session goes on, and written as soon as there is room.
+
+Tips that cannot be of this robot are not taken, and `sentence` says why: another clock, other units, no numbers.
 """
 
 import csv
 import enum
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from gravcomp.calibration.bag import SAME_CLOCK, another_clock
+from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.files import csv_header, csv_row
-from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import Plan, PlannedPose
 from gravcomp.calibration.plan_table import instruction
+from gravcomp.calibration.plausible import check_units
+from gravcomp.calibration.whole_file import write_whole
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.inverse.limits import within_limits
@@ -44,8 +52,14 @@ class Phase(enum.StrEnum):
     DONE = "done"
 
 
+_ANOTHER = "is not of this robot and plan; name another file to begin again"
+
+
 class LiveSession:
-    """One calibration. Times in s of any clock that does not jump; all else in SI and soft_base."""
+    """One calibration. Times in s of any clock that does not jump; all else in SI and soft_base.
+
+    unwritten: why the measured poses are not in the file, empty where they are.
+    """
 
     def __init__(self, robot: Robot, plan: Plan, path: Path):
         """Begin, or go on with the file at `path`. Raises MeasurementError for a file of another robot or plan."""
@@ -54,6 +68,8 @@ class LiveSession:
         self.phase = Phase.TURN if self._pose < len(plan.poses) else Phase.DONE
         self._gravities: list[tuple[float, np.ndarray]] = []
         self._rows: list[list] = []
+        self._pending: list[list] = []  # rows of finished poses that are not in the file
+        self.unwritten, self._refused = "", ""
         self._command: np.ndarray | None = None
         self._since = math.nan
         self._commanded_at = math.nan
@@ -70,19 +86,30 @@ class LiveSession:
 
     def sentence(self) -> str:
         """Return what to do, or what is happening."""
+        kept = (
+            f"{self.unwritten}; the poses since then are kept, and written as soon as that is possible. "
+            if self.unwritten
+            else ""
+        )
         pose = self.pose
         if pose is None:
-            return f"all {len(self._plan.poses)} poses are measured: {self._path}"
-        place = f"pose {self._pose + 1} of {len(self._plan.poses)}"
+            return kept or f"all {len(self._plan.poses)} poses are measured: {self._path}"
+        place = f"{kept}pose {self._pose + 1} of {len(self._plan.poses)}"
         if self.phase == Phase.TURN:
             away = "" if not self._gravities else f", about {5 * round(self._degrees_away() / 5)} deg away"
             return f"{place}: hold the base with its {instruction(pose)}{away}"
+        if self._refused:
+            return f"{place}: the tip is not taken: {self._refused}"
         if self.phase == Phase.PULL:
             return f"{place}: hold still, the cables move"
+        if not self._rows and self._gravities[-1][0] - self._since > self._plan.rest:
+            return f"{place}: hold still; no measured tip arrives"
         return f"{place}: hold still, measuring"
 
     def on_gravity(self, time: float, gravity: np.ndarray) -> None:
-        """Take gravity (3,). A base that leaves the pose begins it again."""
+        """Take gravity (3,). A base that leaves the pose begins it again; what is no direction is left out."""
+        if not np.isfinite(gravity).all() or not gravity.any():
+            return
         self._gravities = [(t, g) for t, g in self._gravities if t >= time - self._options.hold] + [(time, gravity)]
         if self.phase == Phase.DONE:
             return
@@ -110,47 +137,76 @@ class LiveSession:
         return self._command
 
     def on_tip(self, time: float, position: np.ndarray, direction: np.ndarray) -> None:
-        """Take a measured tip; at the end of its time the pose is written, and the next one begins. Raises MeasurementError."""
+        """Take a measured tip; at the end of its time the pose is finished, and the next one begins."""
         if self.phase not in (Phase.PULL, Phase.REST) or self._command is None or not self._gravities:
+            return
+        self._refused = self._wrong(time, position, direction)
+        if self._refused:
             return
         gravity = self._gravities[-1][1]
         self._rows.append(csv_row(self._trial, time, gravity, self._command, position, direction))
         if self.phase == Phase.REST and time - self._since >= self._plan.rest:
             self._finish()
 
-    def _finish(self) -> None:
-        fresh = not self._path.exists()
+    def save(self) -> bool:
+        """Write the finished poses that are not in the file; return whether all of them are. `unwritten` says why not."""
+        if not self._pending:
+            return True
+        text = io.StringIO()
+        writer = csv.writer(text)
         try:
-            with self._path.open("a", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                if fresh:
-                    writer.writerow(["pose", *csv_header(self._robot.cable_names, directed=True)])
-                writer.writerows([self._pose + 1, *row] for row in self._rows)
+            if self._path.exists():
+                with self._path.open(newline="", encoding="utf-8-sig") as file:
+                    text.write(file.read())
+            else:
+                writer.writerow(self._header)
+            writer.writerows(self._pending)
+            write_whole(self._path, text.getvalue())
         except OSError as error:
-            raise MeasurementError(f"{self._path}: cannot be written: {error.strerror}") from error
+            self.unwritten = f"{self._path} cannot be written: {error.strerror}"
+            return False
+        self._pending, self.unwritten = [], ""
+        return True
+
+    @property
+    def _header(self) -> list[str]:
+        return ["pose", *csv_header(self._robot.cable_names, directed=True)]
+
+    def _wrong(self, time: float, position: np.ndarray, direction: np.ndarray) -> str:
+        """Return why a tip cannot be of this robot, empty where it can."""
+        if not np.isfinite([time, *position, *direction]).all():
+            return "it has values that are not finite numbers"
+        now, gravity = self._gravities[-1]
+        if abs(time - now) > SAME_CLOCK:
+            return another_clock(time - now, time, "measured/tip")
+        assert self._command is not None
+        try:
+            check_units(self._robot, StillWindows(gravity[None], self._command[None], position[None]), "measured/tip")
+        except MeasurementError as error:
+            return str(error)
+        return ""
+
+    def _finish(self) -> None:
+        self._pending += [[self._pose + 1, *row] for row in self._rows]
         self._pose, self._rows, self._since = self._pose + 1, [], math.nan
         pose, last = self.pose, self._plan.poses[self._pose - 1]
         if pose is None:
             self.phase = Phase.DONE
         else:
             self.phase = Phase.PULL if pose.station == last.station else Phase.TURN
+        self.save()
 
     def _progress(self) -> tuple[int, int]:
         """Return the number of poses in the file, and the number of the next trial."""
         if not self._path.exists():
             return 0, 0
-        with self._path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            header, rows = reader.fieldnames or [], list(reader)
-        needed = ["pose", *csv_header(self._robot.cable_names, directed=True)]
-        try:
-            done = max((int(row["pose"]) for row in rows), default=0) if header == needed else -1
-            trial = max((int(row["trial"]) for row in rows), default=-1) + 1 if header == needed else 0
-        except (KeyError, TypeError, ValueError):
-            done, trial = -1, 0
-        if not 0 <= done <= len(self._plan.poses):
-            raise MeasurementError(f"{self._path}: is not of this robot and plan; name another file to begin again")
-        return done, trial
+        table = CsvTable.read(self._path)
+        if list(table.header) != self._header:
+            raise MeasurementError(f"{self._path}: {_ANOTHER}")
+        done, trial = (int(table.numbers(name).max(initial=-1.0)) for name in ("pose", "trial"))
+        if max(done, 0) > len(self._plan.poses):
+            raise MeasurementError(f"{self._path}: {_ANOTHER}")
+        return max(done, 0), trial + 1
 
     def _away(self, gravity: np.ndarray) -> float:
         """Return the angle in rad between gravity and the planned one."""

@@ -24,11 +24,20 @@ class Measured:
     tip_direction: np.ndarray | None = None  # (t, 3)
 
     def __post_init__(self) -> None:
-        for name in ("time", "gravity", "tip_position"):
-            if not np.isfinite(getattr(self, name)).all():
+        for name in ("time", "gravity", "tip_position", "tip_direction"):
+            values = getattr(self, name)
+            if values is not None and not np.isfinite(values).all():
                 raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
+        if np.isinf(self.displacement).any():
+            raise MeasurementError(f"{self.source}: displacement has values that are infinite")
         if len(self.time) < 2:
             raise MeasurementError(f"{self.source}: has {len(self.time)} samples; at least 2 are needed")
+        back = np.flatnonzero((np.diff(self.time) <= 0.0) & (np.diff(self.trial) == 0))
+        if len(back):
+            one, other = self.time[back[0]], self.time[back[0] + 1]
+            raise MeasurementError(
+                f"{self.source}: in trial {self.trial[back[0]]} the time goes from {one:g} to {other:g} s; it must increase"
+            )
 
     def trials(self) -> list["Measured"]:
         """Return one measurement per trial."""

@@ -91,3 +91,17 @@ def with_cable_places(robot: Robot, radius: np.ndarray, angle: np.ndarray) -> Ro
             place = {"radius": (1.0 + share) * cable.radius, "tip_radius": tip, "angle": cable.angle + turn}
             cables.append(dataclasses.replace(cable, **place))
     return dataclasses.replace(robot, cables=tuple(cables))
+
+
+def starting_parameters(robot: Robot, creep_times: tuple[float, ...]) -> StaticParameters:
+    """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times."""
+    creep = np.zeros(len(creep_times))
+    for ratio, time in robot.materials[0].branches if creep_times else ():
+        creep[int(np.argmin(np.abs(np.log(np.array(creep_times) / time))))] += ratio
+    moduli = np.array([material.youngs_modulus for material in robot.materials])
+    return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep)
+
+
+def cable_compliance(robot: Robot) -> np.ndarray:
+    """Return (m,) the elongation in m/N of each cable from capstan to end, from the robot's description."""
+    return np.array([robot.cable_compliance(cable) for cable in robot.cables])

@@ -17,13 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.fit import TipNoise, starting_parameters
+from gravcomp.calibration.fit import TipNoise
 from gravcomp.calibration.measured import StillWindows
+from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
 from gravcomp.config import ConfigError, parameter
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
+from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.mesh.tube import with_coarse_elements
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.standard_gravity import STANDARD_GRAVITY
@@ -127,14 +129,18 @@ def make_plan(
     transmission: Transmission | None = None,
     options: PlanOptions | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
+    orientations: tuple[tuple[float, float], ...] = ORIENTATIONS,
 ) -> Plan:
-    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose."""
+    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose.
+
+    orientations: candidates, inclination and roll of the base in rad.
+    """
     options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
-    candidates = _candidates(robot, transmission, options, progress)
+    candidates, shapes = _candidates(robot, transmission, options, progress, orientations)
     if not candidates:
         raise ConfigError(
-            f"robot '{robot.name}': in none of {len(ORIENTATIONS)} orientations has the released robot an equilibrium within"
+            f"robot '{robot.name}': in none of {len(orientations)} orientations has the released robot an equilibrium within"
             " the limits of its cables; no calibration can be planned"
         )
     windows = StillWindows(
@@ -143,7 +149,7 @@ def make_plan(
         np.zeros((len(candidates), 3)),
         np.tile([0.0, 0.0, 1.0], (len(candidates), 1)),
     )
-    predictor = StaticPredictor(robot, windows)
+    predictor = StaticPredictor(robot, windows, near=shapes)
     initial = starting_parameters(robot, ())
     unknowns = unknowns_of(robot, predictor.predict(initial), initial, None, priors)
     progress(f"planning: sensitivities of {len(candidates)} poses")
@@ -168,19 +174,24 @@ def make_plan(
 
 
 def _candidates(
-    robot: Robot, transmission: Transmission | None, options: PlanOptions, progress: Callable[[str], None]
-) -> list[PlannedPose]:
-    """Return the poses that the limits allow, from the model's equilibria."""
-    simulator, found = Simulator(robot, reduced=False), []
+    robot: Robot,
+    transmission: Transmission | None,
+    options: PlanOptions,
+    progress: Callable[[str], None],
+    orientations: tuple[tuple[float, float], ...],
+) -> tuple[list[PlannedPose], list[Equilibrium]]:
+    """Return the poses that the limits allow, and their shapes, from the model's equilibria."""
+    simulator = Simulator(robot, reduced=False)
+    found: list[tuple[PlannedPose, Equilibrium]] = []
     count = len(robot.cables)
     slack = options.slack * robot.length
-    for number, (inclination, roll) in enumerate(ORIENTATIONS):
-        progress(f"planning: orientation {number + 1} of {len(ORIENTATIONS)}")
+    for number, (inclination, roll) in enumerate(orientations):
+        progress(f"planning: orientation {number + 1} of {len(orientations)}")
         gravity = gravity_of(inclination, roll)
         free = simulator.solve(gravity)
         if not free.is_equilibrium:
             continue
-        found.append(_pose(robot, inclination, roll, free, np.zeros(count), slack, transmission))
+        found.append((_pose(robot, inclination, roll, free, np.zeros(count), slack, transmission), simulator.solver.state))
         turns = np.linalg.norm(free.response.compliance_ea[3:6], axis=0)
         largest = np.minimum(options.tension * robot.limits.tension_max, options.bend / np.maximum(turns, 1e-12))
         for one in np.eye(count):
@@ -188,8 +199,10 @@ def _candidates(
                 tension = level * largest * one
                 shape = simulator.solve(gravity, tension=tension)
                 if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
-                    found.append(_pose(robot, inclination, roll, shape, tension, slack, transmission))
-    return [pose for pose in found if pose.displacement.max(initial=0.0) <= robot.limits.displacement_max]
+                    pose = _pose(robot, inclination, roll, shape, tension, slack, transmission)
+                    found.append((pose, simulator.solver.state))
+    found = [pair for pair in found if pair[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
+    return [pose for pose, _ in found], [shape for _, shape in found]
 
 
 def _turned(shape: Shape, free: Shape) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan import Plan, PlannedPose
+from gravcomp.calibration.whole_file import write_whole
 
 _ARRAYS = ("displacement", "tension", "tip")
 
@@ -14,7 +15,7 @@ _ARRAYS = ("displacement", "tension", "tip")
 def save_plan(plan: Plan, path: Path) -> None:
     """Write the plan. Raises OSError."""
     poses = [{name: np.asarray(value).tolist() for name, value in vars(pose).items()} for pose in plan.poses]
-    path.write_text(json.dumps({**vars(plan), "poses": poses}), encoding="utf-8")
+    write_whole(path, json.dumps({**vars(plan), "poses": poses}))
 
 
 def load_plan(path: Path) -> Plan:

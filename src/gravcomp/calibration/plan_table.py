@@ -13,8 +13,7 @@ import csv
 import math
 from pathlib import Path
 
-import numpy as np
-
+from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import Plan, PlannedPose
 from gravcomp.description import Robot
@@ -70,33 +69,10 @@ def is_plan_table(path: Path) -> bool:
 
 def read_plan_table(path: Path, cables: tuple[str, ...]) -> StillWindows:
     """Return the poses that are filled in. Raises MeasurementError."""
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(file)
-        header, rows = reader.fieldnames or [], list(reader)
+    table = CsvTable.read(path)
     wound = [f"{name}_mm" for name in cables]
-    missing = [name for name in (*_GRAVITY, *wound, *_TIP) if name not in header]
-    if missing:
-        raise MeasurementError(
-            f"{path}: the column '{missing[0]}' is missing; is the table of another robot? This one has the cables"
-            f" {', '.join(cables)}; found: {', '.join(header)}"
-        )
-    filled = [(line, row) for line, row in enumerate(rows, start=2) if any((row[name] or "").strip() for name in _TIP)]
-    if len(filled) < _FEWEST:
-        raise MeasurementError(f"{path}: {len(filled)} rows have a tip; at least {_FEWEST} are needed")
-
-    def number(line: int, row: dict, name: str, empty: float | None = None) -> float:
-        text = (row[name] or "").strip()
-        if not text and empty is not None:
-            return empty
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise MeasurementError(f"{path}, line {line}: {name} is '{text}'; a number is needed")
-        return value
-
-    def columns(names: tuple[str, ...] | list[str], scale: float = 1.0, empty: float | None = None) -> np.ndarray:
-        return scale * np.array([[number(line, row, name, empty) for name in names] for line, row in filled])
-
-    return StillWindows(columns(_GRAVITY), columns(wound, 1e-3, math.nan), columns(_TIP, 1e-3))
+    table.require([*_GRAVITY, *wound, *_TIP], "; is the table of another robot?")
+    filled = table.only([any(row[name] for name in _TIP) for row in table.rows])
+    if len(filled.rows) < _FEWEST:
+        raise MeasurementError(f"{path}: {len(filled.rows)} rows have a tip; at least {_FEWEST} are needed")
+    return StillWindows(filled.vectors(_GRAVITY), filled.vectors(wound, 1e-3, empty=math.nan), filled.vectors(_TIP, 1e-3))

@@ -1,20 +1,26 @@
 """Measurements that cannot be of the described robot: other units, another frame, a mirrored one, swapped cables, another robot.
 
-Units show in the lengths of vectors: gravity, the tip's distance from the base. A wrong frame and swapped cables show where the
-described robot explains the data much better once axes or cables are exchanged.
+Units show in the lengths of vectors: gravity, the tip's distance from the base; those of time in the robot's first period. A
+wrong frame, swapped cables and displacements in other units show where the described robot explains the data much better once
+they are exchanged; a frame that is turned by any angle or moved where the fitted robot does.
 """
 
 import dataclasses
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows
+from gravcomp.calibration.standstill import Standstill
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.standard_gravity import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _UNITS = {
     1e3: "a thousand times too large", 1e-3: "a thousand times too small", 25.4: "25.4 times too large",
@@ -24,6 +30,7 @@ _UNITS = {
 
 _NEAR = 0.25  # relative distance from one of these factors
 _GRAVITY = 0.1  # relative error of the length of gravity
+_FEWEST_OF_FRAME = 6  # rests: fewer tips fit any robot after a turn and a motion
 
 
 @dataclass(frozen=True)
@@ -43,6 +50,13 @@ class PlausibilityOptions:
     unexplained: float = parameter(
         0.03, minimum=1e-4, maximum=1.0, description="tip error after the fit that no robot like the described one has"
     )
+    displaced: float = parameter(
+        0.01, minimum=1e-4, maximum=1.0, description="tip error after the fit from which on another frame is tried"
+    )
+    sparse: float = parameter(
+        10.0, minimum=1.0, maximum=1e3, description="longest time between samples, over that of a window at rest"
+    )
+    duration: float = parameter(36e3, unit="s", minimum=600.0, maximum=1e7, description="longest time of a trial")
 
 
 def check_units(robot: Robot, measured: Measured | StillWindows, source: str) -> None:
@@ -75,15 +89,30 @@ def check_units(robot: Robot, measured: Measured | StillWindows, source: str) ->
         )
 
 
+def check_time(measured: Measured, still: Standstill) -> None:
+    """Raise MeasurementError where the times of a course are in other units than s."""
+    options = PlausibilityOptions()
+    for trial in measured.trials():
+        if len(trial.time) < 2:
+            continue
+        apart, whole = float(np.median(np.diff(trial.time))), float(np.ptp(trial.time))
+        if apart > options.sparse * still.time or whole > options.duration:
+            raise MeasurementError(
+                f"{measured.source}: the samples of trial {trial.trial[0]} are {apart:.3g} s apart and last {whole:.3g} s;"
+                f" allowed: {options.sparse * still.time:.2g} s (from the robot's first period) and {options.duration:.3g} s."
+                " Are the times in ms? s are needed"
+            )
+
+
 def check_frame(
     robot: Robot,
     windows: StillWindows,
     tip: np.ndarray,
-    swapped: Callable[[StillWindows], np.ndarray],
+    swapped: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     """Raise MeasurementError where exchanged axes or cables explain the data much better than the data as they are.
 
-    tip (k, 6): as the described robot has it; swapped(windows): the same for windows with other displacements.
+    tip (k, 6): as the described robot has it; swapped(displacement): the same for other displacements (k, m).
     """
     options = PlausibilityOptions()
     own = _distance(robot, windows, tip)
@@ -97,34 +126,88 @@ def check_frame(
             f" tip error falls from {_mm(robot, own)} to {_mm(robot, best)}. If only the signs of x and y are wrong, gravity may"
             " have the sign of the specific force"
         )
-    names = robot.cable_names
-    found = []
-    for a, b in itertools.combinations(range(len(names)), 2):
-        order = np.arange(len(names))
-        order[[a, b]] = b, a
-        if np.allclose(windows.displacement, windows.displacement[:, order], equal_nan=True):
-            continue
-        try:
-            exchanged = swapped(dataclasses.replace(windows, displacement=windows.displacement[:, order]))
-        except RuntimeError:  # no equilibrium
-            continue
-        found.append((_distance(robot, windows, exchanged), names[a], names[b]))
-    if found and min(found)[0] < options.better * own:
-        best, one, other = min(found)
-        raise MeasurementError(
-            f"the cables {one} and {other} are swapped in these data: exchanged, the described robot's tip error falls from"
-            f" {_mm(robot, own)} to {_mm(robot, best)}"
-        )
+    _check_displacements(robot, windows, own, swapped)
 
 
-def check_explained(robot: Robot, rms_after: float) -> None:
-    """Raise MeasurementError where even the fitted robot misses the tips by rms_after (m), as no robot like this one does."""
+def _check_displacements(robot: Robot, windows: StillWindows, own: float, swapped: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Raise MeasurementError where exchanged cables or other units of the displacements explain the data much better.
+
+    own: distance of the tips as the data are, over the length.
+    """
     options = PlausibilityOptions()
-    if rms_after > options.unexplained * robot.length:
+
+    def distance(displacement: np.ndarray) -> float:
+        try:
+            return _distance(robot, windows, swapped(displacement))
+        except RuntimeError:  # no equilibrium
+            return np.inf
+
+    wound = windows.displacement
+    limits = robot.limits
+    for factor, words in _UNITS.items():
+        scaled = wound / factor
+        inside = scaled[np.isfinite(scaled)]
+        if not inside.any() or inside.max() > limits.displacement_max or inside.min() < limits.displacement_min:
+            continue
+        found = distance(scaled)
+        if found < options.better * own:
+            raise MeasurementError(
+                f"the displacements of the cables are {words}: in the right unit, the described robot's tip error falls from"
+                f" {_mm(robot, own)} to {_mm(robot, found)}; mm are needed in a table, m in a bag"
+            )
+    names = np.array(robot.cable_names)
+    order, best = np.arange(len(names)), own
+    while True:  # exchange by exchange: three cables in turn need two
+        tried = []
+        for a, b in itertools.combinations(range(len(names)), 2):
+            other = order.copy()
+            other[[a, b]] = order[[b, a]]
+            if not np.allclose(wound[:, other], wound[:, order], equal_nan=True):
+                tried.append((distance(wound[:, other]), tuple(other.tolist())))
+        if not tried or min(tried)[0] >= best:
+            break
+        best, order = min(tried)[0], np.array(min(tried)[1])
+    if best < options.better * own:
+        moved = np.flatnonzero(order != np.arange(len(names)))
+        *others, last = names[moved]
+        exchanged = ", ".join(f"{names[order[k]]} is {names[k]}" for k in moved)
         raise MeasurementError(
-            f"no values describe these data: a tip error of {1e3 * rms_after:.2f} mm remains ({rms_after / robot.length:.1%} of"
-            f" the length; allowed: {options.unexplained:.0%}). Are they of another robot, or in another frame than soft_base?"
+            f"the cables {', '.join(others)} and {last} are swapped in these data ({exchanged}): exchanged, the described robot's"
+            f" tip error falls from {_mm(robot, own)} to {_mm(robot, best)}"
         )
+
+
+def check_explained(robot: Robot, windows: StillWindows, tip: np.ndarray) -> None:
+    """Raise MeasurementError where even the fitted robot, whose tips are `tip` (k, 6), misses those of the windows.
+
+    Either a rigid motion of the measured tips explains them much better, or no robot like this one has such tips.
+    """
+    options = PlausibilityOptions()
+    left = _distance(robot, windows, tip)
+    if left > options.displaced and windows.shares.sum() >= _FEWEST_OF_FRAME:
+        turn, moved = _rigid(windows, tip)
+        found = _distance(robot, dataclasses.replace(windows, tip_position=turn.apply(windows.tip_position) + moved), tip)
+        if found < options.better * left:
+            place = ", ".join(f"{1e3 * value:.1f}" for value in moved)
+            raise MeasurementError(
+                f"the measured tips are in another frame than soft_base: turned by {np.degrees(turn.magnitude()):.1f} deg and"
+                f" moved by ({place}) mm, the fitted robot's tip error falls from {_mm(robot, left)} to {_mm(robot, found)}"
+            )
+    if left > options.unexplained:
+        raise MeasurementError(
+            f"no values describe these data: a tip error of {_mm(robot, left)} remains ({left:.1%} of the length; allowed:"
+            f" {options.unexplained:.0%}). Are they of another robot, or in another frame than soft_base?"
+        )
+
+
+def _rigid(windows: StillWindows, tip: np.ndarray) -> tuple["Rotation", np.ndarray]:
+    """Return the turn and the motion (3,) in m that bring the measured tips nearest to `tip` (k, 6)."""
+    from scipy.spatial.transform import Rotation
+
+    share = windows.shares / windows.shares.sum()
+    measured, modelled = (points - share @ points for points in (windows.tip_position, tip[:, :3]))
+    turn, _ = Rotation.align_vectors(modelled, measured, weights=share)
+    return turn, share @ tip[:, :3] - turn.apply(share @ windows.tip_position)
 
 
 def _distance(robot: Robot, windows: StillWindows, tip: np.ndarray, axes: np.ndarray | None = None) -> float:

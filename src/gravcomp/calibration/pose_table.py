@@ -1,12 +1,12 @@
 """Measured poses from a table as others lay it out, read through a mapping."""
 
-import csv
 import math
 import re
 from pathlib import Path
 
 import numpy as np
 
+from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.mapping import UNITS, Mapping, MarkerColumns
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.poses import Poses
@@ -22,23 +22,25 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
     Raises MeasurementError, naming file, line and column, for a missing column, a cell that is empty or not a number, a column
     whose name ends in another unit than the mapping says, and a cable that the robot does not have.
     """
-    table = _Table(Path(path).expanduser())
+    table = CsvTable.read(Path(path).expanduser())
+    if not table.rows:
+        raise MeasurementError(f"{path}: contains no rows below its header")
     commands = _commands(table, mapping, cables)
     count = len(table.rows)
     turn, origin = _frames(table, mapping)
     gravity = np.tile(np.array(mapping.gravity or (0.0, 0.0, 0.0)), (count, 1))
     if mapping.gravity_columns is not None:
-        gravity = np.column_stack([table.column(name) for name in mapping.gravity_columns])
-    masses = [table.column(entry.column, entry.unit) for entry in mapping.mass_columns]
+        gravity = np.column_stack([_column(table, name) for name in mapping.gravity_columns])
+    masses = [_column(table, entry.column, entry.unit) for entry in mapping.mass_columns]
     loads = tuple(
         (*mapping.loads, *(PointLoad(e.at, float(m[k])) for e, m in zip(mapping.mass_columns, masses) if m[k]))
         for k in range(count)
     )
-    measured = np.stack([table.place(marker) for marker in mapping.markers], axis=1)
+    measured = np.stack([_place(table, marker) for marker in mapping.markers], axis=1)
     driven = mapping.cables.input if mapping.cables else None
     return Poses(
         source=str(path),
-        name=tuple(table.names(mapping.pose)),
+        name=tuple(table.texts(mapping.pose) if mapping.pose else (f"line {line}" for line in table.lines)),
         gravity=np.einsum("kji,kj->ki", turn, gravity),
         tension=commands if driven == "tension" else None,
         displacement=commands if driven == "displacement" else None,
@@ -49,58 +51,23 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
     )
 
 
-class _Table:
-    """The cells of a CSV file."""
-
-    def __init__(self, path: Path):
-        self.path = path
-        try:
-            with path.open(newline="", encoding="utf-8-sig") as file:
-                reader = csv.DictReader(file)
-                self.header, self.rows = list(reader.fieldnames or []), list(reader)
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise MeasurementError(f"{path}: cannot be read as CSV: {error}") from error
-        if not self.rows:
-            raise MeasurementError(f"{path}: contains no rows below its header")
-
-    def column(self, name: str, unit: str = "") -> np.ndarray:
-        """Return a column in SI; `unit` is that of its cells."""
-        self._require(name)
-        suffix = _SUFFIX.search(name)
-        if unit and suffix and suffix.group(1).lower() != unit.lower():
-            raise MeasurementError(
-                f"{self.path}: the column '{name}' ends in the unit {suffix.group(1)}, and the mapping says {unit}"
-            )
-        values = []
-        for line, row in enumerate(self.rows, start=2):
-            text = (row[name] or "").strip()
-            try:
-                value = float(text)
-            except ValueError as error:
-                found = f"is '{text}'" if text else "is empty"
-                raise MeasurementError(f"{self.path}, line {line}: {name} {found}; a number is needed") from error
-            if not math.isfinite(value):
-                raise MeasurementError(f"{self.path}, line {line}: {name} is {text}; a finite number is needed")
-            values.append(value)
-        return np.array(values) * UNITS.get(unit, 1.0)
-
-    def place(self, marker: MarkerColumns) -> np.ndarray:
-        """Return the measured places (k, 3) of a marker in m."""
-        return np.column_stack([self.column(name, marker.unit) for name in marker.columns])
-
-    def names(self, column: str) -> list[str]:
-        """Return the names of the rows."""
-        if not column:
-            return [f"line {line}" for line in range(2, len(self.rows) + 2)]
-        self._require(column)
-        return [row[column] or "" for row in self.rows]
-
-    def _require(self, name: str) -> None:
-        if name not in self.header:
-            raise MeasurementError(f"{self.path}: the column '{name}' is missing; found: {', '.join(self.header)}")
+def _column(table: CsvTable, name: str, unit: str = "") -> np.ndarray:
+    """Return a column in SI; `unit` is that of its cells. Raises MeasurementError where its name ends in another one."""
+    table.require([name])
+    suffix = _SUFFIX.search(name)
+    if unit and suffix and suffix.group(1).lower() != unit.lower():
+        raise MeasurementError(
+            f"{table.path}: the column '{name}' ends in the unit {suffix.group(1)}, and the mapping says {unit}"
+        )
+    return table.numbers(name, UNITS.get(unit, 1.0))
 
 
-def _commands(table: _Table, mapping: Mapping, cables: tuple[str, ...]) -> np.ndarray | None:
+def _place(table: CsvTable, marker: MarkerColumns) -> np.ndarray:
+    """Return the measured places (k, 3) of a marker in m."""
+    return np.column_stack([_column(table, name, marker.unit) for name in marker.columns])
+
+
+def _commands(table: CsvTable, mapping: Mapping, cables: tuple[str, ...]) -> np.ndarray | None:
     """Return what drives the cables (k, m) in SI; None if all are released."""
     if mapping.cables is None:
         return None
@@ -112,16 +79,17 @@ def _commands(table: _Table, mapping: Mapping, cables: tuple[str, ...]) -> np.nd
     released = 0.0 if mapping.cables.input == "tension" else math.nan
     values = np.full((len(table.rows), len(cables)), released)
     for name, column in mapping.cables.columns.items():
-        values[:, cables.index(name)] = mapping.cables.sign * table.column(column, mapping.cables.unit)
+        values[:, cables.index(name)] = mapping.cables.sign * _column(table, column, mapping.cables.unit)
     if mapping.cables.input == "tension" and (values < 0.0).any():
         row, cable = np.argwhere(values < 0.0)[0]
         raise MeasurementError(
-            f"{table.path}, line {row + 2}: the tension of '{cables[cable]}' is {values[row, cable]:g} N; a cable cannot push"
+            f"{table.path}, line {table.lines[row]}: the tension of '{cables[cable]}' is {values[row, cable]:g} N;"
+            " a cable cannot push"
         )
     return values
 
 
-def _frames(table: _Table, mapping: Mapping) -> tuple[np.ndarray, np.ndarray]:
+def _frames(table: CsvTable, mapping: Mapping) -> tuple[np.ndarray, np.ndarray]:
     """Return orientation (k, 3, 3) and origin (k, 3) of soft_base in the frame of measurement for every row."""
     from scipy.spatial.transform import Rotation
 
@@ -133,7 +101,7 @@ def _frames(table: _Table, mapping: Mapping) -> tuple[np.ndarray, np.ndarray]:
     spread = np.linalg.svd(at - at.mean(axis=0), compute_uv=False)
     if spread[1] < _STRAIGHT * spread[0]:
         raise MeasurementError(f"{table.path}: the markers on the base lie on one line; a pose needs at least 3 that do not")
-    measured = np.stack([table.place(marker) for marker in frame.markers], axis=1)
+    measured = np.stack([_place(table, marker) for marker in frame.markers], axis=1)
     turns, origins = [], []
     for places in measured:
         rotation, _ = Rotation.align_vectors(places - places.mean(axis=0), at - at.mean(axis=0))

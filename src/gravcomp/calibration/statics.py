@@ -12,17 +12,21 @@ W_aa^-1, dtip/dc = -dtip/do lambda, dtip/dw = dtip/do u. All others are differen
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import Tendons
+from gravcomp.calibration.load_response import LoadResponse
 from gravcomp.calibration.measured import StillWindows
-from gravcomp.calibration.parameters import StaticParameters, with_cable_places, with_moduli
+from gravcomp.calibration.parameters import StaticParameters, starting_parameters, with_cable_places, with_moduli
 from gravcomp.calibration.walk import Step, Walk, steps_of
 from gravcomp.description import PronyTerm, Robot
+from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.mesh.tube import with_coarse_elements
 
 _STEPS = {
@@ -48,8 +52,17 @@ class StaticPrediction:
 class StaticPredictor:
     """Predicts the tips of a robot at rest in given windows."""
 
-    def __init__(self, robot: Robot, windows: StillWindows, creep_times: tuple[float, ...] = ()):
-        """creep_times: of the branches in s; none: the body creeps as it is described. Raises MeshError."""
+    def __init__(
+        self,
+        robot: Robot,
+        windows: StillWindows,
+        creep_times: tuple[float, ...] = (),
+        near: Sequence[Equilibrium] | None = None,
+    ):
+        """creep_times: of the branches in s; none: the body creeps as it is described. Raises MeshError.
+
+        near: shapes of the described robot in relaxed windows, of the same mesh, from which the first prediction begins.
+        """
         self.windows, self._robot = windows, robot
         self._described = np.array([material.youngs_modulus for material in robot.materials])
         model = RobotModel(_with_branches(robot, creep_times) if creep_times else robot)
@@ -60,8 +73,9 @@ class StaticPredictor:
         self._friction = model.tendons.friction.coefficient.copy()
         self._steps = steps_of(windows, crept=bool(creep_times))
         self._tendons: dict[tuple[float, ...], Tendons] = {self._key(np.zeros((2, model.tendons.count))): model.tendons}
-        self._walk = Walk(model, creep_times)
+        self._walk, self._response = Walk(model, creep_times), LoadResponse(model)
         self._last: tuple[bytes, list[Step]] | None = None
+        self._near = [dataclasses.replace(step, state=state) for step, state in zip(self._steps, near or ())] or None
         self._coarse: StaticPredictor | None = None
         self._creep_times = creep_times
 
@@ -69,6 +83,17 @@ class StaticPredictor:
         """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
         shown = [step for step in self._walked(parameters) if step.window is not None]
         return StaticPrediction(np.array([step.tip for step in shown]), np.array([step.tension for step in shown]))
+
+    def tips_of(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the tips (k, 6) of the described robot where the measured displacements were these (k, m), NaN: released.
+
+        Raises RuntimeError if there is no equilibrium.
+        """
+        other = dataclasses.replace(self.windows, displacement=displacement)
+        parameters = starting_parameters(self._robot, self._creep_times)
+        self._apply(parameters)
+        steps = self._walk.run(self._inputs(parameters, steps_of(other, crept=bool(self._creep_times))), parameters.creep)
+        return np.array([step.tip for step in steps if step.window is not None])
 
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
         """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.
@@ -82,7 +107,8 @@ class StaticPredictor:
             return self._coarse.differentiate(parameters, kinds)
         steps = self._walked(parameters)
         shown = [step for step in steps if step.window is not None]
-        found = {kind: self._differences(parameters, kind, steps, shown) for kind in _WALKED if kind in kinds}
+        found = self._by_forces(parameters, shown) if kinds & _FORCES else {}
+        found |= {kind: self._differences(parameters, kind, steps, shown) for kind in _WALKED if kind in kinds - found.keys()}
         by_offset = np.array([step.by_offset for step in shown])
         wound = np.nan_to_num(np.array([self.windows.displacement[step.window] for step in shown]))
         found["offset"] = by_offset
@@ -99,11 +125,12 @@ class StaticPredictor:
         key = parameters.key
         if self._last is None or self._last[0] != key:
             self._apply(parameters)
-            self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, self._last and self._last[1])
+            known = self._last[1] if self._last else self._near
+            self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, known)
         return self._last[1]
 
-    def _inputs(self, parameters: StaticParameters) -> list[Step]:
-        """Return the steps with the gravity and the displacements that the parameters make of the measured ones."""
+    def _inputs(self, parameters: StaticParameters, steps: list[Step] | None = None) -> list[Step]:
+        """Return the steps (None: its own) with the gravity and displacements that the parameters make of the measured ones."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec(parameters.mount)
@@ -113,7 +140,7 @@ class StaticPredictor:
                 gravity=turn.apply(step.gravity),
                 displacement=parameters.winding * step.displacement + parameters.offset,
             )
-            for step in self._steps
+            for step in (self._steps if steps is None else steps)
         ]
 
     def _apply(self, parameters: StaticParameters) -> None:
@@ -142,6 +169,28 @@ class StaticPredictor:
     def _key(places: np.ndarray) -> tuple[float, ...]:
         return tuple(places.ravel().tolist())
 
+    def _by_forces(self, parameters: StaticParameters, shown: list[Step]) -> dict[str, np.ndarray]:
+        """Return the derivatives (k, 6, n) by moduli, density, payload and mount; none where a shape has no linear response.
+
+        What creep held back before a window counts as given.
+        """
+        self._apply(parameters)
+        found: dict[str, list[np.ndarray]] = {kind: [] for kind in _FORCES}
+        for step in shown:
+            weights = {"density": self._model.body_weight, "payload": self._payload, "mount": self._model.nodal_weight}
+            forces = {"modulus": self._response.elastic_forces(step, self._elements)}
+            for kind, weight in weights.items():
+                pulls = np.cross(np.eye(3), step.gravity) if kind == "mount" else step.gravity[None]
+                forces[kind] = np.column_stack([np.outer(weight[: self._model.n_free], pull).ravel() for pull in pulls])
+            try:
+                moved = self._response.tips(step, np.hstack([*forces.values()]))
+            except NotPositiveDefinite:
+                return {}
+            ends = np.cumsum([columns.shape[1] for columns in forces.values()])
+            for kind, part in zip(forces, np.split(moved, ends[:-1], axis=1)):
+                found[kind].append(part)
+        return {kind: np.array(columns) for kind, columns in found.items()}
+
     def _differences(self, parameters: StaticParameters, kind: str, steps: list[Step], shown: list[Step]) -> np.ndarray:
         """Return the difference quotients (k, 6, n) by a field, each from walks of its own near `steps`."""
         here, columns, step = np.array([step.tip for step in shown]), [], _STEPS[kind]
@@ -149,9 +198,7 @@ class StaticPredictor:
         def moved(index: int, change: float) -> np.ndarray:
             parameters_there = parameters.changed(kind, (index,), change)
             self._apply(parameters_there)
-            # A cable that begins where it ends would not slide, and not rub.
-            known = None if kind == "friction" else steps
-            walked = self._walk.run(self._inputs(parameters_there), parameters_there.creep, known)
+            walked = self._walk.run(self._inputs(parameters_there), parameters_there.creep, steps)
             return np.array([one.tip for one in walked if one.window is not None])
 
         for index in range(parameters.count(kind)):
@@ -177,6 +224,7 @@ class StaticPredictor:
         return result
 
 
+_FORCES = {"modulus", "density", "payload", "mount"}
 _WALKED = ("modulus", "density", "payload", "mount", "creep", "friction")
 
 

@@ -112,12 +112,15 @@ class Walk:
         return state, viscous
 
     def _solve(self, step: Step, viscous: ViscousStrain | None, near: Equilibrium | None) -> Equilibrium:
-        solver = self._solver
+        solver, cables = self._solver, CableInput(wound=step.displacement)
         if near is not None:
+            last = solver.state
+            if self._model.tendons.friction.any():  # the cables slide from where they were, not from where `near` has them
+                solver.sliding = cables.sliding(solver.sliding, last.tension, last.tendons.displacement)
             tendons = self._model.tendons.state(self._model.mesh.nodes + near.u, solver.sliding.direction)
             solver.state = dataclasses.replace(near, tendons=tendons)
         solver.viscous = viscous
-        state = solver.track(step.gravity, CableInput(wound=step.displacement), iterations=15)
+        state = solver.track(step.gravity, cables, iterations=15)
         if state.residual < _BALANCED * self._weight:
             # Creep makes the last steps shrink slowly; forces so small move no tip.
             state.converged = True

@@ -43,6 +43,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
         "messages": (1_000_000, "number of malformed and hostile messages"),
         "seed": (1, "seed of the messages and of the virtual robot"),
     },
+    "graph": {"composed": (False, "compare the delay with the inner nodes in one process with that as processes")},
     "robots": {"loop": (False, "measure the loop on each robot's virtual robot instead of its model")},
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "loads": {"seeds": (3, "number of seeds of the virtual robot")},
@@ -63,20 +64,20 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
 BRIEF: dict[str, dict[str, Any]] = {
-    "engine": {"every": 10},
+    "engine": {"every": 25},
     "robots": {"every": 10},
-    "contact": {"every": 19},
-    "track": {"seeds": 1},
-    "loads": {"seeds": 1, "rods": 3},
+    "contact": {"every": 39},
+    "track": {"seeds": 1, "brief": True},
+    "loads": {"seeds": 1, "rods": 3, "brief": True},
     "estimator": {"every": 13},
     "streams": {"every": 5},
     "board": {"frames": 10_000, "every": 5},
-    "graph": {"listen": 3.0, "cost": 3.0, "warm_up": 1.0},
-    "page": {"listen": 3.0, "settle": 1.0},
-    "faults": {"kills": 1, "frames": 10_000, "every": 6, "stops": 2},
-    "joints": {"messages": 3000, "orientations": 0, "loops": 1},
+    "graph": {"listen": 1.0, "cost": 1.0, "warm_up": 0.2},
+    "page": {"listen": 1.0, "settle": 0.2, "window": (1000, 600)},
+    "faults": {"kills": 1, "frames": 2_000, "every": 10, "stops": 1, "pause": 0.2},
+    "joints": {"messages": 1_000, "orientations": 0, "loops": 1, "poses": 2},
     "start": {},
-    "soak": {"minutes": 0.2},
+    "soak": {"minutes": 0.05},
 }
 """Keyword arguments of a benchmark's `run` with --brief."""
 
@@ -106,7 +107,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.report import figures_table
 
-    command = f"bench {args.benchmark}"
+    loop = args.benchmark == "robots" and args.loop
+    command = f"bench {args.benchmark}{' --loop' if loop else ''}"
     if args.write and args.brief:
         raise ConfigError("--write and --brief exclude each other: a document takes the figures of whole benchmarks")
     if args.write:
@@ -121,9 +123,18 @@ def run(args: argparse.Namespace) -> int:
     figures = headline_figures(args.benchmark, measured)
     console.print(_table_of_everything(command, measured))
     if args.write:
-        figures_table.renew(Path(args.write), command, figures)
+        figures_table.renew(Path(args.write), command, figures, typed=_typed(args, command))
     output.result(measured, figures_table.rich_table(command, figures))
     return 1 if any(figure.reached is False for figure in figures) else 0
+
+
+def _typed(args: argparse.Namespace, command: str) -> str:
+    """Return the command with the files and figures that were given."""
+    words = [command]
+    for argument in LISTS.get(args.benchmark, {}):
+        given = getattr(args, argument.lstrip("-"))
+        words += [argument, *given] if given and argument.startswith("--") else given
+    return " ".join(words)
 
 
 def _table_of_everything(title: str, measured: dict[str, Any]) -> "Table":

@@ -215,6 +215,9 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
                     )
                 except RuntimeError as error:  # what was found at rest still counts
                     lost = str(error)
+                if motion is not None and motion.rms_after > motion.rms_before:
+                    before, after = 1e3 * motion.rms_before, 1e3 * motion.rms_after
+                    lost, motion = f"the fit to the motion is worse: {before:.2f} mm before, {after:.2f} mm after", None
                 if motion is not None and motion.damping_seen:
                     robot = with_behaviour(robot, motion)
         except (MeasurementError, MeshError, RuntimeError) as error:

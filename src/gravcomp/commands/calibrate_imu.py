@@ -22,9 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " temperature while the chip warms up."
     )
     parser.add_argument(
-        "file", metavar="FILE", help="a rosbag2 folder, or an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz)"
+        "file",
+        metavar="FILE",
+        help="a rosbag2 folder, an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz), a CSV file or folder",
     )
     parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument("--columns", metavar="YAML", help="names of the columns of a CSV file that do not say what they are")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
     parser.add_argument(
         "--up", nargs=3, type=float, action="append", metavar=("X", "Y", "Z"),
@@ -45,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
     from gravcomp.orientation.calibration import calibrate
-    from gravcomp.recordings.imu import read_recording
+    from gravcomp.recordings.imu import read_mapping, read_recording
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
@@ -53,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     for direction in args.up or ():
         if not np.isfinite(direction).all() or np.linalg.norm(direction) < 1e-6:
             raise ConfigError(f"--up is {direction}; a direction other than zero is needed")
-    recording = read_recording(args.file, args.topic)
+    recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
     found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
     span = _learn_bias(recording, options, found, Path(args.bias_model)) if args.bias_model else None
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.composition import add_composed_argument
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
@@ -48,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="board of the virtual robot: virtual, Python code (default); emulated, the firmware's C code between the host's bus"
         " and the motors; or standalone, that with the loop on the board, which compensates while the nodes only listen",
     )
+    add_composed_argument(parser)
     add_tracker_argument(parser)
     add_seed_argument(parser)
     add_page_arguments(parser)
@@ -113,8 +115,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         _check_alone(args.robot)
         parameters["fem_simulator"] = {"cables_from": "state"}  # the model follows the motors that the board drives
     graph = RobotGraph(args.robot, "udp_multicast", channels, parameters=parameters, seed=args.seed)
-    loop = graph.loop(virtual=True)
-    nodes = [spec.executable for spec in loop] + ["virtual_robot"]
+    loop = graph.loop(virtual=True, composed=args.composed)
+    nodes = [spec.executable for spec in graph.loop(virtual=True)] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
         judge = graph.node(

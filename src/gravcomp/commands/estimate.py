@@ -16,17 +16,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file",
         metavar="FILE",
-        help="an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement) or a rosbag2 folder",
+        help="a rosbag2 folder, an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz; quat, movement), or CSV",
     )
     parser.add_argument(
         "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
     )
     parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    parser.add_argument("--columns", metavar="YAML", help="names of the columns of a CSV file that do not say what they are")
     parser.add_argument(
         "--units",
         choices=("si", "auto"),
         default="si",
         help="si: rad/s, m/s^2 and right-handed axes, anything else is refused or reported; auto: convert what is found",
+    )
+    parser.add_argument(
+        "--calibrate",
+        action="store_true",
+        help="fit scale and offset of the accelerometer to the recording itself, in which the sensor has to turn",
     )
     parser.add_argument("--average", type=int, default=1, metavar="N", help="average every N samples (3: 95.2 Hz in BROAD)")
     parser.add_argument(
@@ -41,15 +47,19 @@ def run(args: argparse.Namespace) -> int:
 
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
+    from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
     from gravcomp.orientation.inclination import inclination_rmse
-    from gravcomp.recordings.imu import read_recording
+    from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
     if args.average < 1:
         raise ConfigError(f"--average is {args.average}; 1 or more is needed")
     try:
-        recording = read_recording(args.file, args.topic)
+        recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
         recording, findings = in_si(recording, convert=args.units == "auto")
+        correction = calibrate_in_motion(recording) if args.calibrate else None
+        if correction is not None:
+            recording = calibrated(recording, correction)
         if args.average > 1:
             recording = recording.averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
@@ -78,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         "rejected": estimator.filter.rejected,
         "problems": dict.fromkeys((*recording.notes, *(f.text for f in findings)), 1) | result.problems,
         "findings": [finding.kind for finding in findings],
+        "calibration": None if correction is None else {"scale": correction.accel_scale, "offset": correction.accel_offset},
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
     if recording.orientation is not None:

@@ -28,7 +28,10 @@ def measured_live(plan: "Plan | None", folder: Path, robot: str, name: str, tip_
 
     plan_path, out, state = plan_of(folder, name), folder / f"{name}-live.csv", folder / f"{name}-live.state.json"
     if plan is not None:
-        save_plan(plan, plan_path)
+        try:
+            save_plan(plan, plan_path)
+        except OSError as error:
+            raise ConfigError(f"{plan_path}: cannot be written: {error.strerror}") from error
     parameters = {"robot": robot, "plan": str(plan_path), "out": str(out), "state_file": str(state)}
     if tip_topic:
         parameters["tip_topic"] = tip_topic

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "A truncated or damaged bag is read as far as possible."
     )
     parser.add_argument(
-        "bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, or an .npz file in BROAD's layout"
+        "bag", metavar="BAG", help="a rosbag2 folder (MCAP or SQLite), its file, an .npz file in BROAD's layout, or CSV"
     )
     parser.add_argument(
         "--speed",
@@ -112,8 +112,9 @@ def _lossless(namespace: str) -> dict:
 def _whole(path: str) -> str:
     """Return the path itself, or that of the readable part of a damaged bag."""
     from gravcomp.recordings.bags.recovery import readable
+    from gravcomp.recordings.imu import is_csv
 
-    if Path(path).suffix == ".npz":
+    if Path(path).suffix == ".npz" or is_csv(Path(path)):
         return path
     bag = readable(path)
     if bag.problem:

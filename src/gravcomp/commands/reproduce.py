@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
-from gravcomp.experiments import EXPERIMENTS, MEASURED, experiment
+from gravcomp.experiments import ALSO, EXPERIMENTS, MEASURED, experiment
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -18,14 +18,20 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    lines = "\n".join(f"  {name:<14}{summary}" for name, summary in EXPERIMENTS.items())
+    other = {name: also for also, name in ALSO.items()}
+    lines = "\n".join(
+        f"  {name:<14}{summary}" + (f" (also: {other[name]})" if name in other else "") for name, summary in EXPERIMENTS.items()
+    )
     parser.description = (
         "Reproduce the article's experiments on the virtual robot, or evaluate a recording of your own robot (--bag):"
         f"\n\n{lines}\n  {'all':<14}all of them, with an index page\n  {'measured':<14}{MEASURED}"
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
-        "name", choices=[*EXPERIMENTS, "all", "measured"], metavar="NAME", help="name of the experiment, all or measured"
+        "name",
+        choices=[*EXPERIMENTS, *ALSO, "all", "measured"],
+        metavar="NAME",
+        help="name of the experiment, all or measured",
     )
     parser.add_argument(
         "data",
@@ -36,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", default="reports", help="folder for the pages and JSON (default: reports)")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     add_seed_argument(parser)
-    parser.add_argument("--workers", type=int, metavar="N", help="number of processes for sweeps (default: one per core)")
+    parser.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes for sweeps (default: one per core; with --brief: one)"
+    )
     parser.add_argument("--dask", metavar="ADDRESS", help="Dask scheduler for sweeps, as tcp://host:8786")
     parser.add_argument(
         "--write",
@@ -68,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.sweep import Sweep
     from gravcomp.trials.context import Context
 
+    args.name = ALSO.get(args.name, args.name)
     names = list(EXPERIMENTS) if args.name == "all" else [args.name]
     if args.data and args.name != "measured":
         raise ConfigError(f"DATA is {args.data}: only measured takes a folder of measurements, {args.name} does not")
@@ -95,7 +104,9 @@ def run(args: argparse.Namespace) -> int:
     prepare_model(args.robot)
     results, pages = [], []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Sweep(args.workers, args.dask) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
+    # Processes take longer to start than the runs of a brief experiment take.
+    workers = 1 if args.brief and args.workers is None else args.workers
+    with Sweep(workers, args.dask) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("starting")
         label = ""
         context = Context(
@@ -107,7 +118,13 @@ def run(args: argparse.Namespace) -> int:
         for name in names:
             label = name
             started = time.perf_counter()
-            result = experiment(name).run(context)
+            try:
+                result = experiment(name).run(context)
+            except ConfigError as error:
+                if args.name != "all":
+                    raise
+                output.note(f"{name}: {error}")
+                continue
             result.seconds = time.perf_counter() - started
             result.parameters.setdefault("seed", context.setup.seed)
             result.parameters.update({"robot": context.setup.source, "sweeps": sweep.place})

@@ -13,8 +13,8 @@ OWN = ("--fast", "--json", "--quiet", "-h", "--help")
 """Options of the command itself, which come first; all other words are passed to pytest."""
 
 FOLDERS = ("src/test", "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
-_WORKERS = os.cpu_count() or 1
-"""Processes that run tests side by side. More would slow the graphs of some tests below their rates."""
+_WORKERS = (os.cpu_count() or 1) + 1
+"""Processes that run tests side by side: one more than cores, as a test with a graph waits for events half of its time."""
 
 # System packages that only tests need, and their use.
 _BROWSER = {"chromium": "tests of the viewer"}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.composition import add_composed_argument
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
     )
+    add_composed_argument(parser)
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
@@ -65,7 +67,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if interface and not args.virtual:
         load_robot_file(args.robot).require_motors(interface)
     graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
-    specs = graph.loop(args.virtual)
+    specs = graph.loop(args.virtual, args.composed)
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic", **tracker_parameters(args)))
     with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:

@@ -12,6 +12,8 @@ import dataclasses
 import math
 from typing import Any
 
+from gravcomp import __version__
+
 # Edge unit -> (suffix of the key, factor to SI, SI unit).
 EDGE_UNITS = {
     "mm": ("_mm", 1e-3, "m"),
@@ -28,7 +30,10 @@ EDGE_UNITS = {
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """Declaration of one field. `minimum` and `maximum` are in the edge unit; `renamed_from` is the key's earlier name."""
+    """Declaration of one field. `minimum` and `maximum` are in the edge unit; `renamed_from` is the key's earlier name.
+
+    `accepted_until`: last release, such as "0.2", that takes the earlier name, with a warning.
+    """
 
     description: str
     unit: str = ""
@@ -38,6 +43,13 @@ class Parameter:
     choices: tuple | None = None
     read_only: bool = False
     renamed_from: str | None = None
+    accepted_until: str | None = None
+
+    @property
+    def accepts_earlier_name(self) -> bool:
+        """Whether this release still takes the earlier name."""
+        until = self.accepted_until
+        return self.renamed_from is not None and until is not None and _release(__version__) <= _release(until)
 
     @property
     def factor(self) -> float:
@@ -79,6 +91,7 @@ def parameter(
     choices: tuple | None = None,
     read_only: bool = False,
     renamed_from: str | None = None,
+    accepted_until: str | None = None,
     default_factory: Any = dataclasses.MISSING,
 ) -> Any:
     """Declare a field of a data class.
@@ -99,6 +112,8 @@ def parameter(
         The ROS parameter cannot be changed while the node runs.
     renamed_from
         Earlier key of this field, with its suffix. It is refused with an error that names the new key.
+    accepted_until
+        Last release that takes the earlier key, with a warning in place of the error: the next one after the renaming.
     default_factory
         As in `dataclasses.field`, in SI.
     """
@@ -111,6 +126,7 @@ def parameter(
         choices,
         read_only,
         renamed_from,
+        accepted_until,
     )
     metadata = {"parameter": declared}
     if default_factory is not dataclasses.MISSING:
@@ -118,6 +134,11 @@ def parameter(
     if default is dataclasses.MISSING:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=_scaled(default, declared.factor), metadata=metadata)
+
+
+def _release(version: str) -> tuple[int, ...]:
+    """Return major and minor number of a version."""
+    return tuple(int(part) for part in version.split(".")[:2])
 
 
 def parameter_of(field: dataclasses.Field) -> Parameter | None:

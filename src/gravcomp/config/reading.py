@@ -9,6 +9,7 @@ import difflib
 import math
 import types
 import typing
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -30,6 +31,7 @@ def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T
     mapping = {} if mapping is None else mapping
     if not isinstance(mapping, dict):
         raise ConfigError(f"{source}: {key or 'the document'} is {_show(mapping)}; a mapping of keys is needed")
+    mapping = _with_present_names(cls, mapping, source, key)
     hints = typing.get_type_hints(cls)
     fields = {key_of(f): f for f in dataclasses.fields(cls) if f.init}
     for name in mapping:
@@ -50,6 +52,26 @@ def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T
         raise
     except ValueError as error:  # a check of several fields in the data class's __post_init__
         raise ConfigError(f"{source}: {key or cls.__name__}: {error}") from error
+
+
+def _with_present_names(cls: type, mapping: dict, source: str, key: str) -> dict:
+    """Return the mapping with the present names of keys whose earlier ones are still taken, and warn of each."""
+    for field in dataclasses.fields(cls):
+        declared = parameter_of(field)
+        if declared is None or not declared.accepts_earlier_name or declared.renamed_from not in mapping:
+            continue
+        if key_of(field) in mapping:
+            raise ConfigError(
+                f"{source}: '{joined(key, declared.renamed_from)}' and its new name '{key_of(field)}' are both given"
+            )
+        warnings.warn(
+            f"{source}: key '{joined(key, declared.renamed_from)}' has been renamed; write '{key_of(field)}': the earlier name is"
+            f" taken until release {declared.accepted_until}",
+            FutureWarning,
+            stacklevel=3,
+        )
+        mapping = {key_of(field) if name == declared.renamed_from else name: value for name, value in mapping.items()}
+    return mapping
 
 
 def convert(value: Any, kind: Any, declared: Parameter | None, *, source: str, key: str) -> Any:

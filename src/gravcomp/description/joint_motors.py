@@ -83,12 +83,13 @@ class Joints:
     controller: str = parameter(description="name of the controller, with its namespace where it is not that of joint_bridge")
     motors: tuple[JointMotor, ...] = parameter(description="joints in the order in which the controller has them")
     command: str = parameter("trajectory", choices=COMMANDS, description="what the controller takes")
-    feedback_delay: float = parameter(
-        30.0,
+    feedback_delay: float | None = parameter(
+        None,
         edge="ms",
         minimum=1,
         maximum=200,
-        description="command effort: from a measurement of the joints to the effort that answers it; longer: softer loops",
+        description="command effort: smallest delay of the loops, from a measurement of the joints to the end of the effort that"
+        " answers it; not given: what is measured; longer: softer loops",
     )
 
     def __post_init__(self) -> None:

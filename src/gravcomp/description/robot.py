@@ -107,7 +107,7 @@ class Robot:
                     f" allowed: below limits.tension_max = {self.limits.tension_max:g} N"
                 )
 
-    @property
+    @functools.cached_property
     def length(self) -> float:
         """Rest length from base to tip, with caps (m)."""
         return self.body.full_length if self.body else sum(s.full_length for s in self.segments)

@@ -16,6 +16,9 @@ Value = TypeVar("Value", np.ndarray, float)
 CONVERGED = 5e-3
 """Of the robot's length: a tip has converged when it stays within it."""
 
+SETTLED = 0.05
+"""Of the sag: within it of its final place, a tip that is compensated has settled."""
+
 _NO_MOTION = 1e-12  # m^2; rounding errors of a course at rest are below it
 
 

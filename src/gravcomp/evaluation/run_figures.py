@@ -15,7 +15,6 @@ from gravcomp.evaluation.track import Track
 
 _AT_REST, _JUST = 1.0, 0.1  # s
 _TURN_RATE = math.radians(1.0)  # rad/s, slowest turn that counts as motion
-_BAND = 0.05  # of the sag, within which the tip counts as settled
 
 
 def sag(truth_tip: Track, straight: np.ndarray, begin: float, end: float) -> float | None:
@@ -76,7 +75,7 @@ def settled(
     if not len(tip):
         return None
     lateral = metrics.tip_errors(tip, direction, target, direction).lateral
-    time = metrics.settling_time(stamps, lateral, start=begin, band=_BAND * sag_size)
+    time = metrics.settling_time(stamps, lateral, start=begin, band=metrics.SETTLED * sag_size)
     return time if math.isfinite(time) else None
 
 

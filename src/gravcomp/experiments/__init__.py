@@ -21,6 +21,9 @@ EXPERIMENTS = {
     "delay": "latency from gravity to motor current, its cost, and the effect of prediction",
 }
 
+ALSO = {"freefall": "real2sim", "segments": "long-segment"}
+"""Other names of experiments."""
+
 MEASURED = "the model against what others measured, in the folder DATA"
 
 

@@ -12,19 +12,23 @@ from gravcomp.report.drawing import REAL, REST, TARGET, WITHOUT, Drawing, draw_r
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, errors_to, target_of
+from gravcomp.trials.holding import GROUND, Case, errors_to, held_notes, lasting, target_of
 from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import WaypointMotion, base_orientation, quaternion
 
 TITLE = "On a moving arm"
 
-HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s
+HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s; slow robots are held longer
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
+_BRIEF_START, _BRIEF_HOLD, _BRIEF_FASTER = 1.5, 0.5, 20.0  # s, s, times the rate
+_BRIEF_INCLINATIONS = (45.0, 0.0)
+_PERIODS = 13.0  # first periods of the robot that either lasts at least
 
 
 def run(context: Context) -> Result:
     """Run the experiment."""
+    inclinations = _BRIEF_INCLINATIONS if context.brief else INCLINATIONS
     setups = {"calibrated": context.once(calibrate_on_virtual_robot).setup, "not calibrated": context.setup}
     jobs = [
         (setup, bend, weightless, context.brief)
@@ -32,7 +36,7 @@ def run(context: Context) -> Result:
         for setup, weightless in ((context.setup, True), *((setup, False) for setup in setups.values()))
     ]
     traces = context.map(_pass, jobs, "two passes of 90 s")
-    figures, rows, plots = [], [], []
+    figures, rows, plots, notes = [], [], [], []
     for index, bend in enumerate((0.0, 30.0)):
         without, fitted, plain = traces[3 * index : 3 * index + 3]
         target = target_of(context.setup, Case(0.0, bend=bend))
@@ -41,12 +45,16 @@ def run(context: Context) -> Result:
             for name, trace in (("without", without), ("calibrated", fitted), ("not calibrated", plain))
         }
         shape = f"bent by {bend:g} deg" if bend else "straight"
+        left = evaluated["calibrated"][1].lateral.mean() / evaluated["without"][1].lateral.mean()
         gain = evaluated["without"][1].distance.mean() / evaluated["calibrated"][1].distance.mean()
         figures += [
             Figure(f"recovery rate r, {shape}, calibrated", evaluated["calibrated"][0], "", ARTICLE[bend], 0.99, True, 5),
             Figure(f"recovery rate r, {shape}, without compensation", evaluated["without"][0], "", digits=5),
             Figure(f"tip error ratio, without / with compensation, {shape}", gain, "", limit=5.0, at_least=True),
+            Figure(f"mean lateral error, {shape}, calibrated, of that without compensation", 100.0 * left, "%"),
         ]
+        if not bend:
+            notes = held_notes(context.setup, *(evaluated[name][1].lateral.mean() for name in ("calibrated", "without")))
         for name, (r, errors) in evaluated.items():
             mean = [1e3 * errors.distance.mean(), 1e3 * errors.distance.max(), 1e3 * errors.lateral.mean()]
             rows.append((shape, name, f"{r:.5f}", *mean, float(np.degrees(errors.tilt.mean()))))
@@ -54,6 +62,7 @@ def run(context: Context) -> Result:
             Plot(
                 f"{shape.capitalize()}: at the five poses",
                 _shapes(
+                    inclinations,
                     without,
                     fitted,
                     arc_points(context.setup.robot.length, np.radians(bend), 0.0, context.setup.robot.effectors.backbone_station),
@@ -85,26 +94,30 @@ def run(context: Context) -> Result:
             ),
             *plots,
         ],
-        parameters={"inclinations_deg": INCLINATIONS, "hold_s": HOLD, "rate_deg_s": float(np.degrees(RATE)), "passes": 2},
+        parameters={
+            "inclinations_deg": inclinations,
+            "hold_s": lasting(context.setup, HOLD, _PERIODS),
+            "rate_deg_s": float(np.degrees(RATE)),
+            "passes": 2,
+        },
         notes=[
             "Without compensation: straight means released cables; bent means that the cables that bend the weightless robot"
             " keep their displacement and the others are released.",
             "With the base tilted back (135 deg) the uncompensated robot falls over to the other side; this dominates r.",
+            *notes,
         ],
     )
 
 
 def _pass(job: tuple[Setup, float, bool, bool]) -> Trace:
     setup, bend, weightless, brief = job
-    inclinations = INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
-    stops = [
-        (base_orientation(np.radians(i)), (HOLD / 20 if brief else HOLD) + (_START if k == 0 else 0.0))
-        for k, i in enumerate(inclinations)
-    ]
-    motion = WaypointMotion(stops, RATE * (10 if brief else 1))
+    inclinations = _BRIEF_INCLINATIONS if brief else (*INCLINATIONS, *INCLINATIONS[-2::-1])
+    start, hold = (_BRIEF_START, _BRIEF_HOLD) if brief else (lasting(setup, _START, _PERIODS), lasting(setup, HOLD, _PERIODS))
+    stops = [(base_orientation(np.radians(i)), hold + (start if k == 0 else 0.0)) for k, i in enumerate(inclinations)]
+    motion = WaypointMotion(stops, RATE * (_BRIEF_FASTER if brief else 1.0))
     loop = ClosedLoop(setup, motion)
     loop.hold(target_of(setup, Case(0.0, bend=bend)), weightless=weightless)
-    loop.run(_START)
+    loop.run(start)
     loop.forget()
     loop.run(motion.duration - loop.time)
     return loop.trace
@@ -116,10 +129,10 @@ def _recovery(trace: Trace, target: np.ndarray) -> float:
     return metrics.recovery_rate(wanted, Rotation.from_quat(trace.base_orientation).apply(trace.tip_position))
 
 
-def _shapes(without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
-    """Draw the shapes at the five poses. wanted: backbone (b, 3) of the target shape, in soft_base."""
-    with Drawing(1, len(INCLINATIONS), width=11.5, height=2.9) as drawing:
-        for axes, inclination in zip(drawing.axes, INCLINATIONS):
+def _shapes(inclinations: tuple[float, ...], without: Trace, fitted: Trace, wanted: np.ndarray) -> str:
+    """Draw the shapes at the poses. wanted: backbone (b, 3) of the target shape, in soft_base."""
+    with Drawing(1, len(inclinations), width=11.5, height=2.9) as drawing:
+        for axes, inclination in zip(drawing.axes, inclinations):
             base = base_orientation(np.radians(inclination))
             draw_robot(axes, side_view(wanted, base), REST, "target")
             for trace, colour, label in ((without, WITHOUT, "without"), (fitted, REAL, "compensated")):

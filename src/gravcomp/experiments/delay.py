@@ -19,8 +19,11 @@ from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
 TITLE = "Latency, and prediction of gravity"
 
 DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
+_BRIEF_DELAYS = (0, 10)
 _START, _DURATION = 3.0, 12.0  # s
-_WARM_UP, _LISTEN, _BRIEF_LISTEN = 5.0, 15.0, 4.0  # s
+_BRIEF_START, _BRIEF_DURATION = 1.5, 2.0  # s
+_WARM_UP, _LISTEN = 5.0, 15.0  # s
+_BRIEF_WARM_UP, _BRIEF_LISTEN = 0.5, 1.5  # s
 _LONGEST_HORIZON = 0.5  # s, limit of the estimator
 
 
@@ -47,9 +50,9 @@ def run(context: Context) -> Result:
     """Run the experiment."""
     measured, failure = _graph_delays(context)
     setup = context.once(calibrate_on_virtual_robot).setup
-    delays = DELAYS[:3] if context.brief else DELAYS
-    jobs = [(setup, delay, predicted) for delay in delays for predicted in ((False, True) if delay else (False,))]
-    runs = dict(zip([job[1:] for job in jobs], context.map(_swing, jobs, "swinging base")))
+    delays = _BRIEF_DELAYS if context.brief else DELAYS
+    jobs = [(setup, delay, predicted, context.brief) for delay in delays for predicted in ((False, True) if delay else (False,))]
+    runs = dict(zip([job[1:3] for job in jobs], context.map(_swing, jobs, "swinging base")))
     errors = {case: _rms(runs[case].error, case[0]) for case in runs}
     moved = {case: _rms(np.linalg.norm(runs[case].tip - runs[0, False].tip, axis=1), case[0]) for case in runs if case[0]}
     in_ms = 1e3 * np.array(measured)
@@ -129,13 +132,13 @@ def _graph_delays(context: Context) -> tuple[list[float], str]:
     from gravcomp.evaluation.bus_delay import DelayListener
     from gravcomp.launcher.virtual_graph import RunningGraph
 
-    listen = _BRIEF_LISTEN if context.brief else _LISTEN
+    warm_up, listen = (_BRIEF_WARM_UP, _BRIEF_LISTEN) if context.brief else (_WARM_UP, _LISTEN)
     context.progress("starting the running graph")
     try:
         with RunningGraph() as graph:
             graph.wait_for_commands()
-            context.progress(f"latency of the running graph over {_WARM_UP + listen:.0f} s")
-            time.sleep(_WARM_UP)
+            context.progress(f"latency of the running graph over {warm_up + listen:.0f} s")
+            time.sleep(warm_up)
             listener = DelayListener(graph.can)
             listener.start()
             time.sleep(listen)
@@ -154,19 +157,20 @@ class _Run:
     error: np.ndarray
 
 
-def _swing(job: tuple[Setup, int, bool]) -> _Run:
-    """Run one case. job: (setup, delay in samples, whether gravity is predicted)."""
-    setup, delay, predicted = job
+def _swing(job: tuple[Setup, int, bool, bool]) -> _Run:
+    """Run one case. job: (setup, delay in samples, whether gravity is predicted, whether the run is brief)."""
+    setup, delay, predicted, brief = job
+    start, duration = (_BRIEF_START, _BRIEF_DURATION) if brief else (_START, _DURATION)
     if predicted:
         horizon = min(delay * SAMPLE_PERIOD, _LONGEST_HORIZON)
         prediction = dataclasses.replace(setup.estimator.prediction, horizon=horizon)
         setup = dataclasses.replace(setup, estimator=dataclasses.replace(setup.estimator, prediction=prediction))
-    loop = ClosedLoop(setup, SwingingMotion(np.radians(20.0), 6.0, _START), delay=delay)
+    loop = ClosedLoop(setup, SwingingMotion(np.radians(20.0), 6.0, start), delay=delay)
     target = target_of(setup, Case(0.0))
     loop.hold(target)
-    loop.run(_START)
+    loop.run(start)
     loop.forget()
-    loop.run(_DURATION)
+    loop.run(duration)
     trace = loop.trace
     return _Run(trace.tip_position, errors_to(trace, target).distance)
 

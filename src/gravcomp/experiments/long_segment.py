@@ -11,7 +11,7 @@ from gravcomp.report.drawing import MODEL, REAL, REST, WITHOUT, Drawing, draw_ro
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, Outcome, pooled_recovery, run_case
+from gravcomp.trials.holding import GROUND, Case, Outcome, held_notes, pooled_recovery, run_case
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "A longer distal segment"
@@ -44,12 +44,14 @@ def run(context: Context) -> Result:
     calibrated = context.once(calibrate_on_virtual_robot).setup
     setup = dataclasses.replace(calibrated, robot=lengthened(calibrated.robot), nominal=lengthened(calibrated.nominal))
     inclinations = INCLINATIONS[1:2] if context.brief else INCLINATIONS
-    cases = [Case(i, options=options) for options in ({}, BACKBONE) for i in inclinations]
+    cases = [Case(i, options=options, brief=context.brief) for options in ({}, BACKBONE) for i in inclinations]
     outcomes = context.map(run_case, [(setup, case) for case in cases], "robot with a longer segment")
     tip_only, weighted = outcomes[: len(inclinations)], outcomes[len(inclinations) :]
-    short = context.map(run_case, [(calibrated, Case(0.0))], "robot as described")[0]
+    short = context.map(run_case, [(calibrated, Case(0.0, brief=context.brief))], "robot as described")[0]
     distal = setup.robot.effectors.backbone_station > 1.0 - setup.robot.segments[-1].full_length / setup.robot.length
     distal[-1] = False
+
+    left, sag = (max(error.lateral for error in errors) for errors in zip(*((o.held, o.without) for o in tip_only)))
 
     def middle(o: Outcome, shape: np.ndarray) -> float:
         """Return the largest sag of the long segment between its ends, m."""
@@ -66,6 +68,7 @@ def run(context: Context) -> Result:
         figures=[
             Figure("recovery rate r at rest", pooled_recovery(outcomes), "", "still works", 0.999, True, 5),
             Figure("largest lateral tip error", 1e3 * max(o.held.lateral for o in tip_only), "mm"),
+            Figure("largest lateral tip error, of the sag", 100.0 * left / sag, "%"),
             Figure("largest tip error without compensation", 1e3 * max(o.without.distance for o in tip_only), "mm"),
             Figure("sag of the long segment's middle, target: tip", 1e3 * worst(tip_only), "mm", "mid-section sags"),
             Figure(
@@ -135,6 +138,7 @@ def run(context: Context) -> Result:
             " direction of the tip; the bending of a segment between the ends of its cables cannot be controlled. With weights"
             " on the middle of the long segment the direction has no weight: the tilt is larger, and the first segment sags as"
             " before.",
+            *held_notes(setup, left, sag),
         ],
     )
 

@@ -12,14 +12,14 @@ from gravcomp.trials.context import Context
 from gravcomp.trials.holding import GROUND
 from gravcomp.trials.lumen import FED, HELD, WITHOUT, Reach, Reached, run_reach
 
-_BRIEF_DURATION = 6.0  # s, of a reach
+_BRIEF_REST, _BRIEF_DURATION = 1.0, 1.0  # s, of a reach
 
 
 def reaching(context: Context, name: str, title: str, question: str, reaches: tuple[Reach, ...]) -> Result:
     """Run every reach with the calibrated controller: without compensation, with it, and with it and a base that is fed."""
     setup = context.once(calibrate_on_virtual_robot).setup
     if context.brief:
-        reaches = (dataclasses.replace(reaches[-1], duration=_BRIEF_DURATION),)
+        reaches = (dataclasses.replace(reaches[-1], rest=_BRIEF_REST, duration=_BRIEF_DURATION),)
     ways = (WITHOUT, HELD, FED)
     results = context.map(run_reach, [(setup, reach, way) for reach in reaches for way in ways], "reaching through lumens")
     triples = list(zip(results[::3], results[1::3], results[2::3]))

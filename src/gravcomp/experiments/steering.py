@@ -12,7 +12,7 @@ from gravcomp.trials.lumen import Reach
 from gravcomp.trials.steered import DEPTH, Passage, Steered, steer
 
 _SEEDS = 20
-_SECONDS = 20.0  # until a run is given up
+_SECONDS, _BRIEF_SECONDS = 20.0, 3.0  # until a run is given up
 _FIRST, _DEPTHS = 0.35, (0.85, 1.0)  # of the robot's length: the tip at the start, the target
 _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0
@@ -22,7 +22,8 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     """Add to `result` what a person reaches in the lumens of `reaches`, with the calibrated controller; seeds take turns."""
     setup = context.once(calibrate_on_virtual_robot).setup
     seeds = range(1, 2 if context.brief else 1 + _SEEDS)
-    passages = [_passage(setup, reaches[seed % len(reaches)], seed) for seed in seeds]
+    seconds = _BRIEF_SECONDS if context.brief else _SECONDS
+    passages = [_passage(setup, reaches[seed % len(reaches)], seed, seconds) for seed in seeds]
     jobs = [(setup, passage, way, seed) for passage, seed in zip(passages, seeds) for way in (True, False)]
     runs = context.map(steer, jobs, "a person steers through lumens")
     held, without = runs[::2], runs[1::2]
@@ -66,11 +67,11 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     ]
 
 
-def _passage(setup: Setup, reach: Reach, seed: int) -> Passage:
+def _passage(setup: Setup, reach: Reach, seed: int, seconds: float) -> Passage:
     length, random = setup.robot.length, np.random.default_rng([seed, 11])
     return Passage(
         reach.name, reach.lumen, reach.inclination, reach.roll, first=_FIRST * length,
-        depth=random.uniform(*_DEPTHS) * length, angle=random.uniform(0.0, 2.0 * np.pi), seconds=_SECONDS,
+        depth=random.uniform(*_DEPTHS) * length, angle=random.uniform(0.0, 2.0 * np.pi), seconds=seconds,
     )  # fmt: skip
 
 

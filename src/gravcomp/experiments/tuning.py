@@ -22,7 +22,7 @@ TITLE = "Tuning: grid against calibration"
 MODULI = (0.50, 0.65, 0.80, 1.00, 1.20)  # MPa
 RAYLEIGH = (0.10, 0.30, 0.50, 0.70, 1.00)  # C: alpha in 1/s and beta in s have the same value, as in the article
 POSES = ((0.0, 0.0), (45.0, 0.0), (-45.0, 90.0))  # inclination, roll in deg
-_DURATION, _BRIEF_DURATION = 1.5, 0.5  # s
+_DURATION, _BRIEF_DURATION = 1.5, 0.35  # s
 
 
 def run(context: Context) -> Result:

@@ -52,8 +52,8 @@ class HostBoard:
         other._unique_id = (ctypes.c_uint32 * 3)(*self._unique_id)
         other._allocate(self._loop is not None)
         ctypes.memmove(other._at, self._at, ctypes.sizeof(self._memory))
-        if self._loop is not None:
-            ctypes.memmove(other._loop_at, self._loop_at, ctypes.sizeof(self._loop))
+        if self._loop is not None and other._loop is not None:
+            ctypes.memmove(other._loop, self._loop, ctypes.sizeof(self._loop))
         other._library.gc_host_attach(other._at, other._loop_at)
         return other
 

@@ -43,6 +43,7 @@ class DynamicSolver:
         self._tolerance = tolerance * model.length
         self._matrix = model.new_matrix()
         self._mass = model.mass_matrix()
+        self._mass_product = self._mass.sparse()
         self._viscosity = Viscosity(model.mesh) if options.damping == "kelvin_voigt" else None
         self._rayleigh = RayleighDamping(model, self._mass, options) if options.damping == "rayleigh" else None
         self.place(np.zeros_like(model.mesh.nodes))
@@ -79,7 +80,7 @@ class DynamicSolver:
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         model = self.model
-        force = -self._mass.multiply(model.free(acceleration))
+        force = -(self._mass_product @ model.free(acceleration))
         if self._rayleigh:
             self._rayleigh.update(u)
             force -= self._rayleigh.force(model.free(velocity))
@@ -123,7 +124,7 @@ class DynamicSolver:
             acceleration = acceleration_0 + scheme.acceleration_rate * moved
             force = self._forces(u, viscous, weight, tension, tendons)
             middle = (1.0 - scheme.alpha_m) * acceleration + scheme.alpha_m * model.free(last.acceleration)
-            out = self._mass.multiply(middle) + (1.0 - scheme.alpha_f) * force + scheme.alpha_f * last.force
+            out = self._mass_product @ middle + (1.0 - scheme.alpha_f) * force + scheme.alpha_f * last.force
             if self._rayleigh:
                 out += self._rayleigh.force((1.0 - scheme.alpha_f) * velocity + scheme.alpha_f * model.free(last.velocity))
             y = factor.solve(-out)
@@ -150,7 +151,7 @@ class DynamicSolver:
         """Return kinetic, elastic and potential energy in J of the present state under gravity (3,)."""
         model, state = self.model, self.state
         velocity = model.free(state.velocity)
-        kinetic = 0.5 * velocity @ self._mass.multiply(velocity)
+        kinetic = 0.5 * velocity @ (self._mass_product @ velocity)
         return float(kinetic + model.elements.energy(state.u) - model.free(state.u) @ model.weight(gravity))
 
     def _finish(

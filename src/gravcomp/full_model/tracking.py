@@ -292,20 +292,31 @@ class StaticTracker:
         immediately if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
-        shifts = () if stable else (self._stiffness * 10.0**power for power in range(-6, 1))
-        for shift in (0.0, *shifts):
-            self._matrix.values[:] = 0.0
-            force = self.model.elements.assemble(state.u, self._matrix, self.viscous, origin)
-            if state.tension.any():
-                self.model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
-            self._contained = load.add_to_tangent(self._matrix, state.u)
-            if shift:
-                self._matrix.add_diagonal(shift)
+        force = self._assemble(state, load, origin)
+        try:
+            return self._matrix.factor(), force, True
+        except NotPositiveDefinite:
+            if stable:
+                raise
+        self._assemble(state, load, origin)  # again, as the factorisation writes over it
+        tangent = self._matrix.values.copy()
+        for power in range(-6, 1):
+            self._matrix.values[:] = tangent
+            self._matrix.add_diagonal(self._stiffness * 10.0**power)
             try:
-                return self._matrix.factor(), force, shift == 0.0
+                return self._matrix.factor(), force, False
             except NotPositiveDefinite:
                 continue
         raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
+
+    def _assemble(self, state: Equilibrium, load: "_Load", origin: np.ndarray | None) -> np.ndarray:
+        """Assemble the tangent at `state` and return the internal forces (n, 3)."""
+        self._matrix.values[:] = 0.0
+        force = self.model.elements.assemble(state.u, self._matrix, self.viscous, origin)
+        if state.tension.any():
+            self.model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
+        self._contained = load.add_to_tangent(self._matrix, state.u)
+        return force
 
     def _allowed_residual(self, state: Equilibrium, load: "_Load") -> float:
         """Return the force out of balance in N below which a state counts as balanced.

@@ -14,6 +14,8 @@ from numba import njit
 
 from gravcomp.description import Limits
 
+_RATE_MARGIN, _TENSION_MARGIN, _TRAVEL_MARGIN = 2.5e-3, 2e-4, 2e-5  # below a limit, where it counts as met: shares of its range
+
 
 class StepBounds(NamedTuple):
     """Bounds of one step, all (m,): of the path's displacement in m and of the tension in N."""
@@ -67,10 +69,11 @@ def limits_met(
 ) -> tuple[np.ndarray, np.bool_]:  # fmt: skip
     """Return (3, m) which cables are at their limit of rate, of tension and of displacement; and whether any is.
 
-    The margins of a micrometre and a millinewton are below the resolution of any winch.
+    The margins are shares of what the limits allow, below the resolution of winches.
     """
     met = np.empty((3, len(tension)), dtype=np.bool_)
-    met[0] = np.abs(displacement - previous) > reach - 1e-6
-    met[1] = tension > highest - 1e-3
-    met[2] = (displacement > farthest_in - 1e-6) | (displacement < farthest_out + 1e-6)
+    met[0] = np.abs(displacement - previous) > (1.0 - _RATE_MARGIN) * reach
+    met[1] = tension > (1.0 - _TENSION_MARGIN) * highest
+    margin = _TRAVEL_MARGIN * (farthest_in - farthest_out)
+    met[2] = (displacement > farthest_in - margin) | (displacement < farthest_out + margin)
     return met, met.any()

@@ -38,6 +38,7 @@ SHARED_MODULES = (
     "gravcomp_fem.fem_simulator",
     "gravcomp_fem.inverse_controller",
     "gravcomp_estimation.imu_estimator",
+    "gravcomp_fem.composed_loop",
     "gravcomp_hw.virtual_robot",
     "gravcomp.launcher.preload:call_compiled",
 )

@@ -13,6 +13,9 @@ LOOP = (
 )
 """The four nodes of the loop: package and executable."""
 
+COMPOSED = ("gravcomp_fem", "composed_loop")
+"""The inner nodes of LOOP, all but the first, in one process."""
+
 JOINT_BRIDGE = ("gravcomp_hw", "joint_bridge")
 """In place of the first node of LOOP for a robot with `hardware.joints`."""
 
@@ -36,17 +39,23 @@ class RobotGraph:
     parameters: dict = field(default_factory=dict)
     seed: int | None = None
 
-    def loop(self, virtual: bool = False) -> list[NodeSpec]:
+    def loop(self, virtual: bool = False, composed: bool = False) -> list[NodeSpec]:
         """Return the four nodes of the loop: bridge, estimator, simulator, controller. Raises ConfigError for a wrong file.
 
-        virtual: for the virtual robot, which joints need a node more for.
+        virtual: for the virtual robot, which joints need a node more for; composed: the inner three in one process.
         """
         from gravcomp.description import load_robot_file
 
         nodes: tuple[tuple[str, str], ...] = LOOP
         if load_robot_file(self.robot).has_joints:
             nodes = (JOINT_BRIDGE, *LOOP[1:]) + ((JOINT_ROBOT,) if virtual else ())
-        return [self.node(package, executable) for package, executable in nodes]
+        specs = [self.node(package, executable) for package, executable in nodes]
+        return [specs[0], self._composed(specs[1:4]), *specs[4:]] if composed else specs
+
+    def _composed(self, specs: list[NodeSpec]) -> NodeSpec:
+        """Return the process of several nodes; the parameters of one are given with its name."""
+        own = {f"{spec.executable}:{k}": v for spec in specs for k, v in spec.parameters.items() if k != "robot"}
+        return NodeSpec(*COMPOSED, {"robot": self.robot, **own}, self.namespace)
 
     def node(self, package: str, executable: str, **parameters: Any) -> NodeSpec:
         """Return one node of this robot."""

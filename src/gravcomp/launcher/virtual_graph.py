@@ -24,15 +24,15 @@ START_TIMEOUT = 300.0
 class RunningGraph:
     """Virtual robot and loop, on request with the viewer; a context manager that starts and ends them.
 
-    parameters: {executable: {parameter: value}}. Attributes: can (CanInterface), namespace, robot (RobotGraph), page (address
-    of the live page).
+    parameters: {executable: {parameter: value}}; composed: the inner nodes in one process. Attributes: can (CanInterface),
+    namespace, robot (RobotGraph), page (address of the live page).
     """
 
-    def __init__(self, parameters: dict[str, dict] | None = None, *, viewer: bool = False):
+    def __init__(self, parameters: dict[str, dict] | None = None, *, viewer: bool = False, composed: bool = False):
         self.can = CanInterface(channel=private_channel())
         self.namespace = f"/bench_{os.getpid()}_{self.can.channel.rpartition(':')[2]}"
         self.robot = robot = RobotGraph("article", self.can.interface, self.can.channel, self.namespace, parameters or {})
-        specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop(virtual=True)]
+        specs = [robot.node("gravcomp_hw", "virtual_robot"), *robot.loop(virtual=True, composed=composed)]
         self._viewer = robot.node("gravcomp_fem", "viewer") if viewer else None
         self.page = ""
         self._specs = {spec.executable: spec for spec in specs}

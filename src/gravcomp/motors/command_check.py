@@ -7,7 +7,7 @@ from gravcomp.description.hardware import Watchdog
 from gravcomp.description.motor import CableMotor
 from gravcomp.description.transmission import Transmission
 
-_MARGIN = 5e-5  # m beyond a displacement limit that is taken as rounding
+_MARGIN = 0.01  # of the largest jump: so far beyond a displacement limit is taken as rounding
 _LEAST_AGE = -0.1  # s; clocks of two processes may differ by this
 
 
@@ -40,15 +40,15 @@ class CommandCheck:
             return f"{len(displacement)} displacements and {len(tension)} tensions for {n} cables"
         if not all(map(math.isfinite, displacement)) or not all(map(math.isfinite, tension)):
             return "it contains a value that is not a number"
-        turned = self._transmission.motors(displacement)
+        turned, margin = self._transmission.motors(displacement), _MARGIN * watchdog.command_jump
         for name, wanted, possible in zip(self._cables, displacement, self._transmission.cables(turned)):
-            if abs(wanted - possible) > _MARGIN:
+            if abs(wanted - possible) > margin:
                 return (
                     f"{name} to {1e3 * wanted:.2f} mm; with the cables that its motor moves as well, {1e3 * possible:.2f} mm"
                     " is possible"
                 )
         for label, x, (low, high) in zip(self._labels, turned, self._limits()):
-            if not low - _MARGIN <= x <= high + _MARGIN:
+            if not low - margin <= x <= high + margin:
                 return f"{label} to {1e3 * x:.2f} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm"
         if not _LEAST_AGE <= age <= watchdog.command_timeout:
             return f"its IMU sample is older than {1e3 * watchdog.command_timeout:.0f} ms or in the future"

@@ -18,7 +18,7 @@ from gravcomp.description.hardware import Drive, Homing
 _SETTLE = 0.25  # s of winding before the current is sampled; in the next such time it gives the slack cable's current
 _SMOOTHING = 0.02  # s, time constant of the current that is compared with the threshold
 _RISE_TIME = 0.04  # s above the threshold until the cable counts as taut
-_ARRIVED = 5e-5  # m from the target
+_ARRIVED, _FARTHEST = 0.01, 0.02  # of the slack: from the target; before the end of the travel
 _PHASE_TIMEOUT = 60.0  # s
 
 
@@ -107,7 +107,7 @@ class HomingProcedure:
         return self.targets
 
     def _arrived(self, displacement: list[float]) -> bool:
-        return all(abs(x - target) < _ARRIVED for x, target in zip(displacement, self.targets))
+        return all(abs(x - target) < _ARRIVED * self._homing.slack for x, target in zip(displacement, self.targets))
 
     def _wind(self, cable: int, displacement: list[float], now: float) -> None:
         self.phase, self._cable, self._since = Phase.WIND, cable, now
@@ -121,7 +121,7 @@ class HomingProcedure:
 
     def _watch_rise(self, displacement: float, current: float, now: float) -> None:
         cable = self._cables[self._cable]
-        if displacement - self._from > self._homing.travel_limit + self._homing.slack - 1e-4:
+        if displacement - self._from > self._homing.travel_limit + (1.0 - _FARTHEST) * self._homing.slack:
             self._fail(
                 f"{cable} was wound in by {1e3 * self._homing.travel_limit:.0f} mm and did not become taut: "
                 "is it broken or unhooked, or is `direction` wrong?"

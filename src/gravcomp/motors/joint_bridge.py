@@ -34,8 +34,9 @@ class JointBridge(Supervisor):
         assert hardware.joints is not None
         self._by_effort = by_effort = hardware.joints.command == "effort"
         self.joints = JointStates(hardware.joints.motors, hardware.drive, hardware.watchdog)
-        delay = hardware.joints.feedback_delay if by_effort else None
-        self._loops = JointLoops(self.joints, hardware.watchdog, transmission.pays_out, delay)
+        self._loops = JointLoops(
+            self.joints, hardware.watchdog, transmission.pays_out, by_effort=by_effort, delay=hardware.joints.feedback_delay
+        )
         self._output = JointOutput(self.joints, by_effort=by_effort)
         self._wanted: list[float] | None = None
         self._no_controller: str | None = None
@@ -65,9 +66,10 @@ class JointBridge(Supervisor):
         efforts: Sequence[float],
         now: float,
         stamp: int = 0,
+        wall: float | None = None,
     ) -> None:
         """Take measured states, see `JointStates.on_message`."""
-        self.joints.on_message(names, angles, speeds, efforts, now, stamp)
+        self.joints.on_message(names, angles, speeds, efforts, now, stamp, wall)
 
     def tick(self, now: float) -> list[float] | None:
         """Run one control period. Return angles (rad) or efforts (N m) in the order of the joints; None: send nothing."""
@@ -97,6 +99,11 @@ class JointBridge(Supervisor):
             tension=cables.tensions(force),
             stamp=self._stamp if self.state is State.ACTIVE else None,
         )
+
+    @property
+    def loop_delay(self) -> float | None:
+        """Largest delay (s) of the loops of efforts, None with positions."""
+        return max(delay.value for delay in self._loops.delays) if self._by_effort else None
 
     # What Supervisor asks.
 

@@ -5,14 +5,17 @@ on_joint_states(), command() --> JointBridge --send()--> controller       every 
 """
 
 import dataclasses
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 
+from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import Hardware
 from gravcomp.motors.joint_bridge import JointBridge
 from gravcomp.motors.state import CableSnapshot, State
 
+_SWITCH_INTERVAL = 5e-4  # s; with Python's default of 5 ms the thread of the messages could delay the control by as much
 _LAST_TIMES = 5  # messages at the end of the bridge
 
 
@@ -47,12 +50,16 @@ class JointDriver:
         self.overruns, self.delay = 0, 0.0
         self._options, self._send, self._on_snapshot, self._controller = options, send, on_snapshot, controller
         self._beat = beat
+        self._wall = time.time() - time.monotonic()  # once: a clock that is set later makes no message late
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
     def open(self) -> None:
         """Start the thread; nothing is sent to the controller."""
+        # For the calling thread and those that it starts: joint states must not wait longer than the control does.
+        take_precedence()
+        sys.setswitchinterval(_SWITCH_INTERVAL)
         self.bridge.configure()
         self._ending.clear()
         self._thread = threading.Thread(target=self._run, name="joint_bridge", daemon=True)
@@ -87,7 +94,8 @@ class JointDriver:
     ) -> None:
         """Take a message of joint states."""
         with self._lock:
-            self.bridge.on_joint_states(names, angles, speeds, efforts, time.monotonic(), stamp_ns)
+            now = time.monotonic()
+            self.bridge.on_joint_states(names, angles, speeds, efforts, now, stamp_ns, now + self._wall)
 
     def command(self, displacement: Sequence[float], tension: Sequence[float], stamp_ns: int) -> str | None:
         """Take a command as `Supervisor.command` does, and send to the controller immediately.

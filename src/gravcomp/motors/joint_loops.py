@@ -3,12 +3,11 @@
     trajectory, position:   q = angle of the setpoint; the controller of the robot closes the loop
     effort:                 tau = d r F,  F the force of the loop of `loop`
 
-The gains of the drive are those of loops that answer within 4 ms, as on a CAN bus. Over topics the answer takes longer, by the
-delay D, and a loop stays stable when its crossover falls as much: with s = min(1, 4 ms / D) the gains are s K_v, s K_i and
-min(1, 2 s) K_p, so that the velocity loop stays faster than the position loop.
+A controller of efforts keeps the last one. So the loops of efforts become softer as the measured states become older and the
+messages to the controller rarer (`loop_delay`). Of an effort that answers an old state, or that stays for long, the force that
+the model expects is left, under which a robot of springs comes to rest by itself.
 """
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,25 +15,28 @@ import numpy as np
 from gravcomp.description.hardware import Drive, Watchdog
 from gravcomp.motors.joint_states import JointStates
 from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.loop_delay import LoopDelay
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.setpoint import Setpoint
 
 _AWAY = 0.1  # of the following error, at rest away from the setpoint
 _AWAY_TIME = 4.0  # stall times
-_NOMINAL_DELAY = 0.004  # s, of the loops that the gains of a drive are for
 
 
 class JointLoops:
-    """Setpoints, or position loops, of the joints of `states`. Attribute: target (k,) m at the capstans.
+    """Setpoints, or position loops, of the joints of `states`.
 
-    pays_out (k,): motors that only pay out when they turn back; delay: None for a controller of positions; for one of efforts,
-    the time (s) from a measurement to the effort that answers it.
+    pays_out (k,): motors that only pay out when they turn back; delay: with efforts, the smallest delay (s) of the loops that
+    counts, None: what is measured. Attributes: target (k,) m at the capstans; delays (k,), of the loops of efforts.
     """
 
-    def __init__(self, states: JointStates, watchdog: Watchdog, pays_out: np.ndarray, delay: float | None):
-        self._states, self._watchdog, self._pays_out, self._by_effort = states, watchdog, pays_out, delay is not None
-        drives = [_softer(scale.drive, delay or 0.0) for scale in states.scales]
+    def __init__(
+        self, states: JointStates, watchdog: Watchdog, pays_out: np.ndarray, *, by_effort: bool, delay: float | None = None
+    ):
+        self._states, self._watchdog, self._pays_out, self._by_effort = states, watchdog, pays_out, by_effort
+        drives = [scale.drive for scale in states.scales]
         self._drives: list[Drive] = drives
+        self.delays = [LoopDelay(delay) for _ in drives]
         self._setpoints = [Setpoint(drive.acceleration_limit) for drive in drives]
         self._loops = [PositionLoop(drive, two_way=not alone) for drive, alone in zip(drives, pays_out)]
         self._monitors = [MotorMonitor(drive, watchdog) for drive in drives]
@@ -89,6 +91,8 @@ class JointLoops:
     def rest(self, dt: float) -> list[float] | None:
         """Return what the controller is sent while the motors are not driven, None for nothing."""
         if self._by_effort:
+            for delay in self.delays:
+                delay.pause()
             return [0.0] * len(self.target)
         if self.arrived:
             return None
@@ -97,7 +101,10 @@ class JointLoops:
     def drive(self, now: float, dt: float) -> tuple[list[float], str | None]:
         """Return what the controller is sent in a control period of `dt` s, and the fault of a motor, or None."""
         displacement, velocity, force = self._states.displacement(), self._states.velocity(), self._states.force()
+        seen = self._states.times()
         if self._by_effort:
+            for loop, delay, measured in zip(self._loops, self.delays, seen):
+                loop.softness = delay.update(now, measured)
             wanted = [
                 loop.step(target, tension, x, v, dt)
                 for loop, target, tension, x, v in zip(self._loops, self.target, self._tension, displacement, velocity)
@@ -109,7 +116,6 @@ class JointLoops:
         else:
             output = self._angles(dt)
             wanted = [0.0 if f is None else f / drive.tension_per_ampere for f, drive in zip(force, self._drives)]
-        seen = self._states.times()
         for i, (x, v, setpoint) in enumerate(zip(displacement, velocity, self._positions())):
             fault = self._monitors[i].update(seen[i], wanted[i], v, setpoint - x) or self._left_behind(i, dt, setpoint - x, v)
             if fault:
@@ -134,14 +140,3 @@ class JointLoops:
         if self._by_effort or self._away[index] <= _AWAY_TIME * watchdog.stall_time:
             return None
         return f"rests {1e3 * abs(lag):.1f} mm away from its setpoint: does its controller take the commands?"
-
-
-def _softer(drive: Drive, delay: float) -> Drive:
-    """Return the drive with gains for loops that answer after `delay` (s)."""
-    share = min(1.0, _NOMINAL_DELAY / max(delay, _NOMINAL_DELAY))
-    return dataclasses.replace(
-        drive,
-        position_gain=min(1.0, 2.0 * share) * drive.position_gain,
-        velocity_gain=share * drive.velocity_gain,
-        velocity_integral=share * drive.velocity_integral,
-    )

@@ -1,7 +1,8 @@
 """Measured state of joints that wind cables, from messages such as sensor_msgs/JointState.
 
 A message may hold any joints in any order, those of an arm as well, and a robot may send its joints in several messages.
-Velocities and efforts may be missing: velocities are then differences of positions, and forces are unknown.
+Velocities and efforts may be missing: velocities are then differences of positions, and forces are unknown. A state is as old as
+its stamp says (`stamp_lateness`): messages that have waited in a queue do not count as new because they arrive now.
 """
 
 import dataclasses
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from gravcomp.description.hardware import Drive, Watchdog
 from gravcomp.description.joint_motors import JointMotor
 from gravcomp.motors.joint_scale import JointScale
+from gravcomp.motors.stamp_lateness import StampLateness
 
 _JUMPS = 3  # messages in a row at the other side of a jump, after which the joint counts as being there
 _NAMES_SHOWN = 8
@@ -18,15 +20,17 @@ _NAMES_SHOWN = 8
 
 @dataclasses.dataclass
 class _Measured:
-    """Last state of one joint: rad, rad/s, N m; times in s (monotonic), stamp in ns (the sender's clock)."""
+    """Last state of one joint: rad, rad/s, N m; arrival and measurement in s (monotonic); stamp in ns (the sender's clock)."""
 
     angle: float = 0.0
     speed: float = 0.0
     effort: float | None = None
+    arrival: float = -math.inf
     time: float = -math.inf
     stamp: int = 0
     jumps: int = 0
     jumped: bool = False
+    lateness: StampLateness = dataclasses.field(default_factory=StampLateness)
 
 
 class JointStates:
@@ -48,10 +52,12 @@ class JointStates:
         efforts: Sequence[float],
         now: float,
         stamp: int = 0,
+        wall: float | None = None,
     ) -> None:
         """Take a message: names, and angles (rad), speeds (rad/s), efforts (N m) of all of them; speeds and efforts may be empty.
 
-        `stamp` (ns, the sender's clock) is that of the message, 0 for none. A message older than the last one is not used.
+        `stamp` (ns, the sender's clock) is that of the message, 0 for none; `wall` (s) is now on the host's clock, None: `now`
+        is. A message older than the last one is not used.
         After a silence longer than `zero_timeout` the zero position of a joint that has none in the robot file is lost.
         """
         if len(angles) != len(names):
@@ -66,15 +72,21 @@ class JointStates:
                 self._others[name] = now
                 continue
             effort = efforts[k] if with_effort and math.isfinite(efforts[k]) else None
-            self._take(index, angles[k], speeds[k] if with_speed else math.nan, effort, now, stamp)
+            self._take(index, angles[k], speeds[k] if with_speed else math.nan, effort, now, stamp, wall)
 
-    def _take(self, index: int, angle: float, speed: float, effort: float | None, now: float, stamp: int) -> None:
+    def _take(
+        self, index: int, angle: float, speed: float, effort: float | None, now: float, stamp: int, wall: float | None
+    ) -> None:
         last, scale = self._measured[index], self.scales[index]
-        silence = now - last.time
+        silence = now - last.arrival
         silent = silence > self._watchdog.feedback_timeout
         if not math.isfinite(angle) or (stamp and stamp <= last.stamp and not silent):
             self.rejected += 1
             return
+        if stamp < last.stamp:  # another clock
+            last.lateness.reset()
+        measured = now - (last.lateness.of(now, (now if wall is None else wall) - 1e-9 * stamp) if stamp else 0.0)
+        since = measured - last.time
         # Over a silence the joint may have gone far; otherwise a distance that the watchdog calls a runaway is no motion.
         way = abs(angle - last.angle) * scale.drive.capstan_radius
         if self._watchdog.zero_timeout < silence < math.inf and self.motors[index].zero is None:
@@ -86,9 +98,9 @@ class JointStates:
                 return
             last.jumped, speed = True, 0.0
         if not math.isfinite(speed):
-            speed = 0.0 if silent or silence <= 0.0 else (angle - last.angle) / silence
-        last.angle, last.speed, last.effort, last.time, last.jumps = angle, speed, effort, now, 0
-        last.stamp = stamp
+            speed = 0.0 if silent or since <= 0.0 else (angle - last.angle) / since
+        last.angle, last.speed, last.effort, last.jumps = angle, speed, effort, 0
+        last.arrival, last.time, last.stamp = now, measured, stamp
 
     @property
     def zeros_known(self) -> bool:
@@ -102,7 +114,7 @@ class JointStates:
                 scale.zero = measured.angle
 
     def times(self) -> list[float]:
-        """Arrival (s) of the last state of each joint."""
+        """Time (s) at which the last state of each joint was measured."""
         return [measured.time for measured in self._measured]
 
     def displacement(self) -> list[float]:
@@ -134,6 +146,9 @@ class JointStates:
         silent = [motor for motor, measured in zip(self.motors, self._measured) if now - measured.time > limit]
         if not silent:
             return None
+        late = max(now - measured.time for measured in self._measured)
+        if all(now - measured.arrival <= limit for measured in self._measured):
+            return f"joint_states arrives {1e3 * late:.0f} ms late"
         foreign = ", ".join(name for name, seen in self._others.items() if now - seen <= limit)
         there = f"; it has other joints: {foreign}" if foreign else ""
         if len(silent) == len(self.motors):

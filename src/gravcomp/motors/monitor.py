@@ -10,7 +10,7 @@ from gravcomp.description.hardware import Drive, Watchdog
 LONGEST_STEP = 0.01
 """s; largest duration that an interval between two feedback frames counts for."""
 
-_STANDSTILL = 0.0005  # m/s
+_STANDSTILL = 0.0125  # of the velocity limit
 _RUNAWAY_TIME = 0.04  # s
 _NEAR_LIMIT = 0.95  # of the current limit
 
@@ -37,7 +37,7 @@ class MotorMonitor:
         self._seen = seen
         drive, watchdog = self._drive, self._watchdog
         saturated = abs(current) >= _NEAR_LIMIT * drive.current_limit
-        if self._lasts("stall", saturated and abs(velocity) < _STANDSTILL, watchdog.stall_time):
+        if self._lasts("stall", saturated and abs(velocity) < _STANDSTILL * drive.velocity_limit, watchdog.stall_time):
             return f"stalled: {current:.2f} A without motion"
         if self._lasts("lag", abs(lag) > watchdog.following_error, _RUNAWAY_TIME):
             return f"is {1e3 * abs(lag):.1f} mm away from its setpoint"

@@ -50,10 +50,13 @@ def check_place(path: Path, command: str) -> None:
         )
 
 
-def renew(path: Path, command: str, figures: Sequence[Figure]) -> None:
-    """Write the figures into the document, with the date and the processor. Raises ConfigError as `check_place`."""
+def renew(path: Path, command: str, figures: Sequence[Figure], typed: str = "") -> None:
+    """Write the figures into the document, with the date and the processor; typed: the command with its arguments.
+
+    Raises ConfigError as `check_place`.
+    """
     check_place(path, command)
-    where = f"\n`./gravcomp {command}`, {datetime.date.today().isoformat()}, {os.cpu_count()} cores of {_processor()}.\n"
+    where = f"\n`./gravcomp {typed or command}`, {datetime.date.today().isoformat()}, {os.cpu_count()} cores of {_processor()}.\n"
     path.write_text(_place(command).sub(lambda match: match[1] + markdown_table(figures) + where + match[2], path.read_text()))
 
 

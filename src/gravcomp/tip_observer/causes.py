@@ -36,13 +36,18 @@ def _all_axes() -> list[_Axes]:
 _AXES = _all_axes()
 
 
+def is_since_boot(stamp: float, now: float) -> bool:
+    """Return whether a stamp (s) counts from the start of a machine while the time `now` (s) does not."""
+    return stamp < _SINCE_BOOT < now
+
+
 def wrong_stamp(stamp: float, now: float, longest_delay: float) -> str:
     """Return what is wrong with a stamp (s) at the time `now` (s), empty for nothing."""
     if not np.isfinite(stamp):
         return f"its stamp is {stamp}"
     if stamp == 0.0:
         return "it has no stamp; set tracker.stamp to arrival, or stamp it with the time of the measurement"
-    if stamp < _SINCE_BOOT < now:
+    if is_since_boot(stamp, now):
         return f"its stamp {stamp:.1f} s is not the graph's time {now:.1f} s: it counts from the start of a machine?"
     if stamp > now + _AHEAD:
         return f"its stamp is {stamp - now:.2f} s ahead: the clocks are not synchronised"

@@ -16,7 +16,7 @@ from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
-from gravcomp.calibration.plan import Plan, PlanOptions, creep_times, make_plan
+from gravcomp.calibration.plan import ORIENTATIONS, Plan, PlanOptions, creep_times, make_plan
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuStream
 from gravcomp.closed_loop.setup import Setup
@@ -38,7 +38,7 @@ _BUS_STEP, _SAMPLE_PERIOD = 0.002, 0.010  # s
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
 _LONGEST_START = 5.0  # s
-_BRIEF = 0.35  # of the budget
+_BRIEF, _FEWER = 0.2, 6  # of the budget; every so many of the orientations
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,12 @@ class Calibration:
 
 def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
     """Return the plan for the context's robot; a brief context has a shorter one. Raises ConfigError, MeshError."""
-    options, setup = options or PlanOptions(), context.setup
+    options, setup, orientations = options or PlanOptions(), context.setup, ORIENTATIONS
     if context.brief:
-        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(3, int(_BRIEF * options.fewest)))
-    return make_plan(setup.robot, first_period(setup.robot), setup.hardware.transmission, options, progress=context.progress)
+        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(4, int(_BRIEF * options.fewest)))
+        orientations = ORIENTATIONS[::_FEWER]
+    period = first_period(setup.robot)
+    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations)
 
 
 def measure(context: Context, plan: Plan) -> Measured:

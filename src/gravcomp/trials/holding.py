@@ -8,13 +8,18 @@ import numpy as np
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.description import Robot
 from gravcomp.evaluation import metrics
+from gravcomp.holdability import holdability
+from gravcomp.holdability.text import sentence
 from gravcomp.inverse import Target, bend_target
 from gravcomp.inverse.target import arc_points
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 # In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
 _RELEASED, _HELD, _SETTLED = 12.0, 14.0, 1.8
+_HELD_WELL = 0.1  # of the sag: a robot whose cables hold it keeps less
+_BRIEF = 0.4  # of the phases of a brief case
 _SHORTEST = 1.5  # s of a phase: filter, controller and winches need as long on the fastest robot
 GROUND = (
     "The whole loop runs in the core, faster than real time, against the virtual robot: CAN frames, bridge, position loops,"
@@ -25,13 +30,14 @@ GROUND = (
 
 @dataclass(frozen=True)
 class Case:
-    """Pose and target. Angles in degrees, bend 0: straight; options: further arguments of `bend_target`."""
+    """Pose and target. Angles in degrees, bend 0: straight; options: of `bend_target`; brief: shorter phases."""
 
     inclination: float
     roll: float = 0.0
     bend: float = 0.0
     plane: float = 0.0
     options: dict[str, Any] = field(default_factory=dict)
+    brief: bool = False
 
     @property
     def name(self) -> str:
@@ -63,6 +69,11 @@ class Outcome:
     shape_held: np.ndarray
 
 
+def lasting(setup: Setup, shortest: float, periods: float) -> float:
+    """Return the duration in s of a phase that lasts `periods` first periods of the robot, at least `shortest` s."""
+    return max(shortest, periods * setup.first_period)
+
+
 def target_of(setup: Setup, case: Case) -> Target:
     """Return the target of a case, with the weights of the controller."""
     options = {"tip_direction_weight": setup.direction_weight, **case.options}
@@ -72,15 +83,14 @@ def target_of(setup: Setup, case: Case) -> Target:
 def run_case(job: tuple[Setup, Case]) -> Outcome:
     """Run one case: release, compensate, evaluate. The phases last as long as the robot's first period demands."""
     setup, case = job
-    period = setup.first_period
-    settled = _SETTLED * period
+    settled, share = _SETTLED * setup.first_period, _BRIEF if case.brief else 1.0
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(case.inclination), np.radians(case.roll))))
     target = target_of(setup, case)
     loop.release()
-    loop.run(max(_SHORTEST, _RELEASED * period))
+    loop.run(lasting(setup, _SHORTEST, share * _RELEASED))
     start = loop.time
     loop.hold(target)
-    loop.run(max(_SHORTEST, _HELD * period))
+    loop.run(lasting(setup, _SHORTEST, share * _HELD))
     trace = loop.trace
     before, after = trace.between(start - settled, start), trace.between(loop.time - settled)
     station = setup.robot.effectors.backbone_station
@@ -102,6 +112,24 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
         shape_without=before.backbone.mean(axis=0),
         shape_held=after.backbone.mean(axis=0),
     )
+
+
+def unholdable(robot: Robot) -> str | None:
+    """Return why the cables cannot hold the robot straight in some direction of gravity, as a sentence; None: they can."""
+    answer = holdability(robot, with_needed=False)
+    return None if answer.held else sentence(robot, answer)
+
+
+def held_notes(setup: Setup, residual: float, sag: float) -> list[str]:
+    """Return notes about a lateral residual of a straight target and the released robot's sag, both in m.
+
+    One that is a large share of the sag asks whether the cables can hold this robot at all; the answer is that of `model info`.
+    """
+    if residual <= _HELD_WELL * sag:
+        return []
+    reason = unholdable(setup.robot)
+    share = f"{100.0 * residual / sag:.0f} % of the sag remain"
+    return [f"{share}: {reason}" if reason else f"{share}, and the cables could hold the robot in every direction of gravity"]
 
 
 def errors_to(trace: Trace, target: Target) -> metrics.TipErrors:

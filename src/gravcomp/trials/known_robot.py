@@ -9,6 +9,7 @@ from gravcomp.calibration.fit import StaticFit, fit_statics
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.motion import fit_motion
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.description import Robot
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.context import Context
 from gravcomp.trials.free_fall import free_fall
@@ -17,11 +18,12 @@ from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.motion import base_orientation
 
-MODULI = (0.55e6, 0.75e6, 1.05e6)  # Pa
+MODULI = (0.69, 0.94, 1.31)  # of the described modulus
 DAMPING_TIME = 25e-3  # s
-OFFSETS = np.array([0.30, -0.20, 0.10, -0.15, 0.25, 0.05]) * 1e-3  # m
-# m: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
-_PULLS = (0.6e-3, 1.8e-3)
+_OFFSETS = (3e-3, -2e-3, 1e-3, -1.5e-3, 2.5e-3, 0.5e-3)  # of the robot's length, one cable after another
+# Of the length: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
+_PULLS = (6e-3, 18e-3)
+_RELEASED = -0.3  # of the length
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
 _FITTED = {"offsets", "compliance", "winding"}
 _IMAGES = 100  # that are averaged, as of a camera in some seconds: the direction is then known to 0.05 degrees
@@ -45,7 +47,8 @@ class Recovered:
 
 def recover(context: Context) -> list[Recovered]:
     """Fit modulus, offsets and elasticity to tips at rest, modulus and damping to free falls. Returns true and fitted values."""
-    moduli = MODULI[:1] if context.brief else MODULI
+    described = context.setup.robot.materials[0].youngs_modulus
+    moduli = [ratio * described for ratio in (MODULI[1:2] if context.brief else MODULI)]
     poses = _POSES[:1] if context.brief else _POSES
     jobs = [(context.setup, modulus, poses) for modulus in moduli]
     fits = context.map(_fit_known, jobs, "fitting robots with known parameters")
@@ -58,9 +61,11 @@ def recover(context: Context) -> list[Recovered]:
     for estimate in fits[0].estimates:
         cable = next((i for i, c in enumerate(context.setup.robot.cables) if estimate.name == f"offset of {c.name}"), None)
         if cable is not None:
-            found.append(Recovered(estimate.name, "mm", 1e3 * OFFSETS[cable], estimate.value, estimate.interval))
+            found.append(
+                Recovered(estimate.name, "mm", 1e3 * offsets(context.setup.robot)[cable], estimate.value, estimate.interval)
+            )
     setup = known_setup(context.setup, moduli[0])
-    inclinations, duration = ((0.0,), 0.5) if context.brief else ((0.0, 30.0), 1.5)
+    inclinations, duration = ((0.0,), 0.35) if context.brief else ((0.0, 30.0), 1.5)
     falls = context.map(
         free_fall, [(setup, i, 0.0, duration, trial) for trial, i in enumerate(inclinations)], "free falls of the known robot"
     )
@@ -80,6 +85,11 @@ def recover(context: Context) -> list[Recovered]:
     return found
 
 
+def offsets(robot: Robot) -> np.ndarray:
+    """Return the offsets (m,) in m of the known robot's cables."""
+    return robot.length * np.resize(_OFFSETS, len(robot.cables))
+
+
 def known_setup(setup: Setup, modulus: float) -> Setup:
     """Return a virtual robot with the model's material law and this module's parameters, without creep and friction."""
     material, truth = setup.robot.materials[0], setup.truth
@@ -95,17 +105,18 @@ def known_windows(setup: Setup, poses: tuple[tuple[float, float], ...] = _POSES)
     """Return tips at rest of the known robot: released, and with each cable pulled in, in each pose (inclination, roll, deg)."""
     rod, random = build_rod(setup.true_robot), np.random.default_rng(setup.seed)
     count, rows = rod.tendons, []
+    length, offset = setup.nominal.length, offsets(setup.nominal)
     for inclination, roll in poses:
         gravity = base_orientation(np.radians(inclination), np.radians(roll)).T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
         pulls = [np.full(count, np.nan)] + [
-            np.where(np.arange(count) == c, pull, np.nan) for c in range(count) for pull in _PULLS
+            np.where(np.arange(count) == c, length * pull, np.nan) for c in range(count) for pull in _PULLS
         ]
         for command in pulls:
             # A released cable is slack.
-            displacement = np.where(np.isnan(command), -0.03, command + OFFSETS)
+            displacement = np.where(np.isnan(command), _RELEASED * length, command + offset)
             shape = equilibrium(rod, gravity, displacement=displacement)
             tips, directions = (np.tile(value, (_IMAGES, 1)) for value in (shape.tip, shape.orientation[-1, :, 2]))
-            tip, direction = Tracker().seen(setup.nominal.length, tips, directions, random)
+            tip, direction = Tracker().seen(length, tips, directions, random)
             rows.append((gravity, command, tip.mean(axis=0), direction.mean(axis=0)))
     gravity, displacement, tip, direction = (np.array(column) for column in zip(*rows))
     return StillWindows(gravity, displacement, tip, direction)

@@ -13,12 +13,16 @@ from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions
 from gravcomp.trials.holding import errors_to
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-_SETTLING, _FINDING, _MEASURED = 4.0, 6.0, 1.0  # s
+_SETTLING, _LEARNT, _FINDING, _MEASURED = 4.0, 0.5, 6.0, 1.0  # s
+_BRIEF = 0.25  # of these, but the errors of model and sensors take their time to be learnt
 
 
 @dataclasses.dataclass(frozen=True)
 class LoadedCase:
-    """An unknown load: a payload in kg, or a force (3,) in N in soft_base; sensors; inclination and roll of the base, deg."""
+    """An unknown load: a payload in kg, or a force (3,) in N in soft_base; sensors; inclination and roll of the base, deg.
+
+    brief: shorter in every phase.
+    """
 
     payload: float = 0.0
     force: tuple[float, float, float] | None = None
@@ -26,11 +30,12 @@ class LoadedCase:
     cells: VirtualLoadCellParameters | None = None
     inclination: float = 0.0
     roll: float = 0.0
+    brief: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
 class LoadedOutcome:
-    """estimate: mean of the last second; before, after: RMS of the lateral tip error in m without load, and with it found."""
+    """estimate: mean at the end; before, after: RMS of the lateral tip error in m without load, and with it found."""
 
     estimate: LoadEstimate
     before: float
@@ -42,16 +47,17 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     setup, case = job
     kind = "payload" if case.force is None else "force"
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
+    share = _BRIEF if case.brief else 1.0
     options = LoadEstimationOptions(kind=kind)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
     loop.hold(target)
-    loop.run(_SETTLING)
+    loop.run(share * _SETTLING)
     loop.zero_load()
-    loop.run(options.zero_time + 0.5)
+    loop.run(options.zero_time + share * _LEARNT)
 
     def lateral() -> float:
-        trace = loop.trace.between(loop.time - _MEASURED)
+        trace = loop.trace.between(loop.time - share * _MEASURED)
         return float(np.sqrt(np.mean(errors_to(trace, target).lateral ** 2)))
 
     before = lateral()
@@ -59,10 +65,10 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
         loop.virtual.attach(case.payload)
     else:
         loop.virtual.push(np.array(case.force))
-    loop.run(_FINDING)
+    loop.run(share * _FINDING)
     estimates = []
     for _ in range(10):
-        loop.run(_MEASURED / 10.0)
+        loop.run(share * _MEASURED / 10.0)
         estimates.append(loop.load)
     mean = dataclasses.replace(
         estimates[-1],

@@ -20,7 +20,6 @@ from gravcomp.evaluation import metrics
 from gravcomp.inverse import Target
 from gravcomp.virtual.motion import BaseMotion, StaticMotion, SyntheticMotion, TremorMotion, base_orientation
 
-REST = 4.0  # s before the base is advanced
 _TARGET_STEPS = 0.1  # s between two targets
 _FEED_GAIN = 0.3  # share of the predicted shortening that is compensated until the next target
 # Stations and weights of the body, in addition to the tip, so that the body follows the centreline.
@@ -62,7 +61,10 @@ class Lumen:
 
 @dataclass(frozen=True)
 class Reach:
-    """One run. inclination, roll: of the inlet, deg; first, last: arc length of the tip, m; duration in s; hand: with tremor."""
+    """One run. inclination, roll: of the inlet, deg; first, last: arc length of the tip, m; duration in s; hand: with tremor.
+
+    rest: time in s before the base is advanced.
+    """
 
     name: str
     lumen: Lumen
@@ -72,6 +74,7 @@ class Reach:
     last: float
     duration: float
     hand: bool
+    rest: float = 4.0
 
     @property
     def orientation(self) -> np.ndarray:
@@ -80,7 +83,7 @@ class Reach:
 
     def depth(self, time: float | np.ndarray) -> np.ndarray:
         """Return the arc length of the target tip at a time in s, m."""
-        return self.first + (self.last - self.first) * _smooth(np.clip((np.asarray(time) - REST) / self.duration, 0.0, 1.0))
+        return self.first + (self.last - self.first) * _smooth(np.clip((np.asarray(time) - self.rest) / self.duration, 0.0, 1.0))
 
     def motion(self, length: float, seed: int, feed: "Feed") -> BaseMotion:
         """Return the motion of the base, in world axes with the lumen's mouth as origin."""
@@ -142,7 +145,7 @@ def run_reach(job: tuple[Setup, Reach, str]) -> Reached:
     feed = Feed()
     motion = reach.motion(setup.robot.length, setup.seed, feed)
     loop = ClosedLoop(setup, motion)
-    while loop.time < REST + reach.duration - 1e-9:
+    while loop.time < reach.rest + reach.duration - 1e-9:
         target = target_at(setup, reach, float(reach.depth(loop.time)), feed.at(loop.time))
         if way == FED:
             assert loop.shape is not None and target.tip_direction is not None
@@ -150,7 +153,7 @@ def run_reach(job: tuple[Setup, Reach, str]) -> Reached:
             feed.add(loop.time + _TARGET_STEPS, shortening)
         loop.hold(target, weightless=way == WITHOUT)
         loop.run(_TARGET_STEPS)
-    return _evaluated(setup, reach, loop.trace.between(REST), motion, feed)
+    return _evaluated(setup, reach, loop.trace.between(reach.rest), motion, feed)
 
 
 def target_at(setup: Setup, reach: Reach, depth: float, feed: float = 0.0) -> Target:

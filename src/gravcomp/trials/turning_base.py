@@ -17,6 +17,7 @@ import numpy as np
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.evaluation.metrics import SETTLED, settling_time
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.virtual.body import build_rod
@@ -37,8 +38,8 @@ class Residuals:
     """Root mean squares of lateral distances of the true tip from the straight robot's, in m; NaN where nothing is counted.
 
     held: at the end of each rest; moving: during the turns; sag: released, at the same orientations; orientations: their number,
-    without those at which the released robot has no equilibrium; settled: s from the start of compensation until the tip stays
-    within a twentieth of the sag there, NaN: never.
+    without those at which the released robot has no equilibrium; settled: s from the start of compensation until the lateral
+    distance stays within a twentieth of the sag of where it comes to rest, NaN: it does not.
     """
 
     held: float
@@ -48,14 +49,14 @@ class Residuals:
     settled: float
 
 
-def orientations(count: int, seed: int) -> list[np.ndarray]:
-    """Return the rotations (3, 3), world from soft_base, of the five poses and of `count` random ones, in the order of the run.
+def orientations(count: int, seed: int, inclinations: tuple[float, ...] = INCLINATIONS) -> list[np.ndarray]:
+    """Return the rotations (3, 3), world from soft_base, of the poses and of `count` random ones, in the order of the run.
 
     The directions of gravity of the random ones are uniform on the sphere.
     """
-    five = [base_orientation(math.radians(angle)) for angle in INCLINATIONS]
-    found = [five[0]]
-    for pose in five[1:]:
+    poses = [base_orientation(math.radians(angle)) for angle in inclinations]
+    found = [poses[0]]
+    for pose in poses[1:]:
         found.append(_turned_upright(found[-1], pose[2]))
     left = np.random.default_rng(seed).standard_normal((count, 3))
     left /= np.linalg.norm(left, axis=1, keepdims=True)
@@ -83,13 +84,14 @@ def residuals(
     orientation_seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
     board: str = "virtual",
+    inclinations: tuple[float, ...] = INCLINATIONS,
 ) -> Residuals:
-    """Run the loop through the five poses and `count` random ones.
+    """Run the loop through the poses at `inclinations` (deg) and `count` random ones.
 
     progress receives the number of orientations that are done, and that of all; board: of the virtual robot. Raises ConfigError,
     NoEquilibrium, RuntimeError.
     """
-    wanted = orientations(count, orientation_seed)
+    wanted = orientations(count, orientation_seed, inclinations)
     rest = _REACTION + _PERIODS * setup.first_period + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
     loop = ClosedLoop(setup, motion, board=board)
@@ -106,12 +108,8 @@ def residuals(
     sags = _released(setup, wanted)
     sag = _rms(sags)
     first = trace.between(start, legs[0][1])
-    outside = np.flatnonzero(_lateral(first) > 0.05 * sag)
-    settled = 0.0 if not len(outside) else first.time[min(outside[-1] + 1, len(first.time) - 1)] - start
-    never = len(outside) > 0 and outside[-1] + 1 >= len(first.time)
-    return Residuals(
-        held=_rms(held), moving=_rms(turns), sag=sag, orientations=len(sags), settled=math.nan if never else float(settled)
-    )
+    settled = settling_time(first.time, _lateral(first), start=start, band=SETTLED * sag)
+    return Residuals(held=_rms(held), moving=_rms(turns), sag=sag, orientations=len(sags), settled=settled)
 
 
 def _released(setup: Setup, wanted: list[np.ndarray]) -> list[np.ndarray]:

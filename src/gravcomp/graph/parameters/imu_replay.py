@@ -9,7 +9,7 @@ from gravcomp.config import parameter
 class ImuReplayParameters:
     """Parameters of the node."""
 
-    file: str = parameter("", description="rosbag2 folder (MCAP or SQLite) or .npz file in BROAD's layout", read_only=True)
+    file: str = parameter("", description="rosbag2 folder (MCAP or SQLite), .npz file in BROAD's layout, or CSV", read_only=True)
     topic: str = parameter("", description="IMU topic of a bag that has several; empty: the only one", read_only=True)
     rate: float = parameter(
         1.0,

@@ -7,6 +7,7 @@ is written once into a complete bag in the cache; the recording itself is not ch
 import contextlib
 import hashlib
 import shutil
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from gravcomp.cache import cache_folder
 from gravcomp.recordings.bags.cut_mcap import CutMcap
+from gravcomp.recordings.bags.cut_sqlite import repaired
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
 
@@ -92,15 +94,24 @@ def _connection(writer: Writer, source: Connection, definitions: Definitions) ->
 
 def _messages(file: Path) -> Iterator[tuple[Connection, int, bytes]]:
     """Yield the messages up to the first that cannot be read."""
-    reader: CutMcap | Sqlite3Reader = CutMcap(file) if file.suffix == ".mcap" else Sqlite3Reader(file)
-    try:
-        reader.open()
-        yield from reader.messages(reader.connections)
-    except Exception:  # the end of the readable part
-        return
-    finally:
-        with contextlib.suppress(Exception):
-            reader.close()
+    with contextlib.ExitStack() as held:
+        try:
+            reader: CutMcap | Sqlite3Reader
+            if file.suffix == ".mcap":
+                reader = CutMcap(file)
+            else:
+                folder = held.enter_context(tempfile.TemporaryDirectory(dir=cache_folder("bags")))
+                reader = Sqlite3Reader(repaired(file, Path(folder)))
+            held.callback(_close, reader)
+            reader.open()
+            yield from reader.messages(reader.connections)
+        except Exception:  # the end of the readable part
+            return
+
+
+def _close(reader: CutMcap | Sqlite3Reader) -> None:
+    with contextlib.suppress(Exception):
+        reader.close()
 
 
 def _key(files: list[Path]) -> str:

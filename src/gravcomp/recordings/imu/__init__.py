@@ -1,10 +1,12 @@
-"""Recordings of an IMU: .npz files in BROAD's layout and rosbag2 folders, as arrays with stamps.
+"""IMU recordings: samples and ground truth as arrays, from the files in which users have them.
 
-recording = read_recording("trial.npz")        # or a rosbag2 folder
-recording.stamp_ns, recording.gyro, recording.accel, recording.orientation
+recording = read_recording("trial.npz")        # a rosbag2 folder, or CSV
+recording.gyro, recording.accel                # (n, 3) rad/s, m/s^2
 """
 
+from gravcomp.recordings.imu.csv_columns import CsvColumns
+from gravcomp.recordings.imu.csv_files import is_csv, read_mapping
 from gravcomp.recordings.imu.reading import read_recording
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 
-__all__ = ["Recording", "RecordingError", "read_recording"]
+__all__ = ["CsvColumns", "Recording", "RecordingError", "is_csv", "read_mapping", "read_recording"]

@@ -3,20 +3,27 @@
 from pathlib import Path
 
 from gravcomp.recordings.imu.broad import read_broad
+from gravcomp.recordings.imu.csv_columns import CsvColumns
+from gravcomp.recordings.imu.csv_files import is_csv, read_csv
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 from gravcomp.recordings.imu.rosbag import read_rosbag
 
+_KINDS = "an .npz file in BROAD's layout, a CSV file or folder, or a rosbag2 folder"
 
-def read_recording(path: str | Path, topic: str | None = None) -> Recording:
-    """Read an .npz file in BROAD's layout or a rosbag2 folder; `topic` names the IMU topic of a bag with several.
 
-    Raises RecordingError, which names what was found and what is needed.
+def read_recording(path: str | Path, topic: str | None = None, columns: CsvColumns | None = None) -> Recording:
+    """Read an .npz file in BROAD's layout, CSV, or a rosbag2 folder.
+
+    topic: the IMU topic of a bag with several; columns: of a CSV file whose names do not say what they are. Raises
+    RecordingError, which names what was found and what is needed.
     """
     path = Path(path).expanduser()
     if not path.exists():
-        raise RecordingError(f"{path}: does not exist; an .npz file in BROAD's layout or a rosbag2 folder is needed")
+        raise RecordingError(f"{path}: does not exist; {_KINDS} is needed")
+    if is_csv(path):
+        return read_csv(path, columns)
     if path.is_dir() or path.suffix in (".mcap", ".db3"):
         return read_rosbag(path, topic)
     if path.suffix != ".npz":
-        raise RecordingError(f"{path}: is neither an .npz file in BROAD's layout nor a rosbag2 folder")
+        raise RecordingError(f"{path}: is of no known kind; {_KINDS} is needed")
     return read_broad(path)

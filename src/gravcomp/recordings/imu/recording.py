@@ -1,6 +1,6 @@
 """An IMU recording as arrays; they are checked once, at construction."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +60,12 @@ class Recording:
         """Sample rate in Hz, from the median of the steps by which the stamps advance."""
         step = np.diff(self.stamp_ns)
         return 1e9 / float(np.median(step[step > 0]))
+
+    def beginning(self, duration: float) -> "Recording":
+        """Return the samples of the first `duration` s; all temperature readings are kept."""
+        rows = self.stamp_ns <= self.stamp_ns[0] + round(1e9 * duration)
+        arrays = {name: getattr(self, name) for name in ("stamp_ns", "gyro", "accel", "orientation", "movement")}
+        return replace(self, **{name: values[rows] for name, values in arrays.items() if values is not None})
 
     def averaged(self, count: int) -> "Recording":
         """Return the recording at 1/count of its rate: the mean of every `count` samples, with the stamp and truth of the last.

@@ -5,6 +5,7 @@ namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/Quater
 `stamps.py` repairs those that cannot be used.
 """
 
+from array import array
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gravcomp.recordings.imu.recording import Recording, RecordingError
-from gravcomp.recordings.imu.stamps import usable_stamps
+from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -20,6 +21,26 @@ if TYPE_CHECKING:
 IMU = "sensor_msgs/msg/Imu"
 TEMPERATURE = "sensor_msgs/msg/Temperature"
 TRUTH = "geometry_msgs/msg/QuaternionStamped"
+
+
+class _Rows:
+    """Stamps, times of reception and values of a topic, in 8 bytes each: a long recording has millions."""
+
+    def __init__(self, width: int):
+        self._width = width
+        self._times = (array("q"), array("q"))
+        self._values = array("d")
+
+    def append(self, stamp: int, received: int, values: tuple[float, ...]) -> None:
+        """Add a message: stamp and time of reception in ns, values (width,)."""
+        self._times[0].append(stamp)
+        self._times[1].append(received)
+        self._values.extend(values)
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
+        stamp, received = (np.array(times, dtype=np.int64) for times in self._times)
+        return stamp, received, np.array(self._values, dtype=float).reshape(len(stamp), self._width)
 
 
 def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
@@ -46,20 +67,20 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
             truths = [
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
-            rows: dict[str, list[tuple[int, int, tuple[float, ...]]]] = {t: [] for t in (name, *temperatures[:1], *truths)}
+            rows = {t: _Rows(width) for t, width in ((name, 6), *((t, 1) for t in temperatures[:1]), *((t, 4) for t in truths))}
             for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-                rows[connection.topic].append((stamp, received, _values(message)))
+                rows[connection.topic].append(stamp, received, _values(message))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
         if isinstance(error, RecordingError):
             raise
         raise RecordingError(f"{path}: is not a readable rosbag2 recording: {error}") from error
 
-    recorded, receptions, values = _arrays(rows[name], 6)
+    recorded, receptions, values = rows[name].arrays()
     samples, notes = usable_stamps(recorded, receptions, values)
-    temperature = _arrays(rows[temperatures[0]], 1) if temperatures else None
-    truth = _arrays(rows[truths[0]], 4) if truths else None
+    temperature = rows[temperatures[0]].arrays() if temperatures else None
+    truth = rows[truths[0]].arrays() if truths else None
     return Recording(
         source=str(path),
         stamp_ns=samples,
@@ -67,7 +88,7 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
         accel=values[:, 3:].copy(),
         temperature_stamp_ns=temperature[0] if temperature else None,
         temperature=temperature[2][:, 0] if temperature else None,
-        orientation=_nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
+        orientation=nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
         notes=(*damage, *notes),
     )
 
@@ -96,20 +117,3 @@ def _values(message: Any) -> tuple[float, ...]:
         return (message.temperature,)
     q = message.quaternion
     return q.w, q.x, q.y, q.z
-
-
-def _arrays(rows: list[tuple[int, int, tuple[float, ...]]], width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
-    stamp, received = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
-    return stamp, received, np.array([row[2] for row in rows], dtype=float).reshape(len(rows), width)
-
-
-def _nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:
-    """Return the truth whose stamp is nearest to that of each sample, NaN where they differ by more than the tolerance."""
-    after = np.clip(np.searchsorted(truth_stamp, stamp), 1, max(len(truth_stamp) - 1, 1))
-    after = np.minimum(after, len(truth_stamp) - 1)
-    before = np.maximum(after - 1, 0)
-    nearest = np.where(np.abs(truth_stamp[before] - stamp) <= np.abs(truth_stamp[after] - stamp), before, after)
-    result = truth[nearest].copy()
-    result[np.abs(truth_stamp[nearest] - stamp) > tolerance_ns] = np.nan
-    return result

@@ -77,3 +77,14 @@ def _spread_bursts(stamp_ns: np.ndarray, values: np.ndarray) -> tuple[np.ndarray
     place = np.arange(len(stamp_ns)) - np.repeat(starts, count)  # within the burst
     left = np.repeat(count, count) - 1 - place  # samples of the burst that follow
     return np.repeat(burst, count) - np.rint(left * np.repeat(since / count, count)).astype(np.int64), int(count.max())
+
+
+def nearest(stamp: np.ndarray, truth_stamp: np.ndarray, truth: np.ndarray, tolerance_ns: int = 5_000_000) -> np.ndarray:
+    """Return the truth whose stamp is nearest to that of each sample, NaN where they differ by more than the tolerance."""
+    after = np.clip(np.searchsorted(truth_stamp, stamp), 1, max(len(truth_stamp) - 1, 1))
+    after = np.minimum(after, len(truth_stamp) - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(np.abs(truth_stamp[before] - stamp) <= np.abs(truth_stamp[after] - stamp), before, after)
+    result = truth[nearest].copy()
+    result[np.abs(truth_stamp[nearest] - stamp) > tolerance_ns] = np.nan
+    return result

@@ -1,0 +1,44 @@
+"""The article's robot in a coarse mesh, with a reduced model that one process of a run builds for all tests."""
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from gravcomp.description import Elements, Robot, load_robot_file
+from gravcomp.reduction import Reduction, load
+from gravcomp.simulation import RobotModel
+from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training.build import alone
+
+# Little training: enough to keep this robot straight.
+SMALL = BuildOptions(
+    modes=30,
+    strains=24,
+    training=TrainingOptions(paths=36, steps=12, bend=0.3),
+    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
+)
+
+
+def coarse(robot: Robot | None = None) -> Robot:
+    """The robot, by default the article's, in a coarse mesh."""
+    return dataclasses.replace(robot or load_robot_file("article").robot, elements=Elements(around=4, along=4))
+
+
+@contextlib.contextmanager
+def cache_of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Context with a cache that is empty at the start of a run, and that its processes share."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GRAVCOMP_CACHE", str(folder))
+        yield
+
+
+def built_once(robot: Robot) -> tuple[RobotModel, Reduction]:
+    """A model and its reduction, built where no other process of the run has done it; in the context of the run's cache."""
+    model = RobotModel(robot)
+    with alone(model):
+        return model, load(model) or build(model, SMALL)[0]

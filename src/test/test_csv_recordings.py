@@ -1,0 +1,177 @@
+"""IMU recordings as CSV, as data sets and phone apps write them; what cannot be read is refused with what was found."""
+
+import numpy as np
+import pytest
+
+from gravcomp.config import ConfigError
+from gravcomp.recordings.imu import RecordingError, read_mapping, read_recording
+from gravcomp.standard_gravity import STANDARD_GRAVITY
+
+N = 6
+GYRO = np.array([[0.1 * k, -0.2 * k, 0.3 * k] for k in range(N)])  # rad/s
+ACCEL = np.array([[0.01 * k, 0.02 * k, STANDARD_GRAVITY] for k in range(N)])
+NS = [1403636579758555392 + 5_000_000 * k for k in range(N)]
+
+
+def lines(header, rows, separator=",", comma=False):
+    text = [header] if isinstance(header, str) else list(header)
+    for row in rows:
+        fields = [str(field) for field in row]
+        text.append(separator.join(field.replace(".", ",") if comma else field for field in fields))
+    return "\n".join(text) + "\n"
+
+
+def rows(*parts):
+    return [[x for part in of_row for x in np.atleast_1d(part).tolist()] for of_row in zip(*parts)]
+
+
+EUROC = "#timestamp [ns]," + ",".join(
+    f"{q}_RS_S_{axis} [{unit}]" for q, unit in (("w", "rad s^-1"), ("a", "m s^-2")) for axis in "xyz"
+)
+EUROC_TRUTH = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
+REPO = ("Time (s);Vicon Orientation;;;;IMU Acceleration;;;IMU Gyroscope;;;IMU Magnetometer;;;", ";W;X;Y;Z;X;Y;Z;X;Y;Z;X;Y;Z;")
+XIMU = "Packet number,Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g),Magnetometer X (G),Magnetometer Y (G),Magnetometer Z (G)"  # noqa: E501
+XIMU3 = XIMU.replace("Packet number", "Timestamp (us)")
+LOGGER = "time,seconds_elapsed,z,y,x"
+SECONDS = [0.005 * k for k in range(N)]
+
+
+def check(recording, rate=200.0):
+    assert recording.gyro == pytest.approx(GYRO, abs=1e-9) and recording.accel == pytest.approx(ACCEL, abs=1e-9)
+    assert recording.rate == pytest.approx(rate)
+
+
+def test_the_tree_of_euroc_with_its_truth(tmp_path):
+    imu, truth = tmp_path / "mav0" / "imu0", tmp_path / "mav0" / "state_groundtruth_estimate0"
+    imu.mkdir(parents=True)
+    truth.mkdir()
+    (imu / "data.csv").write_text(lines(EUROC, rows(NS, GYRO, ACCEL)))
+    turned = np.tile([0.0, 0.0, 0.0, 0.6, 0.8, 0.0, 0.0], (N, 1))
+    (truth / "data.csv").write_text(lines(EUROC_TRUTH, rows(NS[2:], turned[2:])))
+    for path in (tmp_path, imu / "data.csv"):
+        recording = read_recording(path)
+        check(recording)
+        assert recording.stamp_ns.tolist() == NS  # every digit
+        assert np.isnan(recording.orientation[0]).all() and recording.orientation[2].tolist() == [0.6, 0.8, 0.0, 0.0]
+
+
+def test_repoimu_with_two_lines_of_header(tmp_path):
+    path = tmp_path / "TStick_Test02_Trial1.csv"
+    turned = np.tile([1.0, 0.0, 0.0, 0.0], (N, 1))
+    path.write_text(lines(REPO, rows(SECONDS, turned, ACCEL, GYRO, np.ones((N, 3))), ";"))
+    recording = read_recording(path)
+    check(recording)
+    assert recording.orientation[3].tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_x_imu3_in_degrees_and_g(tmp_path):
+    path = tmp_path / "inertial.csv"
+    times = [1000 + 5000 * k for k in range(N)]
+    path.write_text(lines(XIMU3, rows(times, np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))))
+    recording = read_recording(path)
+    check(recording)
+    assert "the gyroscope is in deg/s by its header: converted" in recording.notes
+
+
+def test_x_imu_needs_a_rate(tmp_path):
+    path, mapping = tmp_path / "CalInertialAndMag.csv", tmp_path / "columns.yaml"
+    path.write_text(lines(XIMU, rows(range(N), np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))))
+    with pytest.raises(RecordingError, match=r"no column of time among Packet number.*rate"):
+        read_recording(path)
+    gyro, accel = (
+        [f"{name} {axis} ({unit})" for axis in "XYZ"] for name, unit in (("Gyroscope", "deg/s"), ("Accelerometer", "g"))
+    )
+    mapping.write_text(f"rate: 200\ngyro: {gyro}\ngyro_unit: deg/s\naccel: {accel}\naccel_unit: g\n")
+    check(read_recording(path, columns=read_mapping(str(mapping))))
+
+
+def logger_files(folder, accel):
+    folder.mkdir()
+    (folder / "Gyroscope.csv").write_text(lines(LOGGER, rows(NS, SECONDS, GYRO[:, ::-1])))
+    for name, values in accel.items():
+        (folder / f"{name}.csv").write_text(lines(LOGGER, rows(NS, SECONDS, values[:, ::-1])))
+    (folder / "Metadata.csv").write_text("version,device name\n3,phone\n")
+    return folder
+
+
+def test_sensor_logger_with_and_without_total_acceleration(tmp_path):
+    gravity = np.tile([0.0, 0.0, STANDARD_GRAVITY], (N, 1))
+    check(read_recording(logger_files(tmp_path / "a", {"Accelerometer": ACCEL - gravity, "Gravity": gravity})))
+    check(
+        read_recording(
+            logger_files(tmp_path / "b", {"TotalAcceleration": ACCEL, "Accelerometer": ACCEL - gravity, "Gravity": gravity})
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("time", "accel", "gyro", "separator", "comma"),
+    [
+        ("Time (s)", "Acceleration {} (m/s^2)", "Gyroscope {} (rad/s)", ",", False),
+        ("Time (s)", "Acceleration {} (m/s^2)", "Gyroscope {} (rad/s)", "\t", True),
+        ("Zeit (s)", "Beschleunigung {} (m/s²)", "Winkelgeschwindigkeit {} (rad/s)", ";", True),
+        ("Temps (s)", "Accélération {} (m/s^2)", "Gyroscope {} (rad/s)", ";", True),
+    ],
+)
+def test_phyphox_in_several_languages_and_with_decimal_commas(tmp_path, time, accel, gyro, separator, comma):
+    later = [t + 0.0007 for t in SECONDS]  # the sensors of a phone do not measure at the same moments
+    at = np.stack([np.interp(later, SECONDS, column) for column in ACCEL.T], axis=1)
+
+    def header(name):
+        return separator.join([time, *(name.format(axis) for axis in "xyz")])
+
+    (tmp_path / "Gyroscope.csv").write_text(lines(header(gyro), rows(SECONDS, GYRO), separator, comma))
+    (tmp_path / "Accelerometer.csv").write_text(lines(header(accel), rows(later, at), separator, comma))
+    recording = read_recording(tmp_path)
+    assert len(recording) == N - 1 and recording.accel[:-1] == pytest.approx(ACCEL[1:-1], abs=1e-6)
+    assert recording.gyro == pytest.approx(GYRO[1:])
+
+
+@pytest.mark.parametrize(
+    "names", ["t,gx,gy,gz,ax,ay,az", "timestamp,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z", "Time,GyroX,GyroY,GyroZ,AccX,AccY,AccZ"]
+)
+@pytest.mark.parametrize("unit", [1.0, 1e3, 1e6, 1e9])
+def test_usual_names_in_any_unit_of_time(tmp_path, names, unit):
+    (tmp_path / "a.csv").write_text(lines(names, rows([round(unit * t, 6) for t in SECONDS], GYRO, ACCEL)))
+    check(read_recording(tmp_path / "a.csv"))
+
+
+def test_the_last_line_may_be_cut_off(tmp_path):
+    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)) + "0.03,0.1,")
+    check(read_recording(tmp_path / "a.csv"))
+
+
+MISTAKES = [
+    ("t,gx,gy,gz\n0,1,2,3\n1,1,2,3\n", "lacks a specific force; found the columns: t, gx, gy, gz; needed: time, rate"),
+    (
+        "t,gx,gy,gz,linear acceleration x,linear acceleration y,linear acceleration z\n0,1,2,3,4,5,6\n",
+        "acceleration without gravity",
+    ),
+    ("t,gx (lsb),gy (lsb),gz (lsb),ax,ay,az\n0,1,2,3,4,5,6\n", r"column 'gx \(lsb\)' is in 'lsb'; known units: rad/s"),
+    ("t,gx,gy,gz,ax,ay,az\n0,0,0,1,0,2,0,3,0,4,0,5,0,6\n", "commas are separators and decimal points at once"),
+    (
+        "t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,6\n0.01,1,2,3,4,5\n0.02,1,2,3,4,5,6\n",
+        "row 2 of the numbers has 6 fields; the first has 7",
+    ),
+    ("t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,6\n", "has 1 IMU samples"),
+    ("hello\nworld\n", "no line of numbers"),
+    ("", "no line of numbers"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), MISTAKES)
+def test_an_unusable_file_is_refused_with_what_was_found(tmp_path, text, words):
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(RecordingError, match=words) as refusal:
+        read_recording(tmp_path / "bad.csv")
+    assert "bad.csv" in str(refusal.value)
+
+
+def test_a_mapping_with_a_wrong_name_or_unit_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)))
+    (tmp_path / "map.yaml").write_text("time: t\ngyro: [gx, gy, wz]\naccel: [ax, ay, az]\n")
+    with pytest.raises(RecordingError, match="no column 'wz'; found: t, gx"):
+        read_recording(tmp_path / "a.csv", columns=read_mapping(str(tmp_path / "map.yaml")))
+    (tmp_path / "map.yaml").write_text("gyro: [gx, gy, gz]\naccel: [ax, ay, az]\naccel_unit: ounces\n")
+    with pytest.raises(ConfigError, match="accel_unit is 'ounces'; allowed"):
+        read_mapping(str(tmp_path / "map.yaml"))

@@ -1,0 +1,28 @@
+"""The nodes of a robot's graph as data: apart, in one process, with joints."""
+
+from pathlib import Path
+
+from gravcomp.launcher.robot_graph import COMPOSED, LOOP, RobotGraph
+
+JOINTS = Path(__file__).resolve().parents[1] / "examples" / "joint_robot.yaml"
+PARAMETERS = {"imu_estimator": {"prediction.horizon_ms": 5.0}, "can_bridge": {"trace": False}}
+
+
+def names(specs):
+    return tuple((spec.package, spec.executable) for spec in specs)
+
+
+def test_the_inner_nodes_may_be_one_process():
+    graph = RobotGraph("article", "udp_multicast", "239.1.1.1", "/left", PARAMETERS)
+    assert names(graph.loop()) == LOOP
+    bridge, inner = graph.loop(composed=True)
+    assert names([bridge, inner]) == (LOOP[0], COMPOSED)
+    assert bridge.parameters["trace"] is False and inner.namespace == "/left"
+    assert inner.parameters == {"robot": "article", "imu_estimator:prediction.horizon_ms": 5.0}
+    assert "imu_estimator:prediction.horizon_ms:=5.0" in inner.arguments()
+
+
+def test_a_robot_with_joints_keeps_its_bridge_and_its_stand_in():
+    apart = names(RobotGraph(str(JOINTS)).loop(virtual=True))
+    together = names(RobotGraph(str(JOINTS)).loop(virtual=True, composed=True))
+    assert together == (apart[0], COMPOSED, apart[-1]) and apart[1:-1] == LOOP[1:]
