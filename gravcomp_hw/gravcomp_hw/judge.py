@@ -25,6 +25,8 @@ from gravcomp.evaluation import run_figures as figures
 from gravcomp.evaluation.bus_delay import DelayListener
 from gravcomp.evaluation.released import released_tip_error
 from gravcomp.evaluation.track import Track
+from gravcomp.firmware import requests
+from gravcomp.firmware.client import BoardClient
 from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp.inverse import Holdable
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
@@ -71,6 +73,8 @@ class Judge(ManagedNode):
         self._unholdable: str | None = None
         self._relax = self.create_client(Trigger, "inverse_controller/relax")
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
+        self._stop = self.create_client(Trigger, "can_bridge/stop") if self.parameters.standalone else None
+        self._stopped: Future | None = None
         self._state_clients = {name: self.create_client(GetState, f"{name}/get_state") for name in self.parameters.nodes}
         self.create_timer(0.1, self._run_scenario)
         self.create_timer(0.5, self._observe)
@@ -96,13 +100,29 @@ class Judge(ManagedNode):
             self._phase = "sagging" if p.relax_time > 0.0 else self._phase
             if p.relax_time > 0.0:
                 self._relax.call_async(Trigger.Request())
-        if elapsed >= p.relax_time and self._compensated_at is None and self._enable.service_is_ready():
-            self._enable.call_async(SetBool.Request(data=True))
+        if elapsed >= p.relax_time and self._compensated_at is None and self._begins():
             self._phase, self._compensated_at = "compensating", self._now()
         if elapsed >= p.duration:
             self._phase = "done"
             self._write(self._figures())
             self.finished = True
+
+    def _begins(self) -> bool:
+        """Begin compensation, of the controller or, once the bridge has stopped, of the board; return whether it has begun."""
+        if self._stop is None:
+            if not self._enable.service_is_ready():
+                return False
+            self._enable.call_async(SetBool.Request(data=True))
+            return True
+        if self._stopped is None and self._stop.service_is_ready():
+            self._stopped = self._stop.call_async(Trigger.Request())
+        if self._stopped is None or not self._stopped.done():
+            return False
+        with BoardClient(self._can()) as board:
+            answer = board.ask(requests.act("run"))
+        if not answer.done:
+            raise ConfigError(f"the board does not run its loop: {answer.result}")
+        return True
 
     def _observe(self) -> None:
         """Query the lifecycle states and write the state of the run to the result file."""
@@ -164,7 +184,8 @@ class Judge(ManagedNode):
             "unholdable": self._unholdable,
             "correlation": _rounded(figures.correlation(self._truth_tip, self._model_tip, self._begin, end), 5),
             "imu_rate_hz": _rounded(figures.rate(self._imu.between(counted_from, end)[0]), 2),
-            "command_rate_hz": _rounded(figures.rate(self._commands.between(counted_from, end)[0]), 2),
+            # The controller's commands have no effect while the board runs its own loop.
+            "command_rate_hz": None if p.standalone else _rounded(figures.rate(self._commands.between(counted_from, end)[0]), 2),
             "delay_ms": None
             if delays is None
             else {"median": _rounded(float(np.median(delays)), 2), "p99": _rounded(float(np.percentile(delays, 99)), 2)},

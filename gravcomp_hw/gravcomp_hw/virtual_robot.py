@@ -19,6 +19,8 @@ from std_msgs.msg import String
 
 from gravcomp.canbus.bus import BusError
 from gravcomp.config import ConfigError
+from gravcomp.firmware.model_fit import blob_for
+from gravcomp.firmware.model_settings import LoopParameters
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
 from gravcomp.virtual.described import described
 from gravcomp.virtual.faults import Fault
@@ -51,7 +53,9 @@ class VirtualRobotNode(ManagedNode):
         motion = make_motion(self.parameters, self.robot_file.robot.imu_mount.rotation, virtual.seed)
         hardware = hardware.on(self.parameters.interface, self.parameters.channel)
         scene = self.robot_file.scene
-        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, self.parameters.board, scene)
+        board = self.parameters.board
+        model = blob_for(LoopParameters.of(self.robot_file)) if board == "standalone" else None
+        robot = VirtualRobot(parameters, virtual.robot, hardware, virtual.seed, motion, board, scene, model)
         self.get_logger().info(robot.true.summary())
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)

@@ -1,9 +1,12 @@
 """A board on a bench for tests: the firmware's C code on this machine or its image in the emulator, with motors behind it."""
 
+import struct
+
 import can
+import numpy as np
 
 from gravcomp.canbus import c610
-from gravcomp.firmware import requests
+from gravcomp.firmware import model_blob, model_transfer, requests
 from gravcomp.firmware.host_board import HOST_BUS, MOTOR_BUS
 
 STILL = (10, 20, 5460, 1, 2, 3)
@@ -55,6 +58,21 @@ class Bench:
         self.run(2)
         return next((a for _, frame in self.host[begin:] if (a := requests.answer_of(frame))), None)
 
+    def transfer(self, steps, lose=lambda message: False, feedback=False):
+        """Let a host send a model, without the frames that `lose` names; all answers are in `answers`. Raises as `steps`."""
+        self.answers = []
+        try:
+            messages = next(steps)
+            while True:
+                begin = len(self.host)
+                self.waiting += [message for message in messages if not lose(message)]
+                self.run(2, feedback=feedback)
+                found = [a for _, frame in self.host[begin:] if (a := model_transfer.answer_of(frame))]
+                self.answers += found
+                messages = steps.send(found[-1] if found else None)
+        except StopIteration:
+            pass
+
     def currents(self, motor=1, since=0):
         """Currents (mA) of a motor with the times (ms) at which they were sent."""
         place = 2 * ((motor - 1) % 4)
@@ -67,3 +85,29 @@ class Bench:
 
     def last(self, frame_id) -> can.Message:
         return next(frame for _, frame in reversed(self.host) if frame.arbitration_id == frame_id)
+
+
+def blob_of(modes: int = 4, motion: float = 1.0) -> bytes:
+    """A whole blob of six cables in one piece each, on modes that shorten none of them; `motion`: of the tip by the modes."""
+    pairs, cables, points = modes * (modes + 1) // 2, 6, 2
+    section = np.zeros((9, modes))
+    section[0, 0], section[1, 1], section[2, 2] = motion, motion, 0.1 * motion
+    change = np.zeros((cables, 3, modes))
+    for k in range(cables):
+        change[k, 2, :2] = 0.05 * np.cos(k * np.pi / 3.0), 0.05 * np.sin(k * np.pi / 3.0)
+    settings = np.zeros(model_blob.SETTINGS)
+    settings[:14] = 0.1, 10.0, 0.01, 5.0, 20.0, -0.03, 0.03, 0.025, 0.05, 3e-4, 0.02, 1e-4, 4e-3, 0.09
+    settings[14:22] = 0.0, 0.0, 0.1, 0.0, 0.0, 1.0, 1.0, 1e-3
+    settings[23], settings[27:30] = 1.0, 1.0
+    settings[36:40], settings[55:57] = (9.81, 1e-3, 1e-3, 0.05), (35.0, 60.0)
+    settings[-9:] = 1, 2, 3, 4, 5, 6, 0, 0, 0
+    tables = (
+        np.zeros((modes, pairs)), np.zeros((pairs, cables)), change, np.eye(3, modes), section,
+        (0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), np.tile((0.0, 0.0, 0.1), (cables, 1)), np.zeros((points, 3, modes)),
+        np.linspace((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), points), np.full(cables, 0.1), np.full(cables, 1e-4),
+        *[np.zeros(cables)] * 3, np.full(cables, 0.05), settings,
+    )  # fmt: skip
+    body = b"".join(np.asarray(table, "<f4").tobytes() for table in tables) + bytes(range(cables)) + bytes(2)
+    counts = struct.pack("<8I", modes, modes, cables, cables, model_blob.SETTINGS, points, 0, 0)
+    head = struct.pack("<4sIII", model_blob.MAGIC, model_blob.VERSION, 64 + len(body), 0)
+    return model_blob.with_crc(head + b"a robot of tests" + counts + body)

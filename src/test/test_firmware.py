@@ -373,6 +373,15 @@ def test_the_image_sets_the_bit_rate_and_lets_go_when_the_supply_falls():
     assert not b.ask(requests.act("home")).done and b.currents(1)[-1][1] == 0
 
 
+def test_frames_that_come_faster_than_the_tick_takes_them_are_reported():
+    b = Bench(ImageBoard(SETTINGS))
+    b.run(20)
+    for _ in range(100):
+        b.board.receive(encode("HeaterCommand", duty=0.0, sequence=0))
+    b.run(2)
+    assert b.board.faults & fault("frames were lost") and b.ask(requests.read("dropped")).value == 100 - 63
+
+
 def test_the_stack_that_is_used_is_within_the_bound():
     image = build_image()
     bound = largest_stack(image)

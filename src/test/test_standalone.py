@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from coarse_article import built_once, cache_of_the_run, coarse
 
+from gravcomp.closed_loop import loop as loop_module
+from gravcomp.closed_loop.loop import ClosedLoop
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import PronyTerm, load_robot_file
 from gravcomp.firmware import model_blob
-from gravcomp.firmware.cycles import MEMORY_AT, MODEL_AT, Processor, sample_bytes
+from gravcomp.firmware.cycles import MEMORY_AT, Processor, sample_bytes
 from gravcomp.firmware.host_library import load as library
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.loop_on_host import LOADING_STEPS, run_on_host, turning_gravity
@@ -21,6 +24,7 @@ from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import RobotModel
+from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 STEPS = 120
 
@@ -46,7 +50,7 @@ def found(parameters, built):
 def started(blob: bytes, gravity: np.ndarray) -> StandaloneLoop:
     loop = StandaloneLoop(blob)
     for _ in range(LOADING_STEPS - 1):
-        assert not loop.follow(SAMPLE_PERIOD, gravity)
+        assert loop.follow(SAMPLE_PERIOD, gravity)
     return loop
 
 
@@ -153,7 +157,7 @@ def test_the_image_computes_the_same_bits_as_the_host(found):
     """The inner loops are written in the processor's instructions there."""
     processor, loop = Processor(build_image(standalone=True), found.blob), StandaloneLoop(found.blob)
     sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
-    assert processor.call("gc_standalone_load", MEMORY_AT, MODEL_AT, len(found.blob))[0] & 0xFF
+    assert processor.take_model(found.blob)
     on_host = (ctypes.c_float * 8)(), (ctypes.c_float * 8)()
     memory = ctypes.create_string_buffer(24)
     for k in range(LOADING_STEPS + 5):
@@ -163,3 +167,18 @@ def test_the_image_computes_the_same_bits_as_the_host(found):
         ctypes.memmove(memory, data, 24)
         library().gc_standalone_step(ctypes.c_void_p(loop.address), memory, 0xFF, *on_host)
     assert any(on_host[0]) and processor.read(targets, 64) == bytes(on_host[0]) + bytes(on_host[1])
+
+
+def test_the_board_holds_the_virtual_robot_by_itself(parameters, built, found, monkeypatch):
+    monkeypatch.setattr(loop_module, "blob_for", lambda _: found.blob)
+    setup = dataclasses.replace(Setup.of(load_robot_file("article")), robot=parameters.robot)
+    loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(135.0))), board="standalone")
+    sagging = np.linalg.norm(loop.truth.tip_position[:2])
+    loop.hold(parameters.straight)
+    loop.run(1.5)
+    assert loop.virtual.firmware.word("motors") == 0b111111 and loop.virtual.firmware.loop().code == 1
+    assert np.linalg.norm(loop.truth.tip_position[:2]) < 0.06 * sagging
+    loop.release()
+    assert np.abs(loop.truth.current).max() > 0.0
+    loop.run(0.1)
+    assert not loop.truth.current.any()

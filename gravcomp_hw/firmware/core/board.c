@@ -85,7 +85,7 @@ static void take_host_currents(gc_board *board, uint32_t group, const gc_frame *
     }
   }
   const bool free = board->state == GC_IDLE || board->state == GC_RELEASED || board->state == GC_HOLDING;
-  if (free && !board->supply_low) {
+  if (free && !board->supply_low && !board->reserved) {
     gc_board_enter(board, GC_FOLLOWING);
   }
   if (board->state == GC_FOLLOWING && gc_board_is_between(board)) {
@@ -375,7 +375,7 @@ static void begin_alone(gc_board *board) {
   if (board->begun || gc_parameter_int(&board->parameters, GC_AT_START) != 1 || board->now < START_TIME) {
     return;
   }
-  if (gc_board_motors_answer(board) && !board->supply_low && board->state != GC_FAULT) {
+  if (gc_board_motors_answer(board) && !board->supply_low && !board->reserved && board->state != GC_FAULT) {
     board->begun = true;
     gc_board_home(board);
   }
@@ -388,8 +388,8 @@ static void watch_twin(gc_board *board) {
 }
 
 static void watch_queues(gc_board *board) {
-  if (board->queues[0].dropped + board->queues[1].dropped != board->dropped) {
-    board->dropped = board->queues[0].dropped + board->queues[1].dropped;
+  if (gc_board_lost(board) != board->dropped) {
+    board->dropped = gc_board_lost(board);
     board->passing |= GC_FAULT_FRAMES;
   }
 }

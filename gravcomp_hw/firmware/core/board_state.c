@@ -20,6 +20,21 @@ bool gc_board_is_between(const gc_board *board) { return gc_parameter_int(&board
 
 uint32_t gc_board_motor_bus(const gc_board *board) { return gc_board_is_between(board) ? 1u : 0u; }
 
+bool gc_board_drives(const gc_board *board) {
+  return board->state != GC_IDLE && board->state != GC_RELEASED && board->state != GC_FAULT;
+}
+
+uint32_t gc_board_lost(const gc_board *board) {
+  return board->queues[0].dropped + board->queues[1].dropped + board->lost;
+}
+
+bool gc_board_reserve(gc_board *board) {
+  board->reserved = !gc_board_drives(board);
+  return board->reserved;
+}
+
+void gc_board_unreserve(gc_board *board) { board->reserved = false; }
+
 void gc_board_enter(gc_board *board, gc_state state) {
   board->state = state;
   board->state_since = board->now;

@@ -2,6 +2,7 @@
 //
 //   IDLE --currents of the host--> FOLLOWING --host silent--> HOLDING --still silent--> RELEASED --currents--> FOLLOWING
 //   IDLE, RELEASED, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
+//   IDLE, RELEASED, FOLLOWING, HOLDING after homing --run--> STANDALONE
 //   any --stall, runaway, a silent motor while the board drives--> FAULT --resume--> RELEASED
 #ifndef GC_BOARD_STATE_H
 #define GC_BOARD_STATE_H
@@ -95,9 +96,11 @@ typedef struct {
   bool supply_low;    // the supply is below its limit
   bool job_waits;     // the loop on the board has a sample to work on
   gc_sample job;
-  uint32_t dropped;   // frames that found a queue full
+  uint32_t lost;      // frames that the buses' rings of reception had no room for, set before each tick
+  uint32_t dropped;   // frames that were lost in rings or queues, as reported
   uint8_t clamped;    // motors whose current was limited since the last BoardState
   bool restart;       // a restart was requested
+  bool reserved;      // the flash is written: no state begins in which the board drives
 } gc_board;
 
 // Whether the board is between the buses of host and motors.
@@ -114,6 +117,16 @@ bool gc_board_has_motor(const gc_board *board, uint32_t index);
 
 // Whether there are motors and all of them answer.
 bool gc_board_motors_answer(const gc_board *board);
+
+// Whether currents go to the motors: those of the host, or of the board's own loops.
+bool gc_board_drives(const gc_board *board);
+
+// Frames that were lost because a queue or a ring was full.
+uint32_t gc_board_lost(const gc_board *board);
+
+// Keep the board from driving while the flash is written; false while it drives. Ends with gc_board_unreserve.
+bool gc_board_reserve(gc_board *board);
+void gc_board_unreserve(gc_board *board);
 
 // Enter a state.
 void gc_board_enter(gc_board *board, gc_state state);

@@ -4,10 +4,6 @@
 
 #define OPERATION_SHIFT 4u
 
-static bool drives(const gc_board *board) {
-  return board->state != GC_IDLE && board->state != GC_RELEASED && board->state != GC_FAULT;
-}
-
 static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
   if (key < (uint32_t)GC_PARAMETER_COUNT) {
     *value = board->parameters.words[key];
@@ -47,7 +43,7 @@ static uint8_t read(const gc_board *board, uint32_t key, uint32_t *value) {
       *value = board->slowest;
       return GC_DONE;
     case GC_KEY_DROPPED:
-      *value = board->queues[0].dropped + board->queues[1].dropped;
+      *value = gc_board_lost(board);
       return GC_DONE;
     case GC_KEY_HOMING:
       *value = (uint32_t)board->homing.phase << 8 | board->homing.motor;
@@ -61,7 +57,7 @@ static uint8_t write(gc_board *board, uint32_t key, uint32_t value) {
   if (key >= (uint32_t)GC_PARAMETER_COUNT) {
     return GC_UNKNOWN_KEY;
   }
-  if (drives(board)) {
+  if (gc_board_drives(board)) {
     return GC_WRONG_STATE;
   }
   return gc_parameter_set(&board->parameters, key, value) ? GC_DONE : GC_OUT_OF_RANGE;
@@ -72,7 +68,7 @@ static uint8_t save(gc_board *board, uint32_t value) {
     return GC_OUT_OF_RANGE;
   }
   // The processor waits while the flash is erased.
-  if (drives(board)) {
+  if (gc_board_drives(board)) {
     return GC_WRONG_STATE;
   }
   if (board->storage.erase == NULL || !gc_storage_save(&board->storage, &board->parameters)) {
@@ -118,10 +114,12 @@ static bool all_have_zeros(const gc_board *board) {
 }
 
 // Whether the board may begin to drive by itself: a fault ends by resume first.
-static bool may_begin(const gc_board *board) { return board->state != GC_FAULT && !board->supply_low; }
+static bool may_begin(const gc_board *board) {
+  return board->state != GC_FAULT && !board->supply_low && !board->reserved;
+}
 
 static uint8_t home(gc_board *board) {
-  if (!may_begin(board) || (drives(board) && board->state != GC_STANDALONE)) {
+  if (!may_begin(board) || (gc_board_drives(board) && board->state != GC_STANDALONE)) {
     return GC_WRONG_STATE;
   }
   if (!gc_board_motors_answer(board)) {
@@ -132,7 +130,8 @@ static uint8_t home(gc_board *board) {
 }
 
 static uint8_t run(gc_board *board) {
-  if ((board->state != GC_HOLDING || board->homing.phase != GC_HOMED) && drives(board)) {
+  const bool held = board->state == GC_HOLDING && board->homing.phase == GC_HOMED;
+  if (gc_board_drives(board) && !held && board->state != GC_FOLLOWING) {
     return GC_WRONG_STATE;
   }
   if (!may_begin(board) || !board->has_controller || !all_have_zeros(board)) {
@@ -163,7 +162,7 @@ static uint8_t act(gc_board *board, uint32_t action) {
     case GC_ACT_RUN:
       return run(board);
     case GC_ACT_RESTART:
-      if (drives(board)) {
+      if (gc_board_drives(board)) {
         return GC_WRONG_STATE;
       }
       board->restart = true;
@@ -182,7 +181,7 @@ static uint8_t perform(gc_board *board, uint8_t operation, uint32_t key, uint32_
     case GC_SAVE:
       return save(board, *value);
     case GC_DEFAULTS:
-      if (drives(board)) {
+      if (gc_board_drives(board)) {
         return GC_WRONG_STATE;
       }
       gc_parameters_default(&board->parameters);

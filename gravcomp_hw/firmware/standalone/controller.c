@@ -8,7 +8,7 @@
 #define GC_LONGEST_INTERVAL 0.1f     // s in which cables are paid out in one step after a pause
 #define GC_LARGEST_DAMPING 1e4f      // damping.py
 #define GC_SMALLEST_CHANGE 5e-5f     // of the length
-#define GC_BACK_AND_FORTH -0.3f
+#define GC_BACK_AND_FORTH (-0.3f)
 #define GC_RATE_MARGIN 1e-6f         // m
 #define GC_TENSION_MARGIN 1e-3f      // N
 
@@ -122,6 +122,8 @@ static void take(gc_inverse_controller *controller, const gc_inverse_problem *pr
   const float reach = s->displacement_rate * interval;
   float tension[GC_CABLES_MAX], change[GC_CABLES_MAX], largest = 0.0f;
   bool at_rate = false, at_travel = false;
+  gc_zero(tension, sizeof tension);
+  gc_zero(change, sizeof change);
   for (uint32_t i = 0; i < m; ++i) {
     tension[i] = gc_clamp(solution->unknowns[i] * problem->scale[i], problem->tension_lower[i], problem->tension_upper[i]);
   }

@@ -267,7 +267,6 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
   const gc_model *model = state->model;
   const float length = model->settings->length;
   state->loaded = state->loaded < GC_LOADING_STEPS ? state->loaded + 1u : GC_LOADING_STEPS;
-  shape->loaded = state->loaded == GC_LOADING_STEPS;
   const float share = (float)state->loaded / (float)GC_LOADING_STEPS;
   const float gravity[3] = {share * full_gravity[0], share * full_gravity[1], share * full_gravity[2]};
   if (model->slides) {

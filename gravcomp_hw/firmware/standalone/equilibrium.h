@@ -10,7 +10,7 @@
 #include "cables.h"
 #include "elasticity.h"
 
-#define GC_LOADING_STEPS 100u  // calls after a reset over which gravity rises from zero
+#define GC_LOADING_STEPS 50u  // calls after a reset over which gravity rises from zero
 #define GC_EFFECTOR_ROWS 6u  // position and direction of the tip
 
 #define GC_ANSWERS_MAX (GC_CABLES_MAX + 4u)
@@ -18,7 +18,6 @@
 // Shape of the robot and its linear response to the tensions, as gravcomp.full_model.shape.Response.
 typedef struct {
   bool converged;                                             // false: the last equilibrium
-  bool loaded;                                                // the whole gravity acts
   float tip[3];                                               // m, soft_base
   float direction[3];                                         // of the tip
   float tension[GC_CABLES_MAX];                               // N
@@ -54,7 +53,7 @@ typedef struct {
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model);
 
 // Track the equilibrium to gravity (3,) in m/s^2 in soft_base and to cables pulled in to `wound` (m,) in m, NaN: released.
-// After a reset gravity rises from zero over GC_LOADING_STEPS calls; `loaded` of the shape is false until then.
+// After a reset gravity rises from zero over GC_LOADING_STEPS calls, so that one step a call finds each equilibrium.
 // Where none is found the shape is the last equilibrium, from which the next call starts.
 void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, gc_shape *shape);
 

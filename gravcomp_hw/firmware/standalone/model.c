@@ -18,13 +18,36 @@ size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_
   return sizeof(gc_model_header) + sizeof(float) * float_count(modes, strains, cables, pieces, points) + numbers;
 }
 
-static bool all_finite(const float *values, size_t count) {
+#define GC_PART 16384u  // bytes of a check until it says that it goes on
+
+static void say_alive(gc_alive *alive) {
+  if (alive != NULL) {
+    alive();
+  }
+}
+
+static bool all_finite(const float *values, size_t count, gc_alive *alive) {
   for (size_t i = 0; i < count; ++i) {
+    if (i % (GC_PART / sizeof(float)) == 0u) {
+      say_alive(alive);
+    }
     if (!gc_finite(values[i])) {
       return false;
     }
   }
   return true;
+}
+
+static uint32_t crc_of(const uint8_t *data, size_t size, gc_alive *alive) {
+  uint32_t crc = 0u;
+  while (size > 0u) {
+    const size_t part = size < GC_PART ? size : GC_PART;
+    crc = gc_crc32(crc, data, part);
+    data += part;
+    size -= part;
+    say_alive(alive);
+  }
+  return crc;
 }
 
 static bool fits(const gc_model_header *h) {
@@ -33,12 +56,17 @@ static bool fits(const gc_model_header *h) {
          h->pieces >= 1u && h->pieces <= GC_PIECES_MAX && h->points <= GC_POINTS_MAX;
 }
 
-gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, const uint8_t *robot) {
+uint32_t gc_model_magic(const uint8_t *blob, size_t size) {
+  return size < sizeof(gc_model_header) ? 0u : ((const gc_model_header *)(const void *)blob)->magic;
+}
+
+gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, uint32_t magic, const uint8_t *robot,
+                              gc_alive *alive) {
   if (size < sizeof(gc_model_header)) {
     return GC_MODEL_CUT_OFF;
   }
   const gc_model_header *header = (const gc_model_header *)(const void *)blob;
-  if (header->magic != GC_MODEL_MAGIC) {
+  if (magic != GC_MODEL_MAGIC) {
     return GC_MODEL_FOREIGN;
   }
   if (header->version != GC_MODEL_VERSION || header->settings != GC_SETTINGS_FLOATS) {
@@ -54,7 +82,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
     return GC_MODEL_WRONG_SIZE;
   }
   const size_t before = offsetof(gc_model_header, robot);
-  if (gc_crc32(0u, blob + before, header->size - before) != header->crc) {
+  if (crc_of(blob + before, header->size - before, alive) != header->crc) {
     return GC_MODEL_WRONG_CRC;
   }
   for (uint32_t i = 0; robot != NULL && i < GC_ROBOT_BYTES; ++i) {
@@ -66,7 +94,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   const uint32_t n = header->points;
   const float *next = (const float *)(const void *)(blob + sizeof(gc_model_header));
   const size_t count = float_count(r, k, m, s, n);
-  if (!all_finite(next, count)) {
+  if (!all_finite(next, count, alive)) {
     return GC_MODEL_NOT_FINITE;
   }
   const uint8_t *numbers = (const uint8_t *)(next + count);

@@ -78,10 +78,18 @@ typedef struct {
   bool slides;                    // a cable has friction
 } gc_model;
 
+// Called again and again while something takes long, so that a watchdog does not bite.
+typedef void gc_alive(void);
+
 // Check the blob of `size` bytes, 4-byte aligned, and set the model's pointers into it; the model is written only on success.
 //
-// robot: digest that the blob must have, NULL: any.
-gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, const uint8_t *robot);
+// magic: the first word, which may not be in the blob yet; robot: digest that the blob must have, NULL: any; alive: called at
+// least every 16 KB of the check, NULL: nothing is.
+gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, uint32_t magic, const uint8_t *robot,
+                              gc_alive *alive);
+
+// Return the first word of a blob of `size` bytes, 0 where there is none.
+uint32_t gc_model_magic(const uint8_t *blob, size_t size);
 
 // Return the number of bytes of a blob with these counts, all of them within the maxima.
 size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces, uint32_t points);

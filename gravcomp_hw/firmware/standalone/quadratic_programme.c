@@ -201,6 +201,7 @@ static bool missed(const distance_problem *p, active_set *active, float elastic,
 // or the steps do not suffice.
 static bool solved(const distance_problem *p, float elastic, active_set *active, float *v, uint32_t *steps) {
   float wanted[GC_ACTIVE_MAX], change[GC_ACTIVE_MAX];
+  gc_zero(wanted, sizeof wanted);
   active->count = 0;
   for (uint32_t step = 0; step < GC_QP_STEPS_MAX; ++step) {
     ++*steps;

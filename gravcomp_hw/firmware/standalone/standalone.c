@@ -7,13 +7,22 @@
 #define GC_STANDARD_GRAVITY 9.80665f
 #define GC_COUNTS 32767.0f
 #define GC_DEGREE 0.0174532925f
+#define GC_PAUSE 1.0f  // s between two samples after which the loop starts again
 
 static const float COUNTS_PER_G[4] = {10920.0f, 5460.0f, 2730.0f, 1365.0f};              // of the ranges 3, 6, 12, 24 g
 static const float FULL_RATE[5] = {2000.0f, 1000.0f, 500.0f, 250.0f, 125.0f};            // deg/s
 
-bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
+void gc_standalone_moved(gc_standalone *loop, const gc_model *model) {
+  loop->model = *model;
+  loop->gravity.settings = loop->model.settings;
+  loop->gravity.filter.settings = loop->model.settings;
+  loop->equilibrium.model = &loop->model;
+  loop->controller.model = &loop->model;
+}
+
+bool gc_standalone_take(gc_standalone *loop, const uint8_t *blob, size_t size, uint32_t magic, gc_alive *alive) {
   gc_model model;
-  loop->refusal = gc_model_open(&model, blob, size, loop->loaded ? loop->model.robot : NULL);
+  loop->refusal = gc_model_open(&model, blob, size, magic, loop->loaded ? loop->model.robot : NULL, alive);
   if (loop->refusal != GC_MODEL_OK) {
     return false;
   }
@@ -76,15 +85,11 @@ static bool by_motors(const gc_standalone *loop, uint8_t motors, float *displace
   return true;
 }
 
-bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval) {
+void gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval) {
   gc_equilibrium_step(&loop->equilibrium, gravity, loop->controller.displacement, &loop->shape);
-  if (!loop->shape.loaded) {
-    return false;
-  }
   const gc_target target = loop->joystick ? gc_target_joystick(loop->model.settings, loop->stick[0], loop->stick[1])
                                           : gc_target_stored(loop->model.settings);
   gc_inverse_step(&loop->controller, &loop->shape, &target, interval);
-  return true;
 }
 
 bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t motors, float *displacement, float *tension) {
@@ -92,8 +97,15 @@ bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t mo
     return false;
   }
   const float interval = elapsed(loop, sample->time);
-  return weigh(loop, sample) && gc_standalone_follow(loop, loop->down, interval) &&
-         by_motors(loop, motors, displacement, tension);
+  if (interval > GC_PAUSE) {  // the base may have turned anywhere
+    gc_equilibrium_reset(&loop->equilibrium, &loop->model);
+    gc_inverse_reset(&loop->controller, &loop->model);
+  }
+  if (!weigh(loop, sample)) {
+    return false;
+  }
+  gc_standalone_follow(loop, loop->down, interval);
+  return by_motors(loop, motors, displacement, tension);
 }
 
 bool gc_standalone_receive(void *context, const gc_frame *frame, gc_frame *reply) {

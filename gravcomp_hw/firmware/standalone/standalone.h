@@ -15,7 +15,7 @@
 #define GC_ID_JOYSTICK GC_ID_MODEL_FIRST  // x and y int16 (1 / 32767), mode uint8: 0 stored target, 1 joystick; 0; 0; check
 #define GC_ID_LOOP_STATUS 0x318u          // code, model status, modes, solver's steps uint8; largest left um uint16; 0; check
 
-// State of the loop; zeros before the first gc_standalone_load.
+// State of the loop; zeros before the first gc_standalone_take.
 typedef struct {
   gc_model model;
   bool loaded;
@@ -34,12 +34,16 @@ typedef struct {
 } gc_standalone;
 
 // Take a model from flash and start again with the stored target. Returns false for a blob that is refused; what was loaded
-// before goes on. After the first model only those of the same robot are taken.
-bool gc_standalone_load(gc_standalone *loop, const uint8_t *blob, size_t size);
+// before goes on. After the first model only those of the same robot are taken. magic and alive: of gc_model_open.
+bool gc_standalone_take(gc_standalone *loop, const uint8_t *blob, size_t size, uint32_t magic, gc_alive *alive);
 
-// Compute the command for gravity (3,) in m/s^2 in soft_base, `interval` s after the last one. Returns false while the model's
-// load rises after a start; the command, in loop->controller, is then the displacement 0.
-bool gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval);
+// Let a loop that was copied to another place in memory go on with the same model, `model`, which was opened there.
+void gc_standalone_moved(gc_standalone *loop, const gc_model *model);
+
+// Compute the command for gravity (3,) in m/s^2 in soft_base, `interval` s after the last one; it is in loop->controller. After a
+// start the model's gravity rises within half a second, and the command with it: the robot goes from where it sags to the target
+// without a jump.
+void gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval);
 
 // Compute targets of the motors from a sample. motors: bits of those that exist; displacement (8,) in m, positive: pulled in,
 // and tension (8,) in N, both by the number of the motor less 1. Returns false while there is nothing to send: the motors hold.

@@ -62,7 +62,7 @@ static void keep(const uint8_t *bytes, size_t size) {
 }
 
 static size_t changed(uint8_t *bytes) {
-  static const uint16_t ids[] = {0x1FF, 0x200, 0x201, 0x203, 0x206, 0x310, 0x315, 0x320, 0x322, 0x328, 0x32F};
+  static const uint16_t ids[] = {0x1FF, 0x200, 0x201, 0x203, 0x206, 0x310, 0x315, 0x320, 0x322, 0x328, 0x329, 0x32A, 0x32F};
   const input *base = &corpus[draw((uint32_t)kept)];
   size_t size = base->size;
   memcpy(bytes, base->bytes, size);
@@ -109,7 +109,7 @@ static void load(const char *path) {
   static uint8_t bytes[LONGEST];
   FILE *file = fopen(path, "rb");
   if (file == NULL) {
-    fprintf(stderr, "%s cannot be read\n", path);
+    (void)fprintf(stderr, "%s cannot be read\n", path);
     exit(2);
   }
   const size_t size = fread(bytes, 1u, LONGEST, file);
@@ -123,7 +123,7 @@ static void store(const char *folder, const uint8_t *bytes, size_t size) {
   (void)snprintf(path, sizeof path, "%s/%04zu.bin", folder, kept);
   FILE *file = fopen(path, "wb");
   if (file == NULL || fwrite(bytes, 1u, size, file) != size) {
-    fprintf(stderr, "%s cannot be written\n", path);
+    (void)fprintf(stderr, "%s cannot be written\n", path);
     exit(2);
   }
   (void)fclose(file);
@@ -132,7 +132,7 @@ static void store(const char *folder, const uint8_t *bytes, size_t size) {
 int main(int count, char **words) {
   static uint8_t bytes[LONGEST];
   if (count < 4) {
-    fprintf(stderr, "fuzz FRAMES SEED OUT FILE...\n");
+    (void)fprintf(stderr, "fuzz FRAMES SEED OUT FILE...\n");
     return 2;
   }
   const uint64_t wanted = strtoull(words[1], NULL, 10);
@@ -156,7 +156,7 @@ int main(int count, char **words) {
       }
     }
   }
-  printf("{\"frames\": %llu, \"samples\": %llu, \"answers\": %llu, \"violations\": %llu, \"edges\": %zu, \"found\": %zu}\n",
+  (void)printf("{\"frames\": %llu, \"samples\": %llu, \"answers\": %llu, \"violations\": %llu, \"edges\": %zu, \"found\": %zu}\n",
          (unsigned long long)gc_counted.frames, (unsigned long long)gc_counted.samples,
          (unsigned long long)gc_counted.answers, (unsigned long long)gc_counted.violations, edges, kept - given);
   return 0;

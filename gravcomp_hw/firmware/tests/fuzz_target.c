@@ -18,6 +18,7 @@
 gc_tally gc_counted;
 
 static gc_host host;
+static gc_host_loop loop;  // without a model
 static uint32_t host_time;
 static uint32_t heater_time;
 static bool host_seen;
@@ -138,6 +139,7 @@ static void give_sample(const uint8_t **data, size_t *size) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   const uint32_t id[3] = {1u, 2u, 3u};
   gc_zero(&host, sizeof host);
+  host.loop = &loop;
   gc_host_lose_supply_after(&host, 0xFFFFFFFFu);
   gc_host_start(&host, id, GC_RESET_POWER);
   host_seen = false;

@@ -19,6 +19,7 @@ from gravcomp.firmware.host_board import MOTOR_BUS, HostBoard
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.settings import settings_of
 from gravcomp.firmware.stack import largest_stack
+from gravcomp.graph.parameters.virtual_robot import BOARDS
 from gravcomp.trials.turning_base import residuals
 
 _AMPERES = 0.5  # of the host before it dies, where the robot's limit allows that
@@ -71,15 +72,17 @@ def run(progress: Callable[[str], None], *, frames: int = 200_000, seed: int = 1
 
 
 def _loop(progress: Callable[[str], None]) -> dict:
-    """Return the lateral residuals with the Python board and with the C code, and their difference in per cent."""
+    """Return the lateral residuals at rest and turning with each board, and the differences from the Python board's in %."""
     found = {}
-    for board in ("virtual", "emulated"):
+    for board in BOARDS:
         progress(f"the loop with the {board} board")
-        found[board] = residuals(Setup.of(load_robot_file("article")), 0, board=board).held
-    difference = 100.0 * (found["emulated"] / found["virtual"] - 1.0)
+        found[board] = residuals(Setup.of(load_robot_file("article")), 0, board=board)
+    held = {board: of.held for board, of in found.items()}
     return {
-        "lateral_mm": {board: round(1e3 * value, 4) for board, value in found.items()},
-        "emulated_residual_pct": round(abs(difference), 2),
+        "lateral_mm": {
+            board: {"held": round(1e3 * of.held, 4), "moving": round(1e3 * of.moving, 4)} for board, of in found.items()
+        },
+        **{f"{board}_residual_pct": round(100.0 * (held[board] / held["virtual"] - 1.0), 2) for board in BOARDS[1:]},
     }
 
 

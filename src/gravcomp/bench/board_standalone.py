@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import RobotFile, load_robot_file
 from gravcomp.firmware.cycles import Cycles, loop_cycles, sample_bytes
 from gravcomp.firmware.emulator.machine import STACK_SIZE
@@ -22,7 +21,6 @@ from gravcomp.recordings.imu import Recording
 from gravcomp.recordings.imu.broad_folder import broad_trials
 from gravcomp.reduction import load
 from gravcomp.training import build
-from gravcomp.trials.turning_base import residuals
 
 Progress = Callable[[str], None]
 
@@ -46,7 +44,6 @@ def run(progress: Progress, *, every: int = 1) -> dict:
         **memory(progress, found),
         **step_time(progress, file, found, every),
         **estimator(progress, file, found, every),
-        **(residual(progress) if every == 1 else {}),
     }
 
 
@@ -151,16 +148,6 @@ def gravity_difference(recording: Recording, file: RobotFile, blob: bytes) -> fl
         board[row] = loop.gravity
     apart = _unit(board) - _unit(host)
     return float(np.nanmax(2.0 * np.arcsin(0.5 * np.linalg.norm(apart, axis=1))))
-
-
-def residual(progress: Progress) -> dict:
-    """Return `standalone_lateral_mm`: of the virtual robot held straight, at rest and turning, with both loops."""
-    found = {}
-    for board in ("virtual", "standalone"):
-        progress(f"the virtual robot, loop of the {board} board")
-        errors = residuals(Setup.of(load_robot_file("article")), 0, board=board)
-        found[board] = {"held": round(1e3 * errors.held, 4), "moving": round(1e3 * errors.moving, 4)}
-    return {"standalone_lateral_mm": found}
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

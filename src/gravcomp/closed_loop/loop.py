@@ -25,9 +25,9 @@ from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.firmware import requests
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
-from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
@@ -81,9 +81,10 @@ class ClosedLoop:
 
         delay: samples between a command and its arrival at the bridge; heating: the temperature control runs; warm: the board
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
-        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there; or "standalone": the
-        firmware's loop in C computes the commands in place of filter, simulator and inverse problem, which needs a reduced model.
-        Raises RuntimeError where the bridge does not start, ConfigError for a robot that does not fit the board.
+        load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. From the first
+        `hold` on the board "standalone" computes the commands and drives the motors by itself; the host then only listens, and
+        its simulator follows the board's commands. It needs a reduced model. Raises RuntimeError where the bridge does not start,
+        ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
         self._virtual = VirtualRobot(
@@ -92,10 +93,11 @@ class ClosedLoop:
             setup.virtual_hardware,
             seed=setup.seed,
             motion=motion,
-            board="virtual" if board == _STANDALONE else board,
+            board=board,
             scene=setup.scene,
+            model=blob_for(_parameters(setup)) if board == _STANDALONE else None,
         )
-        self._on_board = StandaloneLoop(blob_for(_parameters(setup))) if board == _STANDALONE else None
+        self._has_loop, self._alone = board == _STANDALONE, False  # alone: the board drives the motors by itself
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
@@ -166,7 +168,9 @@ class ClosedLoop:
         return self._load.estimate(self._gravity, self.time)
 
     def release(self) -> None:
-        """Pay the cables out: the robot is without compensation."""
+        """Pay the cables out: the robot is without compensation. A board that has held by itself lets go of the motors."""
+        if self._alone:
+            self._outgoing.append(requests.act("stop"))
         self._target = None
 
     def hold(self, target: Target, *, weightless: bool = False) -> None:
@@ -177,6 +181,9 @@ class ClosedLoop:
         """
         if self._target is None:
             self._problem.reset(self._cables)
+            if self._has_loop:
+                self._outgoing.append(requests.act("run"))
+                self._alone = True
         options = self.setup.controller.inverse
         self._problem.options = dataclasses.replace(options, pretension=0.0) if weightless else options
         self._target, self._weightless = target, weightless
@@ -208,7 +215,7 @@ class ClosedLoop:
             if sample is not None:
                 self._on_sample(sample)
         self._steps += 1
-        if self._steps % _CONTROL_STEPS == 0:
+        if self._steps % _CONTROL_STEPS == 0 and not self._alone:
             self._outgoing += self._bridge.tick(now)
         if self._heater is not None and self._steps % round(_HEATER_PERIOD / _BUS_STEP) == 0:
             self._outgoing.append(codec.encode("HeaterCommand", duty=self._heater.state.duty, sequence=self._steps // 50 % 256))
@@ -221,8 +228,6 @@ class ClosedLoop:
         estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
         if not isinstance(estimate, Problem):
             self._gravity = np.array(estimate.gravity)
-        if self._on_board is not None:
-            self._on_board.weigh(stamp_ns // 1000, sample.angular_rate, sample.specific_force)
         released = self._target is None
         gravity = np.zeros(3) if self._weightless and not released else self._gravity
         # The model starts at rest and relaxed, and creeps from then on.
@@ -236,7 +241,7 @@ class ClosedLoop:
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
         self._arriving.append((self._sent, tension))
         arrived = self._arriving.popleft()
-        if arrived is not None and not self._waiting:
+        if arrived is not None and not self._waiting and not self._alone:
             refused = self._bridge.command(arrived[0].tolist(), arrived[1].tolist(), self.time)
             if refused:
                 raise RuntimeError(f"the bridge refused a command at {self.time:.2f} s: {refused}")
@@ -279,9 +284,8 @@ class ClosedLoop:
         return self.setup.hardware.transmission.possible(displacement, np.zeros(len(free))), np.zeros(len(free))
 
     def _compensated(self, shape: Shape, target: Target) -> tuple[np.ndarray, np.ndarray]:
-        if self._on_board is not None:
-            self._on_board.follow(SAMPLE_PERIOD)
-            result = self._on_board.read()
+        if self._has_loop:
+            result = self._virtual.firmware.loop()
             return result.displacement, result.tension
         command = self._problem.step(
             shape.response,

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from gravcomp.launcher import Graph
     from gravcomp.launcher.host_client import NodeHost
 
-BOARDS = ("virtual", "emulated")
 _SHORTEST = 10.0  # s: a shorter run shows neither sag nor compensation
 _TURNING = 0.2  # rad/s: above the rate of a hand at rest plus the gyroscope's bias
 _START_TIMEOUT = 300.0  # s: on the first start on a machine Numba compiles
@@ -30,6 +29,8 @@ _BROWSER_TIME = 200.0  # s from the end of the run until a browser shows the pag
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    from gravcomp.graph.parameters.virtual_robot import BOARDS
+
     parser.description = (
         "Run the four nodes, a virtual robot on a private CAN bus and the viewer as processes; print the figures of the run."
     )
@@ -45,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--board",
         default="virtual",
         choices=BOARDS,
-        help="board of the virtual robot: virtual, Python code (default), or emulated, the firmware's C code between the"
-        " host's bus and the motors",
+        help="board of the virtual robot: virtual, Python code (default); emulated, the firmware's C code between the host's bus"
+        " and the motors; or standalone, that with the loop on the board, which compensates while the nodes only listen",
     )
     add_composed_argument(parser)
     add_tracker_argument(parser)
@@ -108,14 +109,19 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
         pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
-    graph = RobotGraph(args.robot, "udp_multicast", channels, parameters={"virtual_robot": motion}, seed=args.seed)
+    alone = args.board == "standalone"
+    parameters: dict[str, dict] = {"virtual_robot": motion}
+    if alone:
+        _check_alone(args.robot)
+        parameters["fem_simulator"] = {"cables_from": "state"}  # the model follows the motors that the board drives
+    graph = RobotGraph(args.robot, "udp_multicast", channels, parameters=parameters, seed=args.seed)
     loop = graph.loop(virtual=True, composed=args.composed)
     nodes = [spec.executable for spec in graph.loop(virtual=True)] + ["virtual_robot"]
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
         judge = graph.node(
             "gravcomp_hw", "judge", duration=args.duration, relax_time=relax_time, settle_time=min(4.0, 0.15 * args.duration),
-            start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes,
+            start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes, standalone=alone, measure_delay=not alone,
         )  # fmt: skip
         specs = [*loop, judge]
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
@@ -148,6 +154,19 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if problem:
         raise ConfigError(problem)
     return 0
+
+
+def _check_alone(robot: str) -> None:
+    """Make the model of the loop on the board, before any process starts. Raises ConfigError for a robot that has none."""
+    from gravcomp.config import ConfigError
+    from gravcomp.description import load_robot_file
+    from gravcomp.firmware.model_fit import blob_for
+    from gravcomp.firmware.model_settings import LoopParameters
+
+    file = load_robot_file(robot)
+    if file.has_joints:
+        raise ConfigError(f"{robot}: --board standalone needs motors on the board's bus; this robot has hardware.joints")
+    blob_for(LoopParameters.of(file))
 
 
 def _begin_of_motion(path: str) -> float:
@@ -233,8 +252,14 @@ def _summary(figures: dict[str, Any]) -> "Table":
         ("settled after", figures["settle_s"], "s"),
         ("correlation of model and ground truth", figures["correlation"], ""),
         ("error of gravity", figures["gravity_error_deg"], "deg RMS"),
-        ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),
-        ("delay, IMU to motor current, median / p99", f"{delay['median']} / {delay['p99']}", "ms"),
+        *(
+            [("IMU rate", figures["imu_rate_hz"], "Hz")]
+            if figures["board"] == "standalone"
+            else [
+                ("IMU / command rate", f"{figures['imu_rate_hz']} / {figures['command_rate_hz']}", "Hz"),
+                ("delay, IMU to motor current, median / p99", f"{delay['median']} / {delay['p99']}", "ms"),
+            ]
+        ),
         ("nodes", ", ".join(f"{name} {state}" for name, state in figures["nodes"].items()), ""),
     ]
     for name, value, unit in rows:

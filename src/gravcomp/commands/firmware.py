@@ -7,7 +7,7 @@ from pathlib import Path
 from gravcomp.commands import output
 from gravcomp.commands.parsers import add_subcommand
 
-_TESTS = ("src/test/test_firmware.py", "src/test/test_virtual_board.py", "src/test/test_standalone.py")
+_TESTS = tuple(f"src/test/test_{name}.py" for name in ("firmware", "virtual_board", "standalone", "model_transfer"))
 _FOLDER = "build/firmware"
 
 
@@ -33,6 +33,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     model.add_argument(
         "--joystick-bend", type=float, default=60.0, metavar="DEG", help="bend at full deflection of the joystick (default: 60)"
     )
+    send = add_subcommand(
+        choices, "send", "send a model to the loop on the board over CAN; the board keeps the old one until it is whole"
+    )
+    send.add_argument("model", metavar="FILE", help="file that `firmware model` wrote")
+    send.add_argument(
+        "--forget", action="store_true", help="let the board forget its model first, so that it takes that of another robot"
+    )
+    send.add_argument("--interface", required=True, help="python-can interface, e.g. socketcan")
+    send.add_argument("--channel", required=True, help="channel of the bus, e.g. can0")
     settings = add_subcommand(choices, "parameters", "write a robot's parameters into the board over CAN, and store them")
     settings.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
     settings.add_argument("--number", type=int, default=255, metavar="N", help="number of the board (default: the only one)")
@@ -46,7 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: done, 1: a test failed or the board refused. Raises ConfigError, SetupError."""
     subcommands = {
-        "install": _install, "build": _build, "flash": _flash, "test": _test, "model": _model, "parameters": _parameters,
+        "install": _install, "build": _build, "flash": _flash, "test": _test, "model": _model, "send": _send,
+        "parameters": _parameters,
     }  # fmt: skip
     return subcommands[args.subcommand](args)
 
@@ -132,6 +142,27 @@ def _model(args: argparse.Namespace) -> int:
     return 0
 
 
+def _send(args: argparse.Namespace) -> int:
+    from gravcomp.config import ConfigError
+    from gravcomp.description.hardware import CanInterface
+    from gravcomp.firmware.client import BoardClient
+    from gravcomp.firmware.model_transfer import forgetting, sending
+
+    path = Path(args.model)
+    try:
+        blob = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(
+            f"{path} cannot be read: {error.strerror}; `./gravcomp firmware model ROBOT` writes such a file"
+        ) from None
+    with BoardClient(CanInterface(args.interface, args.channel)) as client:
+        if args.forget:
+            client.transfer(forgetting())
+        client.transfer(sending(blob))
+    output.result({"model": str(path), "bytes": len(blob)}, f"The board uses the model {path}, and keeps it")
+    return 0
+
+
 def _flash(args: argparse.Namespace) -> int:
     import subprocess
 
@@ -154,24 +185,28 @@ def _test(args: argparse.Namespace) -> int:
     from gravcomp.environment.packages import provide_extra
     from gravcomp.firmware.fuzzing import fuzz
     from gravcomp.firmware.line_coverage import measure
+    from gravcomp.firmware.static_check import findings
     from gravcomp.firmware.toolchain import provide
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
     provide_extra("development", root)
     provide()
+    found = findings()
+    for line in found:
+        output.note(line)
     coverage = measure(list(_TESTS), root)
     for file, lines in coverage.missed.items():
         output.note(f"{file}: not reached: {', '.join(map(str, lines))}")
     fuzzed = fuzz(args.frames, args.seed)
-    good = not fuzzed.fault and fuzzed.violations == 0
+    good = not fuzzed.fault and fuzzed.violations == 0 and not found
     figures = {
         "coverage_pct": coverage.percent, "lines": coverage.lines, "lines_reached": coverage.reached, "frames": fuzzed.frames,
-        "violations": fuzzed.violations, "fault": fuzzed.fault, "edges": fuzzed.edges,
+        "violations": fuzzed.violations, "fault": fuzzed.fault, "edges": fuzzed.edges, "findings": len(found),
     }  # fmt: skip
     output.result(
         figures,
-        f"Tests passed; {coverage.percent} % of {coverage.lines} lines reached; {fuzzed.frames} hostile frames,"
-        f" {fuzzed.violations} violations{', fault: ' + fuzzed.fault if fuzzed.fault else ''}",
+        f"Tests passed; clang-tidy finds {len(found)}; {coverage.percent} % of {coverage.lines} lines reached;"
+        f" {fuzzed.frames} hostile frames, {fuzzed.violations} violations{', fault: ' + fuzzed.fault if fuzzed.fault else ''}",
     )
     return 0 if good else 1
 

@@ -19,12 +19,14 @@ from pathlib import Path
 from gravcomp.environment.errors import SetupError
 from gravcomp.environment.installer import install
 from gravcomp.environment.interpreter import Interpreter
+from gravcomp.environment.progress import note
 
 BUILD_LOCK = "requirements-build.lock"
 EXTRAS = {
     "browser": ("requirements-browser.lock", "Packages for pictures of the page"),
     "mesher": ("requirements-mesher.lock", "Meshers of surfaces"),
     "development": ("requirements-development.lock", "Packages for tests and checks"),
+    "clang": ("requirements-clang.lock", "Checker of C code"),
     "reports": ("requirements-reports.lock", "Packages for figures"),
 }
 """Locks that are installed on demand: file and title."""
@@ -77,17 +79,35 @@ def provide_extra(name: str, root: "Path | None" = None) -> None:
     if name in _SUFFICES and importlib.util.find_spec(_SUFFICES[name]):
         return
     lock, title = EXTRAS[name]
-    stamp = Path(sys.prefix) / f"{name}.key"
-    key = hashlib.sha256((root / lock).read_bytes()).hexdigest()
-    if _read(stamp) == key:
+    provide_lock(root, lock, title, Path(sys.prefix) / f"{name}.key")
+
+
+def is_provided(root: Path, lock: str, stamp: Path) -> bool:
+    """Return whether `stamp` says that the packages of a lock file in `root` are installed."""
+    return _read(stamp) == _key(root / lock)
+
+
+def provide_lock(root: Path, lock: str, title: str, stamp: Path, target: Path | None = None, notice: str = "") -> None:
+    """Install the packages of a lock file in `root` unless `stamp` says that they are.
+
+    target: folder of their own, default the running environment; notice: is said before. Raises SetupError.
+    """
+    if is_provided(root, lock, stamp):
         return
-    with open(Path(sys.prefix) / "lock", "w") as alone:
+    stamp.parent.mkdir(parents=True, exist_ok=True)
+    with open(stamp.parent / "lock", "w") as alone:
         fcntl.flock(alone, fcntl.LOCK_EX)
-        if _read(stamp) == key:  # installed by another process meanwhile
+        if is_provided(root, lock, stamp):  # installed by another process meanwhile
             return
-        install(root, Path(sys.executable), root / lock, title)
+        if notice:
+            note(notice)
+        install(root, Path(sys.executable), root / lock, title, target=target)
         importlib.invalidate_caches()
-        stamp.write_text(key)
+        stamp.write_text(_key(root / lock))
+
+
+def _key(lock: Path) -> str:
+    return hashlib.sha256(lock.read_bytes()).hexdigest()
 
 
 def _read(path: Path) -> str:

@@ -10,11 +10,12 @@ from gravcomp.canbus.bus import BusError, open_bus
 from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import CanInterface
-from gravcomp.firmware import requests
+from gravcomp.firmware import model_transfer, requests
 from gravcomp.firmware.requests import Answer
 from gravcomp.firmware.settings import ANY_BOARD, value_of
 
 _PATIENCE = 1.0  # s for an answer; storing stops the board for half of it
+_ERASING = 5.0  # s for an answer after a sector of a model is erased
 _LISTEN = 0.5  # s for a heartbeat
 
 
@@ -44,6 +45,19 @@ class BoardClient:
             if answer is not None and answer.key == message.data[2] and answer.operation == message.data[1]:
                 return answer
         raise ConfigError(self._why_silent())
+
+    def transfer(self, steps: model_transfer.Step) -> None:
+        """Send the frames of a transfer of a model and pass the answers to it. Raises ConfigError where the board refuses."""
+        answer: model_transfer.ModelAnswer | None = None
+        try:
+            messages = next(steps)
+            while True:
+                for message in messages:
+                    self.send(message)
+                answer = next((a for frame in self.listen(_ERASING) if (a := model_transfer.answer_of(frame))), None)
+                messages = steps.send(answer)
+        except StopIteration:
+            return
 
     def send(self, message: can.Message) -> None:
         """Send a frame that has no answer. Raises ConfigError where the bus does not take it."""

@@ -14,9 +14,8 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from gravcomp.firmware.elf import read_elf
+from gravcomp.firmware.emulator.core import CCM, CCM_SIZE, FLASH, FLASH_SIZE, RAM, RAM_SIZE, RETURN, Core
 from gravcomp.firmware.image import Image
-from gravcomp.firmware.toolchain import provide
 
 CLOCK_HZ = 168e6
 MODEL_AT = 0x08040000
@@ -25,9 +24,7 @@ MODEL_AT = 0x08040000
 MEMORY_AT = 0x20008000
 """Begin of the RAM that the image's own data leave free."""
 
-_FLASH, _FLASH_SIZE, _RAM, _RAM_SIZE = 0x08000000, 0x100000, 0x20000000, 0x20000
-_STACK, _STACK_SIZE = 0x10000000, 0x10000
-_RETURN, _LINE, _WAIT, _WAIT_BEHIND, _INSTRUCTION_LINES = 0x08007FF0, 4, 5, 1, 64
+_LINE, _WAIT, _WAIT_BEHIND, _INSTRUCTION_LINES = 4, 5, 1, 64
 _TAKEN = 2
 _CHAINED = ("vmla", "vmls", "vfma", "vfms", "vnmla", "vnmls", "vfnma", "vfnms")
 _BRANCHES = frozenset(
@@ -73,60 +70,43 @@ class _Lines:
             self._last = line
 
 
-class Processor:
+class Processor(Core):
     """The processor with an image and a model, without peripherals: functions are called one by one."""
 
     def __init__(self, image: Image, blob: bytes = b"", counts: bool = False):
         """counts: the cycles of each call are counted, which is slow. Raises SetupError without the emulator."""
-        provide()
+        super().__init__(image)
         import capstone
-        import unicorn
-        from unicorn import arm_const
 
-        self._arm, self._unicorn = arm_const, unicorn
         self._disassembler = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_THUMB | capstone.CS_MODE_MCLASS)
         self._disassembler.detail = True
-        self._uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
-        uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
-        uc.mem_map(_FLASH, _FLASH_SIZE)
-        uc.mem_map(_RAM, _RAM_SIZE)
-        uc.mem_map(_STACK, _STACK_SIZE)
-        elf = read_elf(image.path.read_bytes())
+        uc, elf = self._uc, self._elf
+        uc.mem_map(FLASH, FLASH_SIZE)
         for address, _, data in elf.segments:
             uc.mem_write(address, data)
         start, end, source = (elf.symbols[f"gc_data_{name}"] for name in ("start", "end", "source"))
         uc.mem_write(start, bytes(uc.mem_read(source, end - start)))  # as the image's start does
         uc.mem_write(MODEL_AT, blob)
-        self.symbols = elf.symbols
         self._functions = sorted((address & ~1, name) for name, address in elf.symbols.items() if address & 1)
         self._blocks: dict[int, tuple[int, int, bool, str]] = {}
         self._counter: _Counter | None = None
         if counts:  # a hook of the emulator has to be there before it translates the code
-            uc.hook_add(unicorn.UC_HOOK_BLOCK, lambda *values: self._counter and self._counter.block(*values))
+            uc.hook_add(self._unicorn.UC_HOOK_BLOCK, lambda *values: self._counter and self._counter.block(*values))
         self._counts = counts
-
-    def write(self, address: int, data: bytes) -> None:
-        """Write bytes into the memory."""
-        self._uc.mem_write(address, data)
-
-    def read(self, address: int, count: int) -> bytes:
-        """Return bytes of the memory."""
-        return bytes(self._uc.mem_read(address, count))
 
     def call(self, name: str, *arguments: int) -> tuple[int, Cycles | None]:
         """Call a function; return its result and, where they are counted, its cycles."""
         uc, arm = self._uc, self._arm
-        stack = _STACK + _STACK_SIZE - 8 * ((max(0, len(arguments) - 4) + 1) // 2)
-        registers = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3)
-        for register, value in zip(registers, arguments):
-            uc.reg_write(register, value)
-        for place, value in enumerate(arguments[4:]):
-            uc.mem_write(stack + 4 * place, struct.pack("<I", value))
-        uc.reg_write(arm.UC_ARM_REG_SP, stack)
-        uc.reg_write(arm.UC_ARM_REG_LR, _RETURN | 1)
+        uc.reg_write(arm.UC_ARM_REG_SP, CCM + CCM_SIZE)
+        start = self._enter(name, arguments)
         self._counter = _Counter(self) if self._counts else None
-        uc.emu_start(self.symbols[name] | 1, _RETURN)
+        uc.emu_start(start, RETURN)
         return uc.reg_read(arm.UC_ARM_REG_R0), self._counter.result() if self._counter else None
+
+    def take_model(self, blob: bytes) -> bool:
+        """Let the loop at MEMORY_AT take the model; return whether it does."""
+        magic = int.from_bytes(blob[:4], "little")
+        return bool(self.call("gc_standalone_take", MEMORY_AT, MODEL_AT, len(blob), magic, 0)[0] & 0xFF)
 
     def block_at(self, address: int, size: int) -> tuple[int, int, bool, str]:
         """Return cost, end, whether it ends with a branch, and function of a block of instructions."""
@@ -191,7 +171,7 @@ class _Counter:
             self._executed[self._last[3]] += _TAKEN
         self._executed[block[3]] += block[0]
         self._last = block
-        if address < _FLASH + _FLASH_SIZE:
+        if address < FLASH + FLASH_SIZE:
             self._code.touch(address, address + size - 1)
 
 
@@ -207,14 +187,13 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
     """
     plain, counting = Processor(image, blob), Processor(image, blob, counts=True)
     sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
-    taken, _ = plain.call("gc_standalone_load", MEMORY_AT, MODEL_AT, len(blob))
-    if not taken & 0xFF:
+    if not plain.take_model(blob):
         raise RuntimeError("the image refuses the model")
     counted = []
     for number, data in enumerate(samples):
         processor = counting if number >= uncounted else plain
         if number == uncounted:
-            counting.write(_RAM, plain.read(_RAM, _RAM_SIZE))
+            counting.write(RAM, plain.read(RAM, RAM_SIZE))
         processor.write(sample, data)
         _, cycles = processor.call("gc_standalone_step", MEMORY_AT, sample, motors, targets, targets + 64)
         if cycles is not None:

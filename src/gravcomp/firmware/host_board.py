@@ -8,6 +8,7 @@ import can
 from gravcomp.config import ConfigError
 from gravcomp.firmware.host_library import Frame, load
 from gravcomp.firmware.settings import keys, word_of
+from gravcomp.firmware.standalone_loop import LoopResult, RawResult
 
 HOST_BUS, MOTOR_BUS = 0, 1
 """Numbers of the board's buses; the second carries frames only where the board sits between host and motors."""
@@ -16,31 +17,44 @@ _ALL_WORDS = 0xFFFFFFFF
 
 
 class HostBoard:
-    """One board. Its stored parameters outlive `restart`.
+    """One board. Its stored parameters and models outlive `restart`.
 
-    `unique_id`: three words, as burnt into the chip. Raises SetupError without a compiler, ConfigError for wrong settings.
+    `unique_id`: three words, as burnt into the chip; model: blob of the loop on the board, empty: firmware with the loop and
+    without a model, None: without the loop. Raises SetupError without a compiler, ConfigError for wrong settings.
     """
 
-    def __init__(self, settings: Mapping[str, float] | None = None, unique_id: tuple[int, int, int] = (1, 2, 3)):
+    def __init__(
+        self,
+        settings: Mapping[str, float] | None = None,
+        unique_id: tuple[int, int, int] = (1, 2, 3),
+        model: bytes | None = None,
+    ):
         self._unique_id = (ctypes.c_uint32 * 3)(*unique_id)
-        self._allocate()
+        self._allocate(model is not None)
+        self._library.gc_host_attach(self._at, self._loop_at)
+        if model is not None:
+            self._library.gc_host_put_model(self._at, model, len(model))
         self.lose_supply_after(_ALL_WORDS)
         self.restart()
         self.set(settings or {})
 
-    def _allocate(self) -> None:
+    def _allocate(self, loop: bool) -> None:
         self._library = load()
         self._memory = (ctypes.c_uint64 * (self._library.gc_host_size() // 8 + 1))()
         self._at = ctypes.addressof(self._memory)
+        self._loop = (ctypes.c_uint64 * (self._library.gc_host_loop_size() // 8 + 1))() if loop else None
+        self._loop_at = None if self._loop is None else ctypes.addressof(self._loop)
         self._frame = Frame()
 
     def __deepcopy__(self, memo: dict) -> "HostBoard":
         """Return a board in the same state."""
         other = HostBoard.__new__(HostBoard)
         other._unique_id = (ctypes.c_uint32 * 3)(*self._unique_id)
-        other._allocate()
+        other._allocate(self._loop is not None)
         ctypes.memmove(other._at, self._at, ctypes.sizeof(self._memory))
-        other._library.gc_host_attach(other._at)
+        if self._loop is not None and other._loop is not None:
+            ctypes.memmove(other._loop, self._loop, ctypes.sizeof(self._loop))
+        other._library.gc_host_attach(other._at, other._loop_at)
         return other
 
     def restart(self, cause: int = 0) -> None:
@@ -92,6 +106,12 @@ class HostBoard:
     def bus_off(self, bus: int, off: bool) -> None:
         """Let a bus be off, or on again."""
         self._library.gc_host_bus_off(self._at, bus, off)
+
+    def loop(self) -> LoopResult:
+        """Return the last results of the loop on the board, of a board that has one."""
+        result = RawResult()
+        self._library.gc_host_loop_read(self._at, ctypes.addressof(result))
+        return LoopResult.of(result)
 
     @property
     def duty(self) -> float:

@@ -43,8 +43,11 @@ def load() -> ctypes.CDLL:
     u8, u32, flag, i16 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_bool, ctypes.c_int16
     for name, result, arguments in (
         ("size", ctypes.c_size_t, ()),
+        ("loop_size", ctypes.c_size_t, ()),
         ("start", None, (memory, ctypes.POINTER(u32), u8)),
-        ("attach", None, (memory,)),
+        ("attach", None, (memory, memory)),
+        ("loop_read", None, (memory, memory)),
+        ("put_model", None, (memory, ctypes.c_char_p, ctypes.c_size_t)),
         ("lose_supply_after", None, (memory, u32)),
         ("set", flag, (memory, u32, u32)),
         ("get", u32, (memory, u32)),

@@ -9,7 +9,7 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.inverse import InverseController
 from gravcomp.simulation import Simulator
 
-LOADING_STEPS = 100
+LOADING_STEPS = 50
 """Steps over which gravity rises after a start, on the board as well (GC_LOADING_STEPS)."""
 
 APPROACH_STEPS = 400
@@ -29,15 +29,17 @@ class HostRun:
 
 
 def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.ndarray) -> HostRun:
-    """Return the loop's run over gravities (n, 3) from the straight robot with its cables at 0."""
+    """Return the loop's run over gravities (n, 3) from the straight robot with its cables at 0.
+
+    Before that the first one rises from zero over LOADING_STEPS, and the command with it.
+    """
     simulator, target = Simulator(model), parameters.straight
     controller = InverseController(model.robot, parameters.controller.inverse)
     wound = np.zeros(len(model.robot.cables))
     controller.reset(wound)
-    for step in range(1, LOADING_STEPS):
-        simulator.step(step / LOADING_STEPS * gravities[0], wound)
+    rising = np.arange(1, LOADING_STEPS)[:, None] / LOADING_STEPS * gravities[0]
     rows = []
-    for gravity in gravities:
+    for gravity in (*rising, *gravities):
         shape = simulator.step(gravity, wound)
         command = controller.step(
             shape.response,
@@ -49,7 +51,7 @@ def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.nda
         )
         rows.append((gravity, wound, shape.tip_position, command.displacement))
         wound = command.displacement
-    return HostRun(*(np.array(column) for column in zip(*rows)))
+    return HostRun(*(np.array(column) for column in zip(*rows[len(rising) :])))
 
 
 def turning_gravity(rate: float, seed: int, steps: int, gravity: float = 9.81) -> np.ndarray:

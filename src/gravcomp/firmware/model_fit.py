@@ -1,15 +1,27 @@
 """Which basis of a reduced model the board has room and time for, what it costs, and the error of a smaller one."""
 
 import dataclasses
+import os
 from collections.abc import Iterator
 
 import numpy as np
 
 from gravcomp.cables.friction import Sliding
+from gravcomp.cache import cache_path, content_key
 from gravcomp.config import ConfigError
 from gravcomp.firmware.cycles import CLOCK_HZ
 from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
-from gravcomp.firmware.model_blob import MODES_MAX, PIECES_MAX, POINTS_MAX, STRAINS_MAX, TILE, blob_bytes, pack, truncated
+from gravcomp.firmware.model_blob import (
+    MODES_MAX,
+    PIECES_MAX,
+    POINTS_MAX,
+    STRAINS_MAX,
+    TILE,
+    VERSION,
+    blob_bytes,
+    pack,
+    truncated,
+)  # fmt: skip
 from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
@@ -81,9 +93,20 @@ def reduction_for(model: RobotModel, source: str) -> Reduction:
 
 
 def blob_for(parameters: LoopParameters) -> bytes:
-    """Return the blob of a robot. Raises ConfigError where it does not fit, or its reduced model is not built."""
+    """Return the blob of a robot, kept by content in the cache.
+
+    Raises ConfigError where it does not fit, or its reduced model is not built.
+    """
     model = RobotModel(parameters.robot)
-    return fit(model, reduction_for(model, parameters.source), parameters).blob
+    reduction = reduction_for(model, parameters.source)
+    of_reduction = reduction.basis, reduction.elasticity.linear, reduction.elasticity.quadratic
+    own = dataclasses.replace(parameters, source="")
+    path = cache_path("firmware", content_key(own, *of_reduction, VERSION, SLOT_BYTES, LONGEST_MS, list(_EXTRA)), ".model")
+    if not path.exists():
+        partial = path.with_suffix(f".{os.getpid()}")
+        partial.write_bytes(fit(model, reduction, parameters).blob)
+        partial.replace(path)
+    return path.read_bytes()
 
 
 def cost(model: ReducedModel) -> tuple[int, float]:

@@ -55,7 +55,7 @@ RESULTS = (
 )  # fmt: skip
 """Meaning of the code in BoardReply.result, its low four bits."""
 
-SAVE_WORD = 0x53415645
+SAVE_WORD, FORGET_WORD = 0x53415645, 0x464F5247
 ANY_BOARD = 255
 BETWEEN = 1
 """Wiring: the board sits between the host's bus and that of the motors."""

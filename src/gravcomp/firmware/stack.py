@@ -21,7 +21,9 @@ _INTERRUPTS = (
 )
 """Handlers by priority: on the stack can be the main loop and one of each priority."""
 
-_POINTED = ("erase", "write", "gc_standalone_receive")
+_POINTED = (
+    "erase_parameters", "write_parameters", "erase_model", "write_model", "gc_model_store_receive", "alive",
+)  # fmt: skip
 """Functions whose addresses are taken: where a call through a pointer may go."""
 
 _THUNK = "Thunk_"  # what the linker puts between code in the flash and in RAM, with the name of the target behind it

@@ -18,7 +18,9 @@ REFUSALS = (
 """Why the firmware refuses a blob, by gc_model_status of standalone/model.h; the first is that of a blob that is taken."""
 
 
-class _Result(ctypes.Structure):
+class RawResult(ctypes.Structure):
+    """`gc_loop_result` of boards/host/loop.h."""
+
     _fields_ = (
         ("gravity", ctypes.c_float * 3),
         ("tip", ctypes.c_float * 3),
@@ -28,6 +30,7 @@ class _Result(ctypes.Structure):
         ("code", ctypes.c_uint32),
         ("converged", ctypes.c_uint32),
         ("solver_steps", ctypes.c_uint32),
+        ("cables", ctypes.c_uint32),
     )
 
 
@@ -49,6 +52,21 @@ class LoopResult:
     converged: bool
     solver_steps: int
 
+    @classmethod
+    def of(cls, raw: RawResult) -> "LoopResult":
+        """Return what the C code says."""
+        m = raw.cables
+        return cls(
+            gravity=np.array(raw.gravity, dtype=float),
+            tip=np.array(raw.tip, dtype=float),
+            displacement=np.array(raw.displacement[:m], dtype=float),
+            tension=np.array(raw.tension[:m], dtype=float),
+            left=raw.left,
+            code=raw.code,
+            converged=bool(raw.converged),
+            solver_steps=raw.solver_steps,
+        )
+
 
 class StandaloneLoop:
     """One loop with its model. Raises SetupError without a compiler, ConfigError for a blob that the firmware refuses."""
@@ -63,15 +81,14 @@ class StandaloneLoop:
             ("weigh", ctypes.c_bool, (memory, ctypes.c_int64, floats, floats)),
             ("follow", ctypes.c_bool, (memory, floats, ctypes.c_float)),
             ("joystick", None, (memory, ctypes.c_float, ctypes.c_float)),
-            ("read", None, (memory, ctypes.POINTER(_Result))),
+            ("read", None, (memory, ctypes.POINTER(RawResult))),
         ):
             function = getattr(library, f"gc_loop_{name}")
             function.restype, function.argtypes = result, arguments
         self._library = library
         self._memory = (ctypes.c_uint64 * (library.gc_loop_size() // 8 + 1))()
         self._at = ctypes.addressof(self._memory)
-        self._result = _Result()
-        self._cables = 0
+        self._result = RawResult()
         refusal = self.load(blob)
         if refusal:
             raise ConfigError(f"the firmware refuses the model: {refusal}")
@@ -83,7 +100,6 @@ class StandaloneLoop:
         status = self._library.gc_loop_load(self._at, ctypes.addressof(memory), len(blob))
         if status == 0:
             self._blob = memory  # the firmware reads it in place
-            self._cables = int(np.frombuffer(blob, "<u4", 1, 40)[0])
         return REFUSALS[status]
 
     def weigh(self, stamp_us: int, gyro: Sequence[float], accel: Sequence[float]) -> bool:
@@ -114,18 +130,8 @@ class StandaloneLoop:
 
     def read(self) -> LoopResult:
         """Return the last results."""
-        result, m = self._result, self._cables
-        self._library.gc_loop_read(self._at, result)
-        return LoopResult(
-            gravity=np.array(result.gravity, dtype=float),
-            tip=np.array(result.tip, dtype=float),
-            displacement=np.array(result.displacement[:m], dtype=float),
-            tension=np.array(result.tension[:m], dtype=float),
-            left=result.left,
-            code=result.code,
-            converged=bool(result.converged),
-            solver_steps=result.solver_steps,
-        )
+        self._library.gc_loop_read(self._at, self._result)
+        return LoopResult.of(self._result)
 
 
 def _floats(values: Sequence[float]) -> ctypes.Array:

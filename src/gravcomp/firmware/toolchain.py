@@ -6,16 +6,12 @@ target; Debian's gcc-arm-none-eabi needs root and another version on each releas
 """
 
 import contextlib
-import fcntl
-import hashlib
 import os
 import sys
 from pathlib import Path
 
-from gravcomp.config import ConfigError
 from gravcomp.environment.errors import SetupError
-from gravcomp.environment.installer import install
-from gravcomp.environment.progress import note
+from gravcomp.environment.packages import is_provided, provide_lock
 from gravcomp.firmware.sources import firmware_folder
 
 LOCK = "requirements-firmware.lock"
@@ -28,22 +24,15 @@ def tools_folder() -> Path:
 
 
 def installed() -> bool:
-    """Return whether the pinned tools are there."""
-    stamp = tools_folder() / "packages.key"
-    return stamp.exists() and stamp.read_text() == _key()
+    """Return whether the pinned tools are there. Raises ConfigError outside a clone of the repository."""
+    return is_provided(_root(), LOCK, _stamp())
 
 
 def provide() -> Path:
     """Return the folder of the tools, installed when they are missing. Raises SetupError, ConfigError."""
     folder = tools_folder()
-    if not installed():
-        folder.mkdir(parents=True, exist_ok=True)
-        with open(folder / "lock", "w") as alone:
-            fcntl.flock(alone, fcntl.LOCK_EX)
-            if not installed():
-                note("Installing the firmware's tools: Zig, Unicorn (100 MB to load, 480 MB on the disk)")
-                install(_root(), Path(sys.executable), _root() / LOCK, "Firmware's tools", target=folder / "packages")
-                (folder / "packages.key").write_text(_key())
+    notice = "Installing the firmware's tools: Zig, Unicorn (100 MB to load, 480 MB on the disk)"
+    provide_lock(_root(), LOCK, "Firmware's tools", _stamp(), folder / "packages", notice)
     if str(folder / "packages") not in sys.path:
         sys.path.append(str(folder / "packages"))
     return folder
@@ -65,8 +54,5 @@ def _root() -> Path:
     return firmware_folder().parent.parent
 
 
-def _key() -> str:
-    lock = _root() / LOCK
-    if not lock.exists():
-        raise ConfigError(f"{lock} is missing")
-    return hashlib.sha256(lock.read_bytes()).hexdigest()
+def _stamp() -> Path:
+    return tools_folder() / "packages.key"

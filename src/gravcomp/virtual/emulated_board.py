@@ -1,6 +1,8 @@
 """The virtual board whose frames come from the firmware's own C code (`gravcomp.firmware`); its IMU is that of `VirtualBoard`.
 
 The board sits between the host and the motors of its bus: it limits currents, holds and releases the cables when the host dies.
+With a model it has the loop on the board as well, which the host's request `run` starts. The cables' zero positions are then
+known from the start, as after homing: there they are where the straight robot has them.
 """
 
 import can
@@ -9,10 +11,14 @@ import numpy as np
 from gravcomp.canbus import c610
 from gravcomp.canbus.codec import encode
 from gravcomp.description.hardware import Hardware
+from gravcomp.firmware import requests
 from gravcomp.firmware.host_board import HOST_BUS, MOTOR_BUS, HostBoard
 from gravcomp.firmware.settings import settings_of
 from gravcomp.virtual.imu_chip import SAMPLE_PERIOD, ImuChip
 from gravcomp.virtual.parameters import Board
+
+LOOP_FRAMES = range(0x328, 0x330)
+"""Ids of the frames to the loop on the board (canbus/FRAMES.md)."""
 
 _STATUS = 0x313
 _COUNTS_PER_DEGREE, _ZERO_DEGREES = 8.0, 23.0
@@ -21,10 +27,17 @@ _COUNTS_PER_DEGREE, _ZERO_DEGREES = 8.0, 23.0
 class EmulatedBoard:
     """State of the board. Attribute: chip (the IMU, with its faults).
 
-    hardware: its motors' parameters; None: a board for the IMU alone. Raises SetupError without a C compiler.
+    hardware: its motors' parameters; None: a board for the IMU alone; model: blob of the loop on the board; None: without the
+    loop. Raises SetupError without a C compiler.
     """
 
-    def __init__(self, parameters: Board, random: np.random.Generator, hardware: Hardware | None = None):
+    def __init__(
+        self,
+        parameters: Board,
+        random: np.random.Generator,
+        hardware: Hardware | None = None,
+        model: bytes | None = None,
+    ):
         self._parameters = parameters
         self.chip = ImuChip(parameters, random)
         self.between = hardware is not None
@@ -33,7 +46,8 @@ class EmulatedBoard:
             "accelerometer_range": parameters.accelerometer_range,
             "gyroscope_range": parameters.gyroscope_range,
         }
-        self._board = HostBoard()
+        self._board = HostBoard(model=model)
+        self._without_zero = {m.can_id for m in hardware.motors} if hardware and model is not None else set()
         self._time = 0.0
         self._last: dict[int, can.Message] = {}  # currents and feedback by id, which continue while time is skipped
         self.restart()
@@ -67,6 +81,10 @@ class EmulatedBoard:
         for message in messages:
             self._last[message.arbitration_id] = message
             self._board.receive(message, MOTOR_BUS if self.between else HOST_BUS)
+            motor = c610.motor_of(message.arbitration_id)
+            if motor in self._without_zero:
+                self._without_zero.remove(motor)
+                self.receive(requests.request("zero", motor - 1))
 
     def command_heater(self, duty: float) -> None:
         """Take a HeaterCommand."""

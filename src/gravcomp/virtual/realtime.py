@@ -17,6 +17,7 @@ from gravcomp.canbus.buses import CanBuses
 from gravcomp.canbus.codec import layout
 from gravcomp.canbus.precedence import take_precedence
 from gravcomp.description.hardware import Hardware
+from gravcomp.virtual.emulated_board import LOOP_FRAMES
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.truth import Truth
 
@@ -26,7 +27,7 @@ _BURST = 0.02  # s of frames sent together after a pause; receivers' socket buff
 _LONGEST_LAG = 0.1  # s
 _STEER_PERIOD = 0.01  # s
 
-RECEIVED_FRAMES = (*c610.COMMANDS, "HeaterCommand")
+RECEIVED_FRAMES = (*c610.COMMANDS, "HeaterCommand", "BoardRequest")
 
 
 class RealtimeRobot:
@@ -45,7 +46,8 @@ class RealtimeRobot:
         `steer` returns the orientation (3, 3), world from soft_base, to turn the base to, or None. Compiles the kernels first.
         """
         self.robot, self.lock = robot, threading.Lock()
-        self.link = CanBuses(hardware.all_buses, hardware.board_bus.name, [layout(name).frame_id for name in RECEIVED_FRAMES])
+        received = [*(layout(name).frame_id for name in RECEIVED_FRAMES), *LOOP_FRAMES]
+        self.link = CanBuses(hardware.all_buses, hardware.board_bus.name, received)
         self._wires = len(hardware.all_buses)
         self.lost_time = 0.0
         self.error: BaseException | None = None

@@ -19,6 +19,7 @@ from gravcomp.canbus.codec import FrameError, decode
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
+from gravcomp.firmware.host_board import HostBoard
 from gravcomp.scene.scene import Scene
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
@@ -27,7 +28,7 @@ from gravcomp.virtual.board import STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.dynamics import MovingRod
-from gravcomp.virtual.emulated_board import EmulatedBoard
+from gravcomp.virtual.emulated_board import LOOP_FRAMES, EmulatedBoard
 from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.frame_faults import FrameFaults
@@ -57,14 +58,16 @@ class VirtualRobot:
         motion: BaseMotion | None = None,
         board: str = "virtual",
         scene: Scene | None = None,
+        model: bytes | None = None,
     ):
         """Start in the static equilibrium.
 
         `seed` replaces the one of the parameters; it also decides what they do not give. Without `motion` the base is at rest and
-        the robot horizontal; `board`: 'virtual', Python code, or 'emulated', the firmware's; `scene`: walls around the robot,
-        whose world begins where the base is at first. Where the robot in equilibrium would lie in a wall it starts unloaded.
-        Raises ConfigError where the motors do not match the cables, where the parameters describe no robot, where the rod cannot
-        represent it, and where the unloaded robot is in a wall.
+        the robot horizontal; `board`: 'virtual', Python code, 'emulated', the firmware's, or 'standalone', the firmware's with
+        the loop on the board, whose blob is `model`; `scene`: walls around the robot, whose world begins where the base is at
+        first. Where the robot in equilibrium would lie in a wall it starts unloaded. Raises ConfigError where the motors do not
+        match the cables, where the parameters describe no robot, where the rod cannot represent it, and where the unloaded robot
+        is in a wall.
         """
         if hardware.cables != robot.cable_names:
             raise ConfigError(f"motors for the cables {', '.join(hardware.cables)}; the robot has {', '.join(robot.cable_names)}")
@@ -78,7 +81,7 @@ class VirtualRobot:
         self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true), around)
         self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
         self._board: VirtualBoard | EmulatedBoard = (
-            EmulatedBoard(true.board, imu, hardware) if board == "emulated" else VirtualBoard(true.board, imu)
+            VirtualBoard(true.board, imu) if board == "virtual" else EmulatedBoard(true.board, imu, hardware, model)
         )
         self._base = MovingBase(
             motion or StaticMotion(base_orientation(0.0)),
@@ -125,6 +128,12 @@ class VirtualRobot:
     def faults(self) -> tuple[Fault, ...]:
         """Faults that act at present."""
         return self._faults.all
+
+    @property
+    def firmware(self) -> HostBoard:
+        """The board's C code, of a robot whose board is not 'virtual'."""
+        assert isinstance(self._board, EmulatedBoard)
+        return self._board.firmware
 
     def turn_base(self, orientation: np.ndarray) -> None:
         """Turn the base to `orientation` (3, 3), world from soft_base, and keep it there; this ends the motion that it had."""
@@ -223,7 +232,10 @@ class VirtualRobot:
         try:
             name, values = decode(frame)
         except FrameError:
-            self.refused += 1
+            if isinstance(self._board, EmulatedBoard) and frame.arbitration_id in LOOP_FRAMES:
+                self._board.receive(frame)
+            else:
+                self.refused += 1
             return
         bus = self._bus_index.get(str(frame.channel), self._board_bus)
         if bus != self._board_bus or not self._board.between:

@@ -3,17 +3,34 @@
 #define GC_HOST_H
 
 #include "../../core/board.h"
+#include "../../standalone/model_store.h"
+#include "loop.h"
+
+// The loop on the board, with its two places for models.
+typedef struct {
+  gc_standalone standalone;
+  gc_model_store store;
+  uint32_t models[GC_MODEL_SLOTS][GC_MODEL_SLOT / 4u];
+} gc_host_loop;
 
 typedef struct {
   gc_board board;
   gc_parameter_record places[2];
   uint32_t words_left;  // that can still be written before the supply is lost
+  gc_host_loop *loop;   // NULL: firmware without the loop on the board
 } gc_host;
 
 size_t gc_host_size(void);
+size_t gc_host_loop_size(void);
 
-// Let a board that was copied to another place in memory use its own stored places.
-void gc_host_attach(gc_host *host);
+// Let a board that was copied to another place in memory use its own stored places, and the copy of its loop, NULL: it has none.
+void gc_host_attach(gc_host *host, gc_host_loop *loop);
+
+// Erase both places for models of a board with a loop, and put a blob of `size` bytes into the first.
+void gc_host_put_model(gc_host *host, const uint8_t *blob, size_t size);
+
+// Read the last results of the loop.
+void gc_host_loop_read(const gc_host *host, gc_loop_result *result);
 
 // Start as after a reset; the stored places keep what they have.
 void gc_host_start(gc_host *host, const uint32_t *unique_id, uint8_t reset_cause);

@@ -7,7 +7,7 @@ size_t gc_loop_size(void) { return sizeof(gc_standalone); }
 size_t gc_loop_settings(void) { return sizeof(gc_settings) / sizeof(float); }
 
 uint32_t gc_loop_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
-  (void)gc_standalone_load(loop, blob, size);
+  (void)gc_standalone_take(loop, blob, size, gc_model_magic(blob, size), NULL);
   return (uint32_t)loop->refusal;
 }
 
@@ -21,7 +21,8 @@ bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval) {
   if (gravity == NULL && !loop->has_gravity) {
     return false;
   }
-  return gc_standalone_follow(loop, gravity != NULL ? gravity : loop->down, interval);
+  gc_standalone_follow(loop, gravity != NULL ? gravity : loop->down, interval);
+  return true;
 }
 
 void gc_loop_joystick(gc_standalone *loop, float x, float y) {
@@ -40,4 +41,5 @@ void gc_loop_read(const gc_standalone *loop, gc_loop_result *result) {
   result->code = (uint32_t)loop->controller.code;
   result->converged = loop->shape.converged ? 1u : 0u;
   result->solver_steps = loop->controller.solver_steps;
+  result->cables = loop->model.cables;
 }

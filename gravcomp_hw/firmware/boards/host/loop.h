@@ -14,6 +14,7 @@ typedef struct {
   uint32_t code;
   uint32_t converged;
   uint32_t solver_steps;
+  uint32_t cables;
 } gc_loop_result;
 
 // Bytes of a loop, and number of floats of its settings.

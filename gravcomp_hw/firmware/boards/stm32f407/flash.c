@@ -1,5 +1,6 @@
 #include "flash.h"
 
+#include "heater_pwm.h"
 #include "registers.h"
 
 #define FIRST_SECTOR 2u
@@ -49,14 +50,14 @@ static bool lock(void) {
   return good;
 }
 
-static bool erase(void *context, uint32_t place) {
+static bool erase_parameters(void *context, uint32_t place) {
   (void)context;
   unlock();
   erase_sector(FIRST_SECTOR + place);
   return lock();
 }
 
-static bool write(void *context, uint32_t place, const uint32_t *words, uint32_t count) {
+static bool write_parameters(void *context, uint32_t place, const uint32_t *words, uint32_t count) {
   (void)context;
   volatile uint32_t *to = (volatile uint32_t *)(uintptr_t)(place == 0u ? gc_parameters_a : gc_parameters_b);
   unlock();
@@ -69,8 +70,40 @@ static bool write(void *context, uint32_t place, const uint32_t *words, uint32_t
 gc_storage gc_flash_storage(void) {
   const gc_storage storage = {
       .places = {gc_parameters_a, gc_parameters_b},
-      .erase = erase,
-      .write = write,
+      .erase = erase_parameters,
+      .write = write_parameters,
   };
   return storage;
 }
+
+#ifdef GC_WITH_STANDALONE
+#define FIRST_MODEL_SECTOR 6u
+#define MODEL_SECTORS (GC_MODEL_SLOT / GC_MODEL_SECTOR)
+
+extern const uint8_t gc_model_a[], gc_model_b[];
+
+static bool erase_model(void *context, uint32_t slot, uint32_t sector) {
+  (void)context;
+  gc_heater_pwm_set(0u);  // for up to two seconds nobody watches it; the next tick sets it again
+  unlock();
+  erase_sector(FIRST_MODEL_SECTOR + MODEL_SECTORS * slot + sector);
+  return lock();
+}
+
+static bool write_model(void *context, uint32_t slot, uint32_t offset, uint32_t word) {
+  (void)context;
+  volatile uint32_t *to = (volatile uint32_t *)((uintptr_t)(slot == 0u ? gc_model_a : gc_model_b) + offset);
+  unlock();
+  write_word(to, word);
+  return lock() && *to == word;
+}
+
+gc_model_memory gc_flash_models(void) {
+  const gc_model_memory memory = {
+      .slots = {gc_model_a, gc_model_b},
+      .erase = erase_model,
+      .write = write_model,
+  };
+  return memory;
+}
+#endif

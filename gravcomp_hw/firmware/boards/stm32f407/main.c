@@ -15,7 +15,7 @@
 #include "watchdog.h"
 
 #ifdef GC_WITH_STANDALONE
-#include "../../standalone/standalone.h"
+#include "../../standalone/model_store.h"
 #endif
 
 #define RECEPTION_PRIORITY 0x10u  // and of the edge
@@ -31,8 +31,8 @@ static uint32_t turns_seen;
 static uint32_t ticks_without_turn;
 
 #ifdef GC_WITH_STANDALONE
-extern const uint8_t gc_model_a[], gc_model_b[], gc_model_size[];
 __attribute__((section(".ccm"))) static gc_standalone standalone;
+__attribute__((section(".ccm"))) static gc_model_store store;
 #endif
 
 static void enable(uint32_t number, uint8_t priority) {
@@ -73,6 +73,7 @@ void gc_on_tick(void) {
     }
     gc_board_bus_off(&board, bus, gc_can_is_off(bus));
   }
+  board.lost = rings[0].lost + rings[1].lost;
   gc_board_supply(&board, (PWR->csr & PWR_CSR_PVDO) != 0u);
   gc_bmi088_tick(&imu, &board.parameters, now);
   gc_board_tick(&board, now);
@@ -115,13 +116,43 @@ void gc_on_host_sent(void) { gc_can_send(&board, 0u); }
 void gc_on_motor_sent(void) { gc_can_send(&board, 1u); }
 
 #ifdef GC_WITH_STANDALONE
+static void alive(void) {
+  turns++;
+  gc_watchdog_feed();
+}
+
+static void note_model(void) {
+  board.has_controller = standalone.loaded;
+  board.faults = (uint16_t)(standalone.loaded ? board.faults & ~(uint32_t)GC_FAULT_MODEL : board.faults | (uint32_t)GC_FAULT_MODEL);
+}
+
 static void start_standalone(void) {
-  const size_t size = (size_t)(uintptr_t)gc_model_size;
-  board.has_controller = gc_standalone_load(&standalone, gc_model_a, size) || gc_standalone_load(&standalone, gc_model_b, size);
-  board.receiver = gc_standalone_receive;
-  board.receiver_context = &standalone;
-  if (!board.has_controller) {
-    board.faults |= GC_FAULT_MODEL;
+  store.memory = gc_flash_models();
+  store.memory.alive = alive;
+  store.loop = &standalone;
+  (void)gc_model_store_start(&store);
+  board.receiver = gc_model_store_receive;
+  board.receiver_context = &store;
+  note_model();
+}
+
+// Work on the frames of a new model.
+static void renew(void) {
+  while (gc_model_store_waits(&store)) {
+    gc_frame reply;
+    __asm__ volatile("cpsid i" ::: "memory");
+    const bool may_write = gc_board_reserve(&board);
+    __asm__ volatile("cpsie i" ::: "memory");
+    const bool answers = gc_model_store_work(&store, may_write, &reply);
+    __asm__ volatile("cpsid i" ::: "memory");
+    gc_board_unreserve(&board);
+    note_model();
+    if (answers) {
+      gc_queue_put(&board.queues[0], &reply);
+      gc_can_send(&board, 0u);
+    }
+    __asm__ volatile("cpsie i" ::: "memory");
+    turns++;
   }
 }
 
@@ -172,6 +203,7 @@ int main(void) {
     turns++;
 #ifdef GC_WITH_STANDALONE
     work();
+    renew();
 #endif
     __asm__ volatile("wfi");
   }

@@ -1,13 +1,20 @@
-"""Model of the flash's controller and of the two sectors of the parameters [RM0090, section 3.9].
+"""Model of the flash's controller and of the sectors that the firmware writes [RM0090, section 3.9].
 
 Writing can only clear bits, needs the bit PG, and is refused while the controller is locked. The supply can fail at any word.
+The two sectors of the parameters are here; those of the models are in the emulator's memory, because the image reads them all
+the time.
 """
 
+from collections.abc import Callable
+
 SECTOR = 0x4000
+MODELS, MODEL_SECTOR, MODELS_END = 0x08040000, 0x20000, 0x08100000
+"""Sectors 6 to 11."""
+
 _KEYS = (0x45670123, 0xCDEF89AB)
 _KEYR, _SR, _CR = 0x04, 0x0C, 0x10
 _PG, _SER, _STRT, _LOCK, _ERROR = 1, 2, 1 << 16, 1 << 31, 1 << 7
-_FIRST_SECTOR = 2
+_FIRST_SECTOR, _FIRST_MODEL_SECTOR = 2, 6
 
 
 class SupplyLost(Exception):
@@ -17,7 +24,9 @@ class SupplyLost(Exception):
 class FlashMemory:
     """State of controller and sectors. Attributes: data (both sectors), words_left (until the supply fails; None: never)."""
 
-    def __init__(self) -> None:
+    def __init__(self, erase_model: Callable[[int, int], None] | None = None) -> None:
+        """erase_model: takes address and size of a sector of the models that is erased."""
+        self._erase_model = erase_model
         self.data = bytearray(b"\xff" * 2 * SECTOR)
         self.words_left: int | None = None
         self.reset()
@@ -42,19 +51,28 @@ class FlashMemory:
             self._control = value
             if value & _STRT and value & _SER:
                 self._spend()
-                start = ((value >> 3 & 15) - _FIRST_SECTOR) * SECTOR
-                if 0 <= start < len(self.data):
-                    self.data[start : start + SECTOR] = b"\xff" * SECTOR
+                self._erase(value >> 3 & 15)
                 self._control &= ~_STRT
 
     def write(self, offset: int, size: int, value: int) -> None:
-        """Write to a sector as the processor does. Raises SupplyLost."""
+        """Write to a sector of the parameters as the processor does. Raises SupplyLost."""
+        before = int.from_bytes(self.data[offset : offset + size], "little")
+        self.data[offset : offset + size] = self.written(before, value).to_bytes(size, "little")
+
+    def written(self, before: int, value: int) -> int:
+        """Return what a place has that had `before` and to which the processor writes `value`. Raises SupplyLost."""
         if not self._control & _PG or self._control & _LOCK:
             self._status |= _ERROR
-            return
+            return before
         self._spend()
-        for k, byte in enumerate(value.to_bytes(size, "little")):
-            self.data[offset + k] &= byte
+        return before & value
+
+    def _erase(self, sector: int) -> None:
+        start = (sector - _FIRST_SECTOR) * SECTOR
+        if 0 <= start < len(self.data):
+            self.data[start : start + SECTOR] = b"\xff" * SECTOR
+        elif sector >= _FIRST_MODEL_SECTOR and self._erase_model is not None:
+            self._erase_model(MODELS + (sector - _FIRST_MODEL_SECTOR) * MODEL_SECTOR, MODEL_SECTOR)
 
     def _spend(self) -> None:
         if self.words_left is None:

@@ -17,16 +17,26 @@ _IDE, _RTR = 1 << 2, 1 << 1
 
 
 class ImageBoard:
-    """One board. Attribute: machine. Raises SetupError without tools, ConfigError for wrong settings."""
+    """One board. Attribute: machine.
+
+    image: default that without the loop on the board; model: blob of the loop, of an image that has one. Raises SetupError
+    without tools, ConfigError for wrong settings.
+    """
 
     def __init__(
         self,
         settings: Mapping[str, float] | None = None,
         unique_id: tuple[int, int, int] = (1, 2, 3),
         image: Image | None = None,
+        model: bytes | None = None,
     ):
-        self.machine = Machine(image or build_image(), unique_id)
+        self.machine = Machine(image or build_image(standalone=model is not None), unique_id)
         self._now = 0
+        if model:
+            self.machine.load_model(model)
+            self.machine.reset("power")
+            self.machine.resets.clear()
+            self.machine.resets.append("power")
         self.set(settings or {})
 
     def restart(self, cause: int = 0) -> None:
@@ -45,7 +55,7 @@ class ImageBoard:
     def word(self, name: str) -> int:
         """Return the 32 bits of a parameter."""
         at = self.machine.symbols["board"] + 4 * keys()[name]
-        return int.from_bytes(self.machine.read_memory(at, 4), "little")
+        return int.from_bytes(self.machine.read(at, 4), "little")
 
     def lose_supply_after(self, words: int) -> None:
         """Let the supply fail after this number of writes to the flash; negative: never."""

@@ -1,29 +1,28 @@
 """The processor and the peripherals around it: memory, registers by address, interrupts as calls of their handlers.
 
-Interrupts come while the image waits for them; a handler runs to its end. That is what the image's priorities give it, except for
-the interrupt of reception, which shares with the others nothing but rings with one writer and one reader.
+Interrupts come while the image waits for them, or where main's loop enters the function `preempted_in`; a handler runs to its
+end. That is what the image's priorities give it, except for the interrupt of reception, which shares with the others nothing but
+rings with one writer and one reader.
 """
 
 import struct
 from collections.abc import Callable
 from typing import Any
 
-from gravcomp.firmware.elf import read_elf
 from gravcomp.firmware.emulator.can_controller import CanController, WireFrame
-from gravcomp.firmware.emulator.flash_memory import FlashMemory, SupplyLost
+from gravcomp.firmware.emulator.core import CCM, RETURN, Core
+from gravcomp.firmware.emulator.flash_memory import MODELS, MODELS_END, FlashMemory, SupplyLost
 from gravcomp.firmware.emulator.imu_device import ImuDevice
 from gravcomp.firmware.image import BOOT_START, CODE_START, Image
-from gravcomp.firmware.toolchain import provide
 
 PARAMETERS, FLASH_END = 0x08008000, 0x08100000
-RAM, RAM_SIZE, CCM, CCM_SIZE, STACK_SIZE = 0x20000000, 0x20000, 0x10000000, 0x10000, 0x2000
+STACK_SIZE = 0x2000
 WATCHDOG = 40_000
 """us that the watchdog waits."""
 
 RESET_FLAGS = {"power": 1 << 27 | 1 << 25, "supply": 1 << 25, "watchdog": 1 << 29, "software": 1 << 28, "pin": 1 << 26}
 """RCC_CSR after a reset by cause."""
 
-_RETURN = 0x08007FF0  # nothing is there; a handler that returns comes to it
 _PAINT = 0xA5
 _START_PATIENCE = 30_000_000  # us
 _WFI = b"\x30\xbf"
@@ -38,41 +37,38 @@ class ProcessorFault(RuntimeError):
     """The image has done what the processor does not do: it hangs, or reads where nothing is."""
 
 
-class Machine:
+class Machine(Core):
     """The chip with an image.
 
-    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), duty, resets (their causes),
-    dead (nothing runs), symbols.
+    Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), preempted_in (name of a function
+    in which main's loop is left until the next tick has interrupted it; empty: none), preemptions (number of these), duty,
+    resets (their causes), dead (nothing runs).
     """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
         """Raises SetupError without the emulator."""
-        provide()
-        import unicorn
-        from unicorn import arm_const
-
-        self._arm = arm_const
-        self._error = unicorn.UcError
-        elf = read_elf(image.path.read_bytes())
-        self.symbols = elf.symbols
-        self._uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
-        uc.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
-        self.flash = FlashMemory()
+        super().__init__(image)
+        self._error = self._unicorn.UcError
+        uc = self._uc
+        self.flash = FlashMemory(self._erase_model)
+        self._unsettled: tuple[int, int, int] | None = None  # address, size and what was there, of a write to the models
         uc.mem_map(BOOT_START, PARAMETERS - BOOT_START)
         uc.mmio_map(PARAMETERS, CODE_START - PARAMETERS, self._read_parameters, None, self._write_parameters, None)
         uc.mem_map(CODE_START, FLASH_END - CODE_START)
-        uc.mem_map(RAM, RAM_SIZE)
-        uc.mem_map(CCM, CCM_SIZE)
         uc.mem_map(_UNIQUE, 0x1000)
         uc.mem_write(_UNIQUE + 0xA10, struct.pack("<3I", *unique_id))
         uc.mmio_map(_PERIPHERALS, 0x28000, self._read, None, self._write, None)
         uc.mmio_map(_SYSTEM, 0x1000, self._read_system, None, self._write_system, None)
-        self.code = image.code
+        if "gc_standalone_step" in self.symbols:
+            uc.hook_add(self._unicorn.UC_HOOK_MEM_WRITE, self._write_model, None, MODELS, MODELS_END - 1)
         self.load(image.boot, image.code)
         main = self.symbols["main"] & ~1
         self._wait = main + bytes(uc.mem_read(main, 4096)).index(_WFI)
         uc.ctl_exits_enabled(True)
-        uc.ctl_set_exits([self._wait, _RETURN, self.symbols["gc_stuck"] & ~1])
+        self._exits = [self._wait, RETURN, self.symbols["gc_stuck"] & ~1]
+        uc.ctl_set_exits(self._exits)
+        self.preempted_in, self.preemptions = "", 0
+        self._left = 0  # address at which main's loop was left, 0: it waits
         self.resets: list[str] = []
         self.supply_low = False
         self.main_stands = False
@@ -89,9 +85,9 @@ class Machine:
         self._uc.ctl_remove_cache(BOOT_START, PARAMETERS)
         self._uc.ctl_remove_cache(CODE_START, FLASH_END)
 
-    def read_memory(self, address: int, size: int) -> bytes:
-        """Read memory."""
-        return bytes(self._uc.mem_read(address, size))
+    def load_model(self, blob: bytes) -> None:
+        """Write a model into the first place for models; the other one is erased."""
+        self._uc.mem_write(MODELS, blob.ljust(MODELS_END - MODELS, b"\xff"))
 
     def reset(self, cause: str) -> None:
         """Start the image as after a reset, and run it until it waits. `dead` where it does not come so far."""
@@ -106,8 +102,10 @@ class Machine:
             can.received.clear()
             can.sent.clear()
         self.resets.append(cause)
+        self._unsettled = None
+        self._left = 0
         self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
-        stack, start = struct.unpack("<2I", self.read_memory(BOOT_START, 8))
+        stack, start = struct.unpack("<2I", self.read(BOOT_START, 8))
         self._uc.reg_write(self._arm.UC_ARM_REG_SP, stack)
         self.dead = False
         try:
@@ -122,8 +120,7 @@ class Machine:
             return
         self.interrupt("gc_on_tick")
         self._flush()
-        if not self.dead and not self.main_stands:
-            self._run(self._wait + 2 | 1, self._wait)
+        self._run_main()
         if self._restart:
             self.reset("software")
         elif (self.now - self._fed) & 0xFFFFFFFF > WATCHDOG:
@@ -139,8 +136,7 @@ class Machine:
         self.now = tick
         self.interrupt("gc_on_data_ready")
         self._flush()
-        if not self.dead and not self.main_stands:
-            self._run(self._wait + 2 | 1, self._wait)
+        self._run_main()
 
     def receive(self, bus: int, frames: list[WireFrame]) -> None:
         """Let frames come on a bus."""
@@ -153,19 +149,15 @@ class Machine:
     def interrupt(self, handler: str) -> None:
         """Run the handler of an interrupt; what it may change of main's registers is kept."""
         kept = self._uc.context_save()
-        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
-        self._run(self.symbols[handler] | 1, _RETURN)
+        self._uc.reg_write(self._arm.UC_ARM_REG_LR, RETURN | 1)
+        self._run(self.symbols[handler] | 1, RETURN)
         if not self.dead:
             self._uc.context_restore(kept)
 
     def call(self, name: str, *arguments: int) -> int:
         """Call a function of the image and return its result."""
-        registers = (self._arm.UC_ARM_REG_R0, self._arm.UC_ARM_REG_R1, self._arm.UC_ARM_REG_R2, self._arm.UC_ARM_REG_R3)
         kept = self._uc.context_save()
-        for register, value in zip(registers, arguments):
-            self._uc.reg_write(register, value)
-        self._uc.reg_write(self._arm.UC_ARM_REG_LR, _RETURN | 1)
-        self._run(self.symbols[name] | 1, _RETURN)
+        self._run(self._enter(name, arguments), RETURN)
         result = self._uc.reg_read(self._arm.UC_ARM_REG_R0)
         self._uc.context_restore(kept)
         return result
@@ -173,7 +165,7 @@ class Machine:
     @property
     def stack_used(self) -> int:
         """Bytes of the stack that were used since the reset, without the frames of interrupts."""
-        stack = self.read_memory(CCM, STACK_SIZE)
+        stack = self.read(CCM, STACK_SIZE)
         return STACK_SIZE - next((k for k, byte in enumerate(stack) if byte != _PAINT), STACK_SIZE)
 
     def _flush(self) -> None:
@@ -184,6 +176,27 @@ class Machine:
                 before = len(can.sent)
                 self.interrupt(handler)
 
+    def _run_main(self) -> None:
+        """Run main's loop until it waits, or until it enters `preempted_in`, from where the next call continues."""
+        if self.dead or self.main_stands:
+            return
+        start, stop = self._left or self._wait + 2, 0
+        if self.preempted_in and not self._left:
+            stop = self.symbols[self.preempted_in] & ~1
+            self._exit_at([*self._exits, stop])
+        waits = self._run(start, self._wait)
+        self._left = 0
+        if stop:
+            self._exit_at(self._exits)
+            if not waits and not self.dead and self._uc.reg_read(self._arm.UC_ARM_REG_PC) & ~1 == stop:
+                self._left = stop
+                self.preemptions += 1
+
+    def _exit_at(self, addresses: list[int]) -> None:
+        """End a run at these addresses: the emulator looks at them when it translates code."""
+        self._uc.ctl_set_exits(addresses)
+        self._uc.ctl_flush_tb()
+
     def _run(self, start: int, end: int, patience: int = 0) -> bool:
         """Run from an address until the image waits, returns or gives up; return whether that is `end`.
 
@@ -193,6 +206,7 @@ class Machine:
         self._failure: Exception | None = None
         try:
             self._uc.emu_start(start | 1, 0, timeout=patience)
+            self._guarded(self._settle)
         except self._error as error:
             at = self._uc.reg_read(self._arm.UC_ARM_REG_PC)
             raise ProcessorFault(f"at 0x{at:08X}: {error}") from error
@@ -221,6 +235,23 @@ class Machine:
     def _write_parameters(self, uc: Any, offset: int, size: int, value: int, _: Any) -> None:
         self._guarded(self.flash.write, offset, size, value)
 
+    def _erase_model(self, address: int, size: int) -> None:
+        self._uc.mem_write(address, b"\xff" * size)
+
+    def _write_model(self, uc: Any, _: int, address: int, size: int, value: int, __: Any) -> None:
+        """Take note of a write to the models: the emulator makes it, and `_settle` what the flash makes of it."""
+        self._guarded(self._settle)
+        self._unsettled = (address, size, int.from_bytes(uc.mem_read(address, size), "little"))
+
+    def _settle(self) -> None:
+        """Let the last place of the models that was written have what the flash has there then. Raises SupplyLost."""
+        if self._unsettled is None:
+            return
+        (address, size, before), self._unsettled = self._unsettled, None
+        value = int.from_bytes(self._uc.mem_read(address, size), "little")
+        self._uc.mem_write(address, before.to_bytes(size, "little"))
+        self._uc.mem_write(address, self.flash.written(before, value).to_bytes(size, "little"))
+
     def _read_system(self, uc: Any, offset: int, size: int, _: Any) -> int:
         return 0
 
@@ -247,6 +278,7 @@ class Machine:
         if offset == _PWR + 0x04:
             return 4 if self.supply_low else 0
         if _FLASH < offset < _FLASH + 0x20:
+            self._settle()
             return self.flash.read_register(offset - _FLASH)
         value = self._registers.get(offset, 0)
         if offset == _RCC:
@@ -269,6 +301,7 @@ class Machine:
         elif offset == _EXTI + 0x14:
             self._registers[offset] = self._registers.get(offset, 0) & ~value
         elif _FLASH < offset < _FLASH + 0x20:
+            self._settle()
             self.flash.write_register(offset - _FLASH, value)
         elif offset in (_GPIOA + 0x18, _GPIOB + 0x18):
             pin, device = _SELECTS[offset - 0x18]

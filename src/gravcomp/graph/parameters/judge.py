@@ -46,6 +46,11 @@ class JudgeParameters:
     measure_delay: bool = parameter(
         True, read_only=True, description="measure the delay from IMU sample to motor current on the CAN bus"
     )
+    standalone: bool = parameter(
+        False,
+        read_only=True,
+        description="compensation is that of the loop on the board: the bridge is stopped, and the board asked to run",
+    )
     interface: str = parameter(
         "", read_only=True, description="python-can interface; empty: hardware.can.interface of the robot file"
     )

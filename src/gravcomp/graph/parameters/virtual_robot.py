@@ -7,8 +7,9 @@ from gravcomp.graph.parameters.shared import CanBusParameters
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 
-BOARDS = ("virtual", "emulated")
-"""What stands in for the board: Python code on the bus of the motors, or the firmware's C code between host and motors."""
+BOARDS = ("virtual", "emulated", "standalone")
+"""What stands in for the board: Python code on the bus of the motors, the firmware's C code between host and motors, or that
+with the loop on the board."""
 
 MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 
@@ -76,7 +77,8 @@ class VirtualRobotNodeParameters(CanBusParameters):
         "virtual",
         choices=BOARDS,
         read_only=True,
-        description="board of the virtual robot: Python code, or the firmware's C code, which also limits the currents",
+        description="board of the virtual robot: Python code; the firmware's C code, which also limits the currents; or that with"
+        " the loop on the board, which begins when a host asks it to run",
     )
     truth_rate: float = parameter(
         100.0, unit="Hz", minimum=1.0, maximum=500.0, description="rate of the topics truth/...", read_only=True
