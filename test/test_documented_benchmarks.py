@@ -31,3 +31,9 @@ def test_performance_is_measured(made, apart, line, about):
     code, output = made(line, low=bool(apart))
     # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output
+
+
+def test_robots_are_measured_in_the_loop(type_in):
+    """One figure of one robot, which is computed in seconds; all of them take a quarter of an hour a robot."""
+    code, output = type_in("./gravcomp bench robots --loop --write src/doc/figures.md", "--figures unholdable --json article")
+    assert code in (0, 1) and '"unholdable": null' in output, output

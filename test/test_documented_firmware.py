@@ -33,8 +33,11 @@ def test_the_firmware_is_tested(type_in):
     [
         ("./gravcomp doctor --board --interface socketcan --channel can0", 1),
         ("./gravcomp firmware parameters ROBOT.yaml --interface socketcan --channel can0", 2),
+        ("./gravcomp firmware send build/firmware/NAME.model --interface socketcan --channel can0", 2),
     ],
 )
-def test_a_board_without_its_can_device_is_reported(type_in, line, expected):
+def test_a_board_without_its_can_device_is_reported(type_in, folder, line, expected):
+    (folder / "build" / "firmware").mkdir(parents=True, exist_ok=True)
+    (folder / "build" / "firmware" / "NAME.model").touch()
     code, output = type_in(line, ROBOT="ROBOT.yaml")
     assert code == expected and "can0" in output and "Traceback" not in output, output

@@ -45,6 +45,7 @@ ROS2_LINES = (
     ("ros2 param describe /inverse_controller inverse.tolerance_mm", "inverse.tolerance_mm"),
     ("ros2 param set /inverse_controller inverse.tolerance_mm 3.0", "successful"),
     ("ros2 param set /inverse_controller inverse.axial_weight 0.1", "successful"),
+    ("ros2 param set /inverse_controller inverse.max_contact_force 0.05", "successful"),
     ("ros2 topic hz /cable/command", r"average rate: \d"),
     ("ros2 topic echo /controller/status --field message", "target"),
     (PUBLISHED_ONCE, "publishing"),

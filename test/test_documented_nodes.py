@@ -33,8 +33,9 @@ def test_a_robot_with_joints_is_demonstrated(type_in):
     assert code == 0 and "sag without compensation" in output and "joint_bridge" in output, output
 
 
-def test_the_firmware_is_the_board_of_a_demonstration(type_in):
-    code, output = type_in("./gravcomp demo --board emulated", f"--headless {SHORTEST}")
+@pytest.mark.parametrize("line", ["./gravcomp demo --board emulated", "./gravcomp demo --board standalone"])
+def test_the_firmware_is_the_board_of_a_demonstration(type_in, line):
+    code, output = type_in(line, f"--headless {SHORTEST}")
     assert code == 0 and "sag without compensation" in output, output
 
 

@@ -66,6 +66,7 @@ class TopicBag:
         )
 
     def status(self, topic: str, time: float, code: int) -> None:
+        point = self._types["Point"](0.0, 0.0, 0.0)
         self._write(
             topic,
             "gravcomp_msgs/msg/ControllerStatus",
@@ -79,6 +80,10 @@ class TopicBag:
             solve_time=0.0,
             holdable=0,
             hold_message="",
+            nearest_tip=point,
+            contact_obstacle="",
+            contact_force=0.0,
+            contact_position=point,
         )
 
     def bend(self, topic: str, time: float, angle: float, plane: float) -> None:

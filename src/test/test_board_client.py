@@ -22,7 +22,7 @@ UP = np.array([0.0, 0.0, 9.81])
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
-    monkeypatch.setattr(client_module, "_PATIENCE", 60.0)  # s: a busy machine answers late
+    monkeypatch.setattr(client_module, "_PATIENCE", 20.0)  # s: a busy machine answers late
 
 
 @pytest.fixture

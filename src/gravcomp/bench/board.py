@@ -19,7 +19,7 @@ from gravcomp.firmware.host_board import MOTOR_BUS, HostBoard
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.settings import settings_of
 from gravcomp.firmware.stack import largest_stack
-from gravcomp.graph.parameters.virtual_robot import BOARDS
+from gravcomp.graph.boards import BOARDS
 from gravcomp.trials.turning_base import residuals
 
 _AMPERES = 0.5  # of the host before it dies, where the robot's limit allows that

@@ -40,9 +40,11 @@ def run(progress: Callable[[str], None], *, seed: int = 1, every: int = 1) -> di
         figures["missed"][fault_name] = sum(not set(kinds) & set(fault.kinds) for kinds, _ in results.values())
         if fault.excess_deg is not None:
             errors = {name: error for name, (_, error) in results.items() if error is not None}
-            excess = max(error - clean[name] for name, error in errors.items())
             if fault.calibrate:
                 figures["not_calibrated"] = len(results) - len(errors)
+            if not errors:
+                continue
+            excess = max(error - clean[name] for name, error in errors.items())
             figures["excess_deg"][fault_name] = round(excess, 3)
             figures["beyond_limit_deg"][fault_name] = round(max(0.0, excess - fault.excess_deg), 3)
     progress("cost of the live checks")

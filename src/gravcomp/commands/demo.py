@@ -29,7 +29,7 @@ _BROWSER_TIME = 200.0  # s from the end of the run until a browser shows the pag
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    from gravcomp.graph.parameters.virtual_robot import BOARDS
+    from gravcomp.graph.boards import BOARDS
 
     parser.description = (
         "Run the four nodes, a virtual robot on a private CAN bus and the viewer as processes; print the figures of the run."

@@ -104,17 +104,16 @@ def _built(args: argparse.Namespace) -> tuple[dict, str]:
 def _model(args: argparse.Namespace) -> int:
     import math
 
+    from gravcomp.commands.model.build import prepare
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
-    from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit, reduction_for
+    from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit
     from gravcomp.firmware.model_settings import LoopParameters
-    from gravcomp.full_model.robot_model import RobotModel
 
     if not 0.0 < args.joystick_bend <= 180.0:
         raise ConfigError(f"--joystick-bend is {args.joystick_bend:g}; allowed: above 0 to 180 deg")
     file = load_robot_file(args.robot)
-    model = RobotModel(file.robot)
-    reduction = reduction_for(model, file.source)
+    model, reduction, _ = prepare(args.robot)
     found = fit(model, reduction, LoopParameters.of(file), math.radians(args.joystick_bend))
     path = Path(args.output) / f"{file.robot.name}.model"
     path.parent.mkdir(parents=True, exist_ok=True)

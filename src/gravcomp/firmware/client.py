@@ -15,6 +15,7 @@ from gravcomp.firmware.requests import Answer
 from gravcomp.firmware.settings import ANY_BOARD, value_of
 
 _PATIENCE = 1.0  # s for an answer; storing stops the board for half of it
+_TRIES = 3  # a frame is lost where a queue is full; what is asked twice has the same answer
 _ERASING = 5.0  # s for an answer after a sector of a model is erased
 _LISTEN = 0.5  # s for a heartbeat
 
@@ -39,11 +40,12 @@ class BoardClient:
 
     def ask(self, message: can.Message) -> Answer:
         """Send a request and return its answer. Raises ConfigError without one."""
-        self.send(message)
-        for frame in self.listen(_PATIENCE):
-            answer = requests.answer_of(frame)
-            if answer is not None and answer.key == message.data[2] and answer.operation == message.data[1]:
-                return answer
+        for _ in range(_TRIES):
+            self.send(message)
+            for frame in self.listen(_PATIENCE):
+                answer = requests.answer_of(frame)
+                if answer is not None and answer.key == message.data[2] and answer.operation == message.data[1]:
+                    return answer
         raise ConfigError(self._why_silent())
 
     def transfer(self, steps: model_transfer.Step) -> None:

@@ -3,13 +3,10 @@
 import dataclasses
 
 from gravcomp.config import parameter
+from gravcomp.graph.boards import BOARDS
 from gravcomp.graph.parameters.shared import CanBusParameters
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
-
-BOARDS = ("virtual", "emulated", "standalone")
-"""What stands in for the board: Python code on the bus of the motors, the firmware's C code between host and motors, or that
-with the loop on the board."""
 
 MOTIONS = ("static", "tilt", "arm", "tremor", "rotation", "recording", "topic")
 
