@@ -27,4 +27,6 @@ def test_every_executable_is_in_the_table_of_nodes():
     # The guard is a process of the bridge, not a node; composed_loop runs three of the nodes.
     for package in {entry.package for entry in NODES}:
         executables = re.findall(r"^\s+\"(\w+) = ", (ROOT / package / "setup.py").read_text(), re.MULTILINE)
-        assert set(executables) - {"can_guard", "composed_loop"} == {entry.executable for entry in NODES if entry.package == package}
+        assert set(executables) - {"can_guard", "composed_loop"} == {
+            entry.executable for entry in NODES if entry.package == package
+        }
