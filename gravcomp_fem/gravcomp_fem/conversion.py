@@ -47,6 +47,9 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
 
 def contact_of(message: Deformation) -> ObstacleForces:
     """Return the obstacles that a message names. Raises ValueError when its arrays do not match, or a number is not finite."""
+    gravity = message.gravity.x, message.gravity.y, message.gravity.z  # places what is in the world
+    if not np.isfinite(gravity).all():
+        raise ValueError(f"gravity is {gravity}; finite numbers are needed")
     count, cables = len(message.contact_obstacle), len(message.cable_tension)
     return ObstacleForces(
         names=tuple(message.contact_obstacle),

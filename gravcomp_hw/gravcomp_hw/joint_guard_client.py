@@ -43,6 +43,8 @@ class JointGuardClient:
         """Send a heartbeat. Return whether there is a guard; one that hangs is killed, and one that is gone is replaced."""
         process = self._process
         if process is None:
+            if self._replacing is not None and not self._replacing.is_alive():
+                self._replace_apart(None)
             return False
         now = time.monotonic()
         if self._answered(process):
@@ -53,8 +55,7 @@ class JointGuardClient:
             return True
         process.kill()
         self._process = None
-        self._replacing = threading.Thread(target=self._replace, args=[process], name="joint_guard", daemon=True)
-        self._replacing.start()
+        self._replace_apart(process)
         return False
 
     def close(self) -> None:
@@ -85,8 +86,15 @@ class JointGuardClient:
         self._unanswered: float | None = None  # s, time of the first heartbeat without answer
         return process
 
-    def _replace(self, former: subprocess.Popen) -> None:
-        former.wait()
+    def _replace_apart(self, former: subprocess.Popen | None) -> None:
+        self._replacing = threading.Thread(target=self._replace, args=[former], name="joint_guard", daemon=True)
+        self._replacing.start()
+
+    def _replace(self, former: subprocess.Popen | None) -> None:
+        if former is not None:
+            former.wait()
+        if self._closed:
+            return
         with contextlib.suppress(JointGuardError, OSError):
             process = self._start()
             if self._closed:

@@ -168,6 +168,7 @@ class LocalPublisher(Publisher):
             return
         self.count += 1
         # First to the middleware: the receivers here may take a while.
-        if self.get_subscription_count() > self.local.receivers(self.topic_name):
+        latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL  # kept for those who subscribe later
+        if latched or self.get_subscription_count() > self.local.receivers(self.topic_name):
             super().publish(message)
         self.local.deliver(self, message)

@@ -22,6 +22,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.shared import SharedParameters
 from gravcomp_node import ros_parameters
 from gravcomp_node.local_topics import LocalPublisher, LocalTopics
+from gravcomp_node.polled import NeverExecuted
 
 OK, WARN, ERROR = (bytes([level]) for level in (0, 1, 2))
 
@@ -125,8 +126,8 @@ class ManagedNode(LifecycleNode):
             return super().create_subscription(msg_type, topic, callback, qos_profile, **options)
         subscription = self._create(super().create_subscription, msg_type, topic, callback, qos_profile, **options)
         if self.local is not None and not subscription.raw:
-            called = subscription.callback_group.can_execute(subscription)
-            self.local.add_subscription(self, subscription, callback if called else None)
+            polled = isinstance(subscription.callback_group, NeverExecuted)
+            self.local.add_subscription(self, subscription, None if polled else callback)
         return subscription
 
     def destroy_publisher(self, publisher: Publisher) -> bool:

@@ -32,7 +32,7 @@ class Polled:
         self._node = node
         self._kind = kind
         self._local: LocalTopics | None = getattr(node, "local", None)
-        self._subscription = node.create_subscription(kind, topic, _never_called, qos, callback_group=_NeverExecuted())
+        self._subscription = node.create_subscription(kind, topic, _never_called, qos, callback_group=NeverExecuted())
         self.last: Received | None = None
 
     def take(self) -> Received | None:
@@ -60,17 +60,19 @@ class Polled:
         self._node.destroy_subscription(self._subscription)
 
 
-class _NeverExecuted(CallbackGroup):
+class NeverExecuted(CallbackGroup):
     """A group whose entities are never executed, so that an executor does not wait for them."""
 
     def can_execute(self, entity: Any) -> bool:
+        """Return False, for any entity."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
+        """Return False, for any entity."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        pass
+        """Do nothing: none has begun."""
 
 
 def _never_called(_: Any) -> None:

@@ -31,6 +31,7 @@ class Model:
     def __init__(self, observer: TipObserver):
         self.observer, self.time, self.tip = observer, START, REST
         self.down, self.held, self.touching = np.array([-1.0, 0.0, 0.0]), 0.0, False
+        self.moved = np.zeros(3)  # by the correction
 
     def run(self, duration: float, held: float | None = None) -> None:
         before, after = self.held, self.held if held is None else held
@@ -39,7 +40,7 @@ class Model:
             self.held = before + (after - before) * step / steps
             self.time += STEP
             sag = SAG * self.down
-            self.tip = REST + (1.0 - self.held) * sag
+            self.tip = REST + (1.0 - self.held) * sag + self.moved
             response = Response(
                 compliance_aa=np.array([[1e-3]]),
                 compliance_ea=np.append(-sag, np.zeros(3))[:, None],
@@ -47,7 +48,9 @@ class Model:
                 effector_free=np.append(REST + sag, [0.0, 0.0, 1.0]),
             )
             self.observer.predict(self.time, self.tip, UPRIGHT, response, np.array([self.held]), self.touching)
-            self.observer.corrected(straight_target(ROBOT.length), self.time)
+            corrected = self.observer.corrected(straight_target(ROBOT.length), self.time)
+            if not self.touching and self.held > 0.0:
+                self.moved = corrected.tip_position - REST
 
     def measure(self, position: np.ndarray, late: float = 0.0, frame: str = "soft_base") -> bool:
         return self.observer.measure(self.time - late, self.time, frame, position)
@@ -147,6 +150,18 @@ def test_a_robot_that_something_holds_is_not_pressed_on_by_the_correction() -> N
     made.run(1.0, held=1.0)
     follow(made, np.array([1e-3, 0.0, 0.0]), 2.0, seed=2)
     assert made.status.state == TrackerState.USED and not made.status.sentence
+
+
+def test_an_error_that_drifts_while_the_target_is_held_is_corrected() -> None:
+    """The base turns, or the body creeps: the model moves by the correction alone, and the robot stays at its target."""
+    made, random = model(), np.random.default_rng(7)
+    made.run(0.5, held=1.0)
+    follow(made, np.zeros(3), 4.0)
+    for step in range(150):
+        made.run(0.2)
+        made.measure(made.tip + [4e-5 * min(step, 125), 0.0, 0.0] + 0.5e-3 * random.standard_normal(3))
+        assert "disagree" not in made.status.sentence
+    np.testing.assert_allclose(made.status.offset, [5e-3, 0.0, 0.0], atol=1e-3)
 
 
 def test_a_robot_that_moves_where_its_model_leans_is_reported() -> None:

@@ -2,7 +2,7 @@
 //
 //   IDLE --currents of the host--> FOLLOWING --host silent--> HOLDING --still silent--> RELEASED --currents--> FOLLOWING
 //   IDLE, RELEASED, STANDALONE --home--> HOMING --> HOLDING or STANDALONE
-//   IDLE, RELEASED, FOLLOWING, HOLDING after homing --run--> STANDALONE
+//   IDLE, RELEASED, FOLLOWING, HOLDING after homing --run--> STANDALONE; FOLLOWING only where the board is between the buses
 //   any --stall, runaway, a silent motor while the board drives--> FAULT --resume--> RELEASED
 #ifndef GC_BOARD_STATE_H
 #define GC_BOARD_STATE_H

@@ -131,7 +131,9 @@ static uint8_t home(gc_board *board) {
 
 static uint8_t run(gc_board *board) {
   const bool held = board->state == GC_HOLDING && board->homing.phase == GC_HOMED;
-  if (gc_board_drives(board) && !held && board->state != GC_FOLLOWING) {
+  // On a bus that host and board share, both would send currents to the motors.
+  const bool takes_over = board->state == GC_FOLLOWING && gc_board_is_between(board);
+  if (gc_board_drives(board) && !held && !takes_over) {
     return GC_WRONG_STATE;
   }
   if (!may_begin(board) || !board->has_controller || !all_have_zeros(board)) {

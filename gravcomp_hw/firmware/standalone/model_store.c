@@ -110,14 +110,20 @@ static uint8_t end(gc_model_store *store) {
   }
   store->begun = false;
   const uint8_t *blob = store->memory.slots[store->slot];
-  if (!gc_standalone_take(store->loop, blob, store->size, store->magic, store->memory.alive)) {
+  gc_model model;
+  const uint8_t *robot = store->loop->loaded ? store->loop->model.robot : NULL;
+  store->loop->refusal = gc_model_open(&model, blob, store->size, store->magic, robot, store->memory.alive);
+  if (store->loop->refusal != GC_MODEL_OK) {
     return GC_STORE_REFUSED;
   }
+  if (!store->memory.write(store->memory.context, store->slot, 0u, store->magic)) {
+    return GC_STORE_NOT_STORED;  // the loop goes on with the old one, also after a reset
+  }
+  (void)gc_standalone_take(store->loop, blob, store->size, store->magic, store->memory.alive);
+  // Until the next write both places have a whole model of this robot.
   const uint32_t before = store->used;
   store->used = store->slot;
-  // Between these two writes both places have a whole model of this robot.
-  const bool marked = store->memory.write(store->memory.context, store->slot, 0u, store->magic);
-  const bool unmarked = marked && (before == GC_MODEL_SLOTS || unmark(store, before));
+  const bool unmarked = before == GC_MODEL_SLOTS || unmark(store, before);
   return unmarked ? GC_STORE_DONE : GC_STORE_NOT_STORED;
 }
 

@@ -53,7 +53,8 @@ static bool converted(const gc_sample *sample, float *gyro, float *accel) {
 static float elapsed(gc_standalone *loop, uint32_t time) {
   const int32_t step = loop->has_sample ? (int32_t)(time - loop->time) : 0;
   const float period = loop->model.settings->period;
-  const float interval = loop->has_sample && step > 0 ? (float)step * 1e-6f : period;
+  // Stamps rise: a step back is a pause of more than half the counter's range.
+  const float interval = step > 0 ? (float)step * 1e-6f : (step < 0 ? 2.0f * GC_PAUSE : period);
   loop->time = time;
   loop->stamp += step;
   loop->has_sample = true;

@@ -3,6 +3,7 @@
 The loop runs in one process, in virtual time. Rate and delay of commands belong to the running graph: `demo --json` has them.
 """
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,14 +25,20 @@ SEEDS = (1, 2, 3)
 
 
 def run(
-    files: Sequence[str], figures: Sequence[str], progress: Callable[[str], None], every: int = 1, sweep: Sweep | None = None
+    files: Sequence[str],
+    figures: Sequence[str],
+    progress: Callable[[str], None],
+    every: int = 1,
+    sweep: Sweep | None = None,
+    *,
+    again: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of `FIGURES` of every robot by name, the worst over `SEEDS`; `seeds`: the shares of each seed.
 
     uncalibrated_pct: lateral residual of the sag at the article's five poses and 20 random orientations of the base, with the
     model as described; calibrated_pct: with the calibrated one; moving_pct: with that one too, during the turns between them at
     30 deg/s. figures: only these, none: all; every > 1: one seed and so many times fewer orientations. A robot that fails has
-    `errors`, and the others go on. Parts that an earlier run finished are not measured again. Raises ConfigError for a figure
+    `errors`, and the others go on. again: measure also the parts that an earlier run finished. Raises ConfigError for a figure
     that does not exist.
     """
     for name in figures:
@@ -39,8 +46,8 @@ def run(
             raise ConfigError(f"--figures has '{name}'; allowed with --loop: {', '.join(FIGURES)}")
     wanted = list(figures) or list(FIGURES)
     seeds = SEEDS[:1] if every > 1 else SEEDS
-    parts = [part for file in files for part in _parts(file, wanted, seeds, every)]
-    finished = sum(path is not None and path.is_file() for path in map(path_of, parts))
+    parts = [dataclasses.replace(part, again=again) for file in files for part in _parts(file, wanted, seeds, every)]
+    finished = 0 if again else sum(path is not None and path.is_file() for path in map(path_of, parts))
     note = f"; {finished} were measured before" if finished else ""
     progress(f"loop of {len(files)} robots (0 of {len(parts)} parts{note})")
     own = sweep is None

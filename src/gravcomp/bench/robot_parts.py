@@ -31,13 +31,15 @@ _ORIENTATIONS = 20
 class Part:
     """One run.
 
-    kind: a key of `KINDS`; file: of the robot; seed: of its virtual robot; every: so many times fewer orientations.
+    kind: a key of `KINDS`; file: of the robot; seed: of its virtual robot; every: so many times fewer orientations; again:
+    measure also what an earlier run finished.
     """
 
     kind: str
     file: str
     seed: int = 1
     every: int = 1
+    again: bool = False
 
     @property
     def orientations(self) -> int:
@@ -53,7 +55,7 @@ class Part:
 def compute(part: Part) -> dict[str, Any]:
     """Return what a part measured, now or in an earlier run; `error`: why the robot could not be measured."""
     path = path_of(part)
-    if path is not None and path.is_file():
+    if path is not None and path.is_file() and not part.again:
         return dict(json.loads(path.read_text()))
     try:
         found = KINDS[part.kind](load_robot_file(part.file), part)

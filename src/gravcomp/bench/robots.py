@@ -41,7 +41,7 @@ def run(
     exist.
     """
     if loop:
-        return {"robots": robot_loop.run([str(file) for file in files or _all_files()], figures, progress, every)}
+        return {"robots": robot_loop.run([str(file) for file in files or _all_files()], figures, progress, every, again=again)}
     allowed = [*robot_figures.FIGURES, *whole_figures.FIGURES]
     for name in figures:
         if name not in allowed:

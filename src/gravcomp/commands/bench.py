@@ -110,8 +110,8 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.report import figures_table
 
-    loop = args.benchmark == "robots" and args.loop
-    command = f"bench {args.benchmark}{' --loop' if loop else ''}"
+    other = next((f" --{name}" for name in ("loop", "composed") if getattr(args, name, False)), "")
+    command = f"bench {args.benchmark}{other}"
     if args.write and args.brief:
         raise ConfigError("--write and --brief exclude each other: a document takes the figures of whole benchmarks")
     if args.write:

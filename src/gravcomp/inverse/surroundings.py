@@ -77,6 +77,8 @@ class Surroundings:
                 try:
                     surface = contact_surface(robot)
                     refuse_start(around, robot)
+                except ConfigError:
+                    raise
                 except ValueError as error:
                     raise ConfigError(f"{around.source}: scene: {error}") from error
                 self._surface = surface._replace(outline=np.zeros((len(surface.place), 0, 2)))
@@ -107,6 +109,10 @@ class Surroundings:
         if largest_force is not None and self._scene is not None:
             wall = self._nearby(self._scene, response, tension, station, gravity)
             least = np.minimum(-margin, wall.gap)
+            arrays = self._scene.arrays
+            touched = np.array([self._scene.names[k] in forces.names for k in arrays.obstacle[wall.row]], dtype=bool)
+            # The depth in a compliant obstacle is its force, which has a row of its own.
+            least[touched & np.isfinite(arrays.stiffness[wall.row])] = -np.inf
             blocks.append((wall.change, least - wall.gap + wall.change @ tension, np.full(len(wall.gap), np.inf)))
         count = sum(len(least) for _, least, _ in blocks)
         if not count:
@@ -149,7 +155,7 @@ class Surroundings:
         moved = response.compliance_ea[6:].reshape(len(station), 3, -1)
         points = (response.compliance_ea[6:] @ tension + response.effector_free[6:]).reshape(-1, 3)
         node = np.asarray(station, dtype=float) * self._length
-        if node[-1] < self._length:
+        if not len(node) or node[-1] < self._length:
             tip = response.compliance_ea[:3]
             node, points = np.append(node, self._length), np.vstack([points, tip @ tension + response.effector_free[:3]])
             moved = np.concatenate([moved, tip[None]])

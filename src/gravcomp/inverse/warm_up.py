@@ -11,6 +11,8 @@ from gravcomp.full_model.shape import Response
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.target import straight_target
+from gravcomp.scene import PlaneWall, SceneSection
+from gravcomp.scene.scene import Scene
 
 
 def warm_up(robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None) -> None:
@@ -28,3 +30,7 @@ def warm_up(robot: Robot, options: InverseOptions | None = None, transmission: T
     for tension in (None, np.zeros(m)):
         controller.step(response, target, backbone_station=stations, tension=tension)
     controller.relax(response)
+    if robot.body is None:  # zones and a bound on forces need more functions, wherever the obstacle is
+        plane = PlaneWall(name="far", normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -10.0 * robot.length), forbidden=True)
+        zones = Scene(SceneSection(planes=(plane,)), forbidden=True)
+        InverseController(robot, options, transmission, zones=zones).step(response, target, backbone_station=stations)

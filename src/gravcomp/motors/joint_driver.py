@@ -17,6 +17,7 @@ from gravcomp.motors.state import CableSnapshot, State
 
 _SWITCH_INTERVAL = 5e-4  # s; with Python's default of 5 ms the thread of the messages could delay the control by as much
 _LAST_TIMES = 5  # messages at the end of the bridge
+_CLOCK_SET = 0.02  # s; a jump of the host's clock, which otherwise is slowed or hurried by microseconds
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +51,7 @@ class JointDriver:
         self.overruns, self.delay = 0, 0.0
         self._options, self._send, self._on_snapshot, self._controller = options, send, on_snapshot, controller
         self._beat = beat
-        self._wall = time.time() - time.monotonic()  # once: a clock that is set later makes no message late
+        self._wall = time.time() - time.monotonic()
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -95,6 +96,10 @@ class JointDriver:
         """Take a message of joint states."""
         with self._lock:
             now = time.monotonic()
+            wall = time.time() - now
+            if abs(wall - self._wall) > _CLOCK_SET:  # senders on this host have the new time, and are not late by the difference
+                self._wall = wall
+                self.bridge.joints.forget_clocks()
             self.bridge.on_joint_states(names, angles, speeds, efforts, now, stamp_ns, now + self._wall)
 
     def command(self, displacement: Sequence[float], tension: Sequence[float], stamp_ns: int) -> str | None:

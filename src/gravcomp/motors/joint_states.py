@@ -44,6 +44,12 @@ class JointStates:
         self._measured = [_Measured() for _ in self.motors]
         self._others: dict[str, float] = {}  # names of joints without a cable, with the time of their last message
 
+    def forget_clocks(self) -> None:
+        """Forget the stamps and the lateness of messages so far: the host's clock has been set."""
+        for measured in self._measured:
+            measured.stamp = 0
+            measured.lateness.reset()
+
     def on_message(
         self,
         names: Sequence[str],

@@ -82,6 +82,7 @@ class TipObserver:
         self._history = History(options.longest_delay + options.delay + options.response)
         self._used = self._refused = self._restarts = 0
         self._applied, self._applied_at = np.zeros(3), -np.inf
+        self._followed = np.zeros(3)  # m, what the model has moved by the correction; none where it leans on an obstacle
         self._last_used = self._last_stamp = -np.inf
         self._refusal, self._in_a_row = "", 0
         self._largest_sag = 0.0
@@ -151,8 +152,10 @@ class TipObserver:
             wanted = wanted * (self._allowed / size)
         # Steps of the estimate reach the motors no faster than the robot follows.
         share = lag_share(self._applied_at, now, self.options.response)
-        self._applied = self._applied + share * (wanted - self._applied)
-        self._applied_at = now
+        step = share * (wanted - self._applied)
+        self._applied, self._applied_at = self._applied + step, now
+        if not self._history.newest.touching:
+            self._followed = self._followed + step
         return dataclasses.replace(target, tip_position=target.tip_position - self._applied)
 
     def status(self, now: float) -> TrackerStatus:
@@ -219,7 +222,8 @@ class TipObserver:
         # While the model moves, the robot is somewhere on the way behind it.
         behind = then.tip_position - self._history.at(time - self.options.response).tip_position
         noise = self.options.std**2 * np.eye(3) + np.outer(behind, behind)
-        motion = self._motion.observe(time, measured, modelled, then.touching)
+        # Without what the correction moves: it moves the model, and the robot stays at its target.
+        motion = self._motion.observe(time, measured, modelled + self._followed, then.touching)
         if motion is Disagreement.HELD:
             if self._agreed is not None:
                 self._filter = self._agreed.copy()

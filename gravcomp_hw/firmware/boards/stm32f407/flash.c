@@ -84,8 +84,8 @@ extern const uint8_t gc_model_a[], gc_model_b[];
 
 static bool erase_model(void *context, uint32_t slot, uint32_t sector) {
   (void)context;
-  gc_heater_pwm_set(0u);  // for up to two seconds nobody watches it; the next tick sets it again
   unlock();
+  gc_heater_pwm_set(0u);  // after interrupts are off: for up to two seconds nobody watches it; the next tick sets it again
   erase_sector(FIRST_MODEL_SECTOR + MODEL_SECTORS * slot + sector);
   return lock();
 }
