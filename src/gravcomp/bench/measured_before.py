@@ -19,7 +19,7 @@ _PACKAGES = (
     "bench", "cables", "config", "contact", "description", "full_model", "inverse", "materials", "mechanics", "mesh",
     "mesh_files", "reduction", "scene", "simulation", "training",
 )  # fmt: skip
-"""Packages whose source counts, beside the modules that are in none."""
+"""Packages whose source counts, and so do the modules that are in none."""
 
 
 def measured_before(
