@@ -112,7 +112,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     alone = args.board == "standalone"
     parameters: dict[str, dict] = {"virtual_robot": motion}
     if alone:
-        _check_alone(args.robot)
+        _prepare_alone(args.robot)
         parameters["fem_simulator"] = {"cables_from": "state"}  # the model follows the motors that the board drives
     graph = RobotGraph(args.robot, "udp_multicast", channels, parameters=parameters, seed=args.seed)
     loop = graph.loop(virtual=True, composed=args.composed)
@@ -156,8 +156,9 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     return 0
 
 
-def _check_alone(robot: str) -> None:
+def _prepare_alone(robot: str) -> None:
     """Make the model of the loop on the board, before any process starts. Raises ConfigError for a robot that has none."""
+    from gravcomp.commands.model.build import prepare
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
     from gravcomp.firmware.model_fit import blob_for
@@ -166,7 +167,10 @@ def _check_alone(robot: str) -> None:
     file = load_robot_file(robot)
     if file.has_joints:
         raise ConfigError(f"{robot}: --board standalone needs motors on the board's bus; this robot has hardware.joints")
-    blob_for(LoopParameters.of(file))
+    parameters = LoopParameters.of(file)
+    prepare(robot)
+    with output.console().status("choosing the modes for the board, once for this robot"):
+        blob_for(parameters)
 
 
 def _begin_of_motion(path: str) -> float:
