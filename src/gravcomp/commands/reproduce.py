@@ -3,13 +3,15 @@
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.experiments import ALSO, EXPERIMENTS, MEASURED, experiment
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import RenderableType
 
     from gravcomp.closed_loop.setup import Setup
@@ -118,12 +120,8 @@ def run(args: argparse.Namespace) -> int:
         for name in names:
             label = name
             started = time.perf_counter()
-            try:
-                result = experiment(name).run(context)
-            except ConfigError as error:
-                if args.name != "all":
-                    raise
-                output.note(f"{name}: {error}")
+            result = _unless_left_out(experiment, name, context, args.name == "all")
+            if result is None:
                 continue
             result.seconds = time.perf_counter() - started
             result.parameters.setdefault("seed", context.setup.seed)
@@ -181,12 +179,8 @@ def _evaluate_bag(args: argparse.Namespace, setup: "Setup", folder: Path) -> int
     results, pages = [], []
     for name in names:
         started = time.perf_counter()
-        try:
-            result = evaluation(name).run(recorded)
-        except ConfigError as error:
-            if args.name != "all":
-                raise
-            output.note(f"{name}: {error}")
+        result = _unless_left_out(evaluation, name, recorded, args.name == "all")
+        if result is None:
             continue
         result.name, result.bag, result.seconds = name, args.bag, time.perf_counter() - started
         result.parameters["robot"] = setup.source
@@ -195,6 +189,23 @@ def _evaluate_bag(args: argparse.Namespace, setup: "Setup", folder: Path) -> int
     if not results:
         raise ConfigError(f"{args.bag}: contains nothing that an experiment could be evaluated from")
     return _print(results, pages)
+
+
+def _unless_left_out(find: "Callable[[str], Any]", name: str, subject: Any, among_all: bool) -> "Result | None":
+    """Return the result of an experiment; among all, one that this robot or bag does not allow is None, with a note.
+
+    find: returns the module of a name, whose `run` takes the subject. Raises ConfigError for one that was asked for alone.
+    """
+    from gravcomp.config import ConfigError
+
+    try:
+        result: Result = find(name).run(subject)
+        return result
+    except ConfigError as error:
+        if not among_all:
+            raise
+        output.note(f"{name}: {error}")
+        return None
 
 
 def _print(results: "list[Result]", pages: list[Path]) -> int:
