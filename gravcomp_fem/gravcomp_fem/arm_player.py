@@ -26,6 +26,7 @@ from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
 from gravcomp.virtual.motion import quaternion
+from gravcomp.whole_file import write_whole
 from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
@@ -188,9 +189,7 @@ class ArmPlayer(ManagedNode):
     def _write(self, phase: str, figures: dict) -> None:
         if not self.parameters.result_file:
             return
-        partial = Path(self.parameters.result_file + ".partial")
-        partial.write_text(json.dumps({"phase": phase, "figures": figures}))
-        partial.replace(self.parameters.result_file)
+        write_whole(Path(self.parameters.result_file), json.dumps({"phase": phase, "figures": figures}))
 
 
 def main() -> int:

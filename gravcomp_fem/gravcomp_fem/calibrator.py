@@ -19,9 +19,9 @@ from gravcomp.calibration.bag import direction_of_poses
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan_file import load_plan
-from gravcomp.calibration.whole_file import write_whole
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.calibrator import CalibratorParameters
+from gravcomp.whole_file import write_whole
 from gravcomp_fem.conversion import seconds
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run

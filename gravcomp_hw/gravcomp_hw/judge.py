@@ -29,6 +29,7 @@ from gravcomp.firmware import requests
 from gravcomp.firmware.client import BoardClient
 from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp.inverse import Holdable
+from gravcomp.whole_file import write_whole
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
 from gravcomp_node import LATCHED, ManagedNode, run
 
@@ -203,9 +204,7 @@ class Judge(ManagedNode):
             "nodes": self._states,
             "figures": result,
         }
-        partial = Path(self.parameters.result_file + ".partial")
-        partial.write_text(json.dumps(state))
-        partial.replace(self.parameters.result_file)
+        write_whole(Path(self.parameters.result_file), json.dumps(state))
 
     def _can(self) -> CanInterface:
         section = self.robot_file.section("hardware")

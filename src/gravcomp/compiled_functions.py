@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from gravcomp.cache import cache_folder, content_key
+from gravcomp.whole_file import write_whole
 
 PACKAGE = Path(__file__).parent
 _LOCATORS = "gravcomp.numba_locator.ContentLocator,UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator"
@@ -52,9 +53,7 @@ def _digests() -> list[str]:
         before = known.get(name)
         current[name] = before if before and before[:2] == stamp else [*stamp, digest(path.read_bytes())]
     if current != known:
-        partial = memory.with_suffix(f".{os.getpid()}")
-        partial.write_text(json.dumps(current))
-        partial.replace(memory)
+        write_whole(memory, json.dumps(current))
     return [f"{name} {entry[2]}" for name, entry in current.items() if entry[2]]
 
 

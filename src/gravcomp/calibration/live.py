@@ -28,10 +28,10 @@ from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import Plan, PlannedPose
 from gravcomp.calibration.plan_table import instruction
 from gravcomp.calibration.plausible import check_units
-from gravcomp.calibration.whole_file import write_whole
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.inverse.limits import within_limits
+from gravcomp.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class LiveSession:
             else:
                 writer.writerow(self._header)
             writer.writerows(self._pending)
-            write_whole(self._path, text.getvalue())
+            write_whole(self._path, text.getvalue(), lasting=True)
         except OSError as error:
             self.unwritten = f"{self._path} cannot be written: {error.strerror}"
             return False

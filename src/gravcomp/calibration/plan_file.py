@@ -7,7 +7,7 @@ import numpy as np
 
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan import Plan, PlannedPose
-from gravcomp.calibration.whole_file import write_whole
+from gravcomp.whole_file import write_whole
 
 _ARRAYS = ("displacement", "tension", "tip")
 
@@ -15,7 +15,7 @@ _ARRAYS = ("displacement", "tension", "tip")
 def save_plan(plan: Plan, path: Path) -> None:
     """Write the plan. Raises OSError."""
     poses = [{name: np.asarray(value).tolist() for name, value in vars(pose).items()} for pose in plan.poses]
-    write_whole(path, json.dumps({**vars(plan), "poses": poses}))
+    write_whole(path, json.dumps({**vars(plan), "poses": poses}), lasting=True)
 
 
 def load_plan(path: Path) -> Plan:

@@ -1,7 +1,6 @@
 """Which basis of a reduced model the board has room and time for, what it costs, and the error of a smaller one."""
 
 import dataclasses
-import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -28,6 +27,7 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.store import Reduction, load, why_not
 from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.whole_file import write_whole
 
 SLOT_BYTES = 384 * 1024
 """Room for a blob in the flash of the STM32F407 (boards/stm32f407/image.ld)."""
@@ -103,9 +103,7 @@ def blob_for(parameters: LoopParameters) -> bytes:
     own = dataclasses.replace(parameters, source="")
     path = cache_path("firmware", content_key(own, *of_reduction, VERSION, SLOT_BYTES, LONGEST_MS, list(_EXTRA)), ".model")
     if not path.exists():
-        partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_bytes(fit(model, reduction, parameters).blob)
-        partial.replace(path)
+        write_whole(path, fit(model, reduction, parameters).blob)
     return path.read_bytes()
 
 

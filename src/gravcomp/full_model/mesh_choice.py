@@ -28,6 +28,7 @@ from gravcomp.mesh.layers import least_layers
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.refusal import well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
+from gravcomp.whole_file import write_whole
 
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
@@ -73,9 +74,7 @@ def chosen_mesh(robot: Robot) -> MeshChoice:
             100 * choice.error,
             100 * ACCURACY,
         )
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(dataclasses.asdict(choice)))
-    part.replace(path)
+    write_whole(path, json.dumps(dataclasses.asdict(choice)))
     return choice
 
 
