@@ -1,20 +1,16 @@
 """Parts of the benchmark of the loop: each is one run on one robot, takes minutes, and is kept in the cache when it is finished.
 
-The key of a part is made of the robot file with all files that it names, of the part itself, and of the sources of this package:
-an interrupted benchmark goes on where it was, and a change of robot or code measures again.
+Its place there stands for the robot file with all files that it names, and for the part (`measured_before`).
 """
 
 import dataclasses
-import functools
-import json
 import logging
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 from gravcomp.bench import robot_calibration
-from gravcomp.cache import cache_path, content_key
+from gravcomp.bench.measured_before import measured_before, place_of
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import RobotFile, load_robot_file
@@ -23,7 +19,6 @@ from gravcomp.trials.holding import unholdable
 from gravcomp.trials.similarity import SCALES, similarity
 from gravcomp.trials.turning_base import residuals
 
-_PACKAGE = Path(__file__).parents[1]
 _ORIENTATIONS = 20
 
 
@@ -55,18 +50,16 @@ class Part:
 def compute(part: Part) -> dict[str, Any]:
     """Return what a part measured, now or in an earlier run; `error`: why the robot could not be measured."""
     path = path_of(part)
-    if path is not None and path.is_file() and not part.again:
-        return dict(json.loads(path.read_text()))
+    return _outcome(part) if path is None else measured_before(path, lambda: _outcome(part), again=part.again)
+
+
+def _outcome(part: Part) -> dict[str, Any]:
+    """Return the result, or why the robot could not be measured, as `error`."""
     try:
-        found = KINDS[part.kind](load_robot_file(part.file), part)
+        return KINDS[part.kind](load_robot_file(part.file), part)
     except (ConfigError, MeshError, ArithmeticError, ValueError, RuntimeError) as error:
         logging.getLogger(__name__).warning("%s: %s", part.name, error)
         return {"error": str(error)}
-    if path is not None:
-        partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_text(json.dumps(found))
-        partial.replace(path)
-    return found
 
 
 def path_of(part: Part) -> Path | None:
@@ -75,7 +68,7 @@ def path_of(part: Part) -> Path | None:
         contents = _contents(load_robot_file(part.file))
     except ConfigError:
         return None
-    return cache_path("bench", content_key(_sources(), *contents, part.kind, part.seed, part.every), ".json")
+    return place_of(*contents, part.kind, part.seed, part.every)
 
 
 def loop(file: RobotFile, part: Part) -> dict[str, Any]:
@@ -114,12 +107,6 @@ def holding(file: RobotFile, part: Part) -> dict[str, Any]:
 
 KINDS = {"loop": loop, "calibration": calibration, "similarity": other_sizes, "holdability": holding}
 """What each kind of part runs."""
-
-
-@functools.cache
-def _sources() -> str:
-    """Digest of the sources of this package."""
-    return content_key(*(path.read_bytes() for path in sorted(_PACKAGE.rglob("*.py"))))
 
 
 def _contents(file: RobotFile) -> list[Any]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gravcomp.bench import robot_figures, robot_loop, whole_figures
-from gravcomp.bench.measured_before import measured_before
+from gravcomp.bench.measured_before import measured_before, place_of
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
 from gravcomp.experiments.measured import default_folder
@@ -88,7 +88,8 @@ def _of(file: str, wanted: Sequence[str], progress: Progress, every: int, again:
                 with _cache(folder):
                     return _outcome(name, file, every)
 
-            found = measured_before(robot, name, every, outcome, again=again)
+            body = Path(robot.body.file).read_bytes() if robot.body is not None else b""
+            found = measured_before(place_of(robot, body, name, every), outcome, again=again)
             if "error" in found:
                 errors[name] = found["error"]
                 logging.getLogger(__name__).warning("%s, %s: %s", robot.name, name, found["error"])
