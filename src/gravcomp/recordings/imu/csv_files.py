@@ -68,9 +68,9 @@ def _of_file(path: Path, mapping: CsvColumns | None) -> Recording:
 
 def _of_folder(path: Path) -> Recording:
     """Return the recording of a folder with a file for each sensor."""
-    files = sorted(file for file in path.glob("*.csv"))
-    tables = {file: read_table(file, longest=2) for file in files if _has_numbers(file)}
-    found = {file: by_names(table.names, file.stem, table.source) for file, table in tables.items()}
+    files = sorted(path.glob("*.csv"))
+    beginnings = {file: _beginning(file) for file in files}
+    found = {file: by_names(table.names, file.stem, table.source) for file, table in beginnings.items() if table is not None}
     for file, columns in found.items():
         if columns.gyro and columns.accel and not columns.linear:
             return _of_file(file, None)
@@ -81,11 +81,13 @@ def _of_folder(path: Path) -> Recording:
     if not gyros or not accels:
         names = ", ".join(file.name for file in files)
         raise RecordingError(f"{path}: has no file of a gyroscope and one of an accelerometer; found: {names}; {_NEEDED}")
-    stamp, gyro, notes = _sensor(gyros[0], found[gyros[0]].gyro, GYRO_UNITS, found[gyros[0]].gyro_unit)
+    columns = found[gyros[0]]
+    stamp, gyro, notes = _sensor(gyros[0], columns, columns.gyro, GYRO_UNITS[columns.gyro_unit or "rad/s"])
     parts = [accels[0]] if "total" in accels[0].stem.lower() else [accels[0], *gravity]
     accel = np.zeros_like(gyro)
     for part in parts:
-        times, values, more = _sensor(part, found[part].accel, ACCEL_UNITS, found[part].accel_unit)
+        columns = found[part]
+        times, values, more = _sensor(part, columns, columns.accel, ACCEL_UNITS[columns.accel_unit or "m/s^2"])
         accel += np.stack([np.interp(stamp, times, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
         notes = (*notes, *more)
     both = np.isfinite(accel).all(axis=1)
@@ -96,22 +98,20 @@ def _of_folder(path: Path) -> Recording:
     )
 
 
-def _sensor(
-    path: Path, axes: tuple[int, ...], units: dict[str, float], unit: str | None
-) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+def _sensor(path: Path, found: Found, axes: tuple[int, ...], unit: float) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Return stamps (n,) in ns, values (n, 3) in SI of the columns `axes`, and what was repaired; unit: of the columns, in SI."""
     table = read_table(path)
-    found = by_names(table.names, path.stem, table.source)
     values = _vectors(table, axes)
     stamp, notes = _stamps(table, found, None, values)
-    return stamp, values * units[unit or next(iter(units))], (*notes, *_converted(found))
+    return stamp, values * unit, (*notes, *_converted(found))
 
 
-def _has_numbers(path: Path) -> bool:
+def _beginning(path: Path) -> Table | None:
+    """Return the first rows of a file, None for one without numbers."""
     try:
-        read_table(path, longest=2)
+        return read_table(path, longest=2)
     except RecordingError:
-        return False
-    return True
+        return None
 
 
 def _vectors(table: Table, columns: tuple[int, ...]) -> np.ndarray:
