@@ -66,6 +66,9 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
+KINDS = ("loop", "composed")
+"""Options with which a benchmark measures something else, which has a table of its own."""
+
 BRIEF: dict[str, dict[str, Any]] = {
     "engine": {"every": 25},
     "robots": {"every": 10},
@@ -110,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.report import figures_table
 
-    other = next((f" --{name}" for name in ("loop", "composed") if getattr(args, name, False)), "")
+    other = next((f" --{name}" for name in KINDS if getattr(args, name, False)), "")
     command = f"bench {args.benchmark}{other}"
     if args.write and args.brief:
         raise ConfigError("--write and --brief exclude each other: a document takes the figures of whole benchmarks")
@@ -132,8 +135,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _typed(args: argparse.Namespace, command: str) -> str:
-    """Return the command with the files and figures that were given."""
+    """Return the command with the files, figures and options that were given, but without those that `command` has."""
     words = [command]
+    for option, (default, _) in OPTIONS.get(args.benchmark, {}).items():
+        given = getattr(args, option)
+        if given != default and option not in (*KINDS, "again"):
+            words += [f"--{option}", str(given)]
     for argument in LISTS.get(args.benchmark, {}):
         given = getattr(args, argument.lstrip("-"))
         words += [argument, *given] if given and argument.startswith("--") else given
