@@ -47,9 +47,6 @@ def deformation_message(shape: Shape, header: Header) -> Deformation:
 
 def contact_of(message: Deformation) -> ObstacleForces:
     """Return the obstacles that a message names. Raises ValueError when its arrays do not match, or a number is not finite."""
-    gravity = message.gravity.x, message.gravity.y, message.gravity.z  # places what is in the world
-    if not np.isfinite(gravity).all():
-        raise ValueError(f"gravity is {gravity}; finite numbers are needed")
     count, cables = len(message.contact_obstacle), len(message.cable_tension)
     return ObstacleForces(
         names=tuple(message.contact_obstacle),
@@ -57,6 +54,11 @@ def contact_of(message: Deformation) -> ObstacleForces:
         position=_matrix(message.contact_position, count, 3, "contact_position"),
         change=_matrix(message.contact_force_change, count, cables, "contact_force_change"),
     )
+
+
+def gravity_of(message: Deformation) -> np.ndarray:
+    """Return the gravity (3,) in m/s^2 of a message. Raises ValueError when it is not finite."""
+    return _matrix(array("d", [message.gravity.x, message.gravity.y, message.gravity.z]), 1, 3, "gravity")[0]
 
 
 def response_of(message: Deformation) -> Response:

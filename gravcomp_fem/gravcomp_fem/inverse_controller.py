@@ -22,7 +22,16 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
-from gravcomp_fem.conversion import contact_of, doubles, point_message, pose_target, response_of, seconds, shape_target
+from gravcomp_fem.conversion import (
+    contact_of,
+    doubles,
+    gravity_of,
+    point_message,
+    pose_target,
+    response_of,
+    seconds,
+    shape_target,
+)
 from gravcomp_fem.tracker_input import TrackerInput
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
@@ -135,7 +144,7 @@ class InverseController(ManagedNode):
             self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
             return
         try:
-            response, contact = response_of(message), contact_of(message)
+            response, contact, gravity = response_of(message), contact_of(message), gravity_of(message)
         except ValueError as error:
             self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
             return
@@ -159,7 +168,7 @@ class InverseController(ManagedNode):
                 interval=interval,
                 followed=message.status != Deformation.NOT_CONVERGED,
                 contact=contact,
-                gravity=np.array([message.gravity.x, message.gravity.y, message.gravity.z]),
+                gravity=gravity,
             )
         else:
             self._publish_code(

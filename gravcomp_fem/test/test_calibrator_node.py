@@ -55,9 +55,6 @@ class Stand:
         answer.success, answer.message = self.willing, "" if self.willing else "not now"
         return answer
 
-    def _hear(self, message):
-        self.heard.append(np.array(message.displacement))
-
     def publish(self):
         """Publish 20 ms of the robot's time."""
         self.time += 0.02
