@@ -35,7 +35,7 @@ def run(context: Context) -> Result:
         for bend in (0.0, 30.0)
         for setup, weightless in ((context.setup, True), *((setup, False) for setup in setups.values()))
     ]
-    traces = context.map(_pass, jobs, "two passes of 90 s")
+    traces = context.map(_pass, jobs, "two passes")
     figures, rows, plots, notes = [], [], [], []
     for index, bend in enumerate((0.0, 30.0)):
         without, fitted, plain = traces[3 * index : 3 * index + 3]
