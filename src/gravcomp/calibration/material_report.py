@@ -1,6 +1,6 @@
 """Report of a fit to a relaxation or creep test: the terms with their intervals, and the course, measured and fitted."""
 
-from gravcomp.calibration.material_test import MaterialTest
+from gravcomp.calibration.material_recording import MaterialTest
 from gravcomp.calibration.prony_fit import SeriesFit
 from gravcomp.report.drawing import MODEL, REAL, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table

@@ -14,7 +14,7 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.calibration.material_test import MaterialTest
+from gravcomp.calibration.material_recording import MaterialTest
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.description import PronyTerm
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result", Path, Path]:
     """Fit, and write robot file and page. Returns the result, the robot file and the page. Raises ConfigError."""
     from gravcomp.calibration.apply import overlay_path, write_calibrated
+    from gravcomp.calibration.material_recording import read_material_recording
     from gravcomp.calibration.material_report import material_result
-    from gravcomp.calibration.material_test import read_material_test
     from gravcomp.calibration.measured import MeasurementError
     from gravcomp.calibration.prony_fit import fit_series
     from gravcomp.config import ConfigError
@@ -23,7 +23,7 @@ def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result",
     target = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
     started = time.perf_counter()
     try:
-        test = read_material_test(args.data)
+        test = read_material_recording(args.data)
         fit = fit_series(test)
     except MeasurementError as error:
         raise ConfigError(str(error)) from error

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from gravcomp.calibration.material_test import MaterialTest, read_material_test
+from gravcomp.calibration.material_recording import MaterialTest, read_material_recording
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.prony_fit import course, fit_series
 from gravcomp.commands.__main__ import main
@@ -93,4 +93,4 @@ def test_tables_that_are_no_test_are_refused(tmp_path, text, found):
     table = tmp_path / "test.csv"
     table.write_text(text)
     with pytest.raises(MeasurementError, match=found):
-        read_material_test(table)
+        read_material_recording(table)

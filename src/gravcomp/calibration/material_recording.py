@@ -35,7 +35,7 @@ class MaterialTest:
         return "creep" if self.creep else "relaxation"
 
 
-def read_material_test(path: str | Path) -> MaterialTest:
+def read_material_recording(path: str | Path) -> MaterialTest:
     """Read a CSV file with a header. Samples at or before the time 0 are left out.
 
     Raises MeasurementError, naming file, line and column, for other columns, cells that are no numbers, times that do not
