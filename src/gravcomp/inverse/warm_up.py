@@ -15,8 +15,13 @@ from gravcomp.scene import PlaneWall, SceneSection
 from gravcomp.scene.scene import Scene
 
 
-def warm_up(robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None) -> None:
-    """Compile, or load from the cache, all functions that a command for the robot needs. options: default `InverseOptions()`."""
+def warm_up(
+    robot: Robot, options: InverseOptions | None = None, transmission: Transmission | None = None, surrounded: bool = False
+) -> None:
+    """Compile, or load from the cache, all functions that a command for the robot needs. options: default `InverseOptions()`.
+
+    surrounded: also those for obstacles and zones around it, which take half as long again.
+    """
     m, stations = len(robot.cables), np.linspace(0.0, 1.0, 3)
     if not m:
         return
@@ -30,7 +35,7 @@ def warm_up(robot: Robot, options: InverseOptions | None = None, transmission: T
     for tension in (None, np.zeros(m)):
         controller.step(response, target, backbone_station=stations, tension=tension)
     controller.relax(response)
-    if robot.body is None:  # zones and a bound on forces need more functions, wherever the obstacle is
+    if surrounded:  # wherever the obstacle is
         plane = PlaneWall(name="far", normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -10.0 * robot.length), forbidden=True)
         zones = Scene(SceneSection(planes=(plane,)), forbidden=True)
         InverseController(robot, options, transmission, zones=zones).step(response, target, backbone_station=stations)
