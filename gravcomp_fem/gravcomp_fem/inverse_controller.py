@@ -56,11 +56,11 @@ class InverseController(ManagedNode):
 
     def configure(self) -> None:
         """Compile the solver; create publishers and services."""
-        # Compile before the first deformation arrives.
-        robot, transmission = self.robot_file.robot, self._transmission()
-        file = self.robot_file
-        warm_up(robot, self.parameters.inverse, transmission, surrounded=bool(file.scene or file.zones))
+        file, transmission = self.robot_file, self._transmission()
+        robot = file.robot
         self._problem = InverseProblem(robot, self.parameters.inverse, transmission, file.scene, file.zones)
+        # Compile before the first deformation arrives.
+        warm_up(robot, self.parameters.inverse, transmission, surrounded=bool(file.scene or file.zones))
         self._tracker = TrackerInput(self, robot, self.parameters.frame)
         self._target: Target | None = self._straight() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
