@@ -9,8 +9,9 @@
 #define GC_LARGEST_DAMPING 1e4f      // damping.py
 #define GC_SMALLEST_CHANGE 5e-5f     // of the length
 #define GC_BACK_AND_FORTH (-0.3f)
-#define GC_RATE_MARGIN 1e-6f         // m
-#define GC_TENSION_MARGIN 1e-3f      // N
+#define GC_RATE_MARGIN 2.5e-3f       // of the largest change in a step; limits.py
+#define GC_TENSION_MARGIN 2e-4f      // of the limit
+#define GC_TRAVEL_MARGIN 2e-5f       // of the travel
 
 void gc_inverse_reset(gc_inverse_controller *controller, const gc_model *model) {
   gc_zero(controller, sizeof *controller);
@@ -69,7 +70,7 @@ static gc_code evaluate(const gc_model *model, const gc_shape *shape, const gc_t
     }
   }
   for (uint32_t k = 0; k < model->cables; ++k) {
-    held = held || tension[k] > s->tension_max - GC_TENSION_MARGIN;
+    held = held || tension[k] > (1.0f - GC_TENSION_MARGIN) * s->tension_max;
   }
   if (at_rate && !held) {
     return GC_CODE_AT_LIMIT;
@@ -119,7 +120,7 @@ static void take(gc_inverse_controller *controller, const gc_inverse_problem *pr
   const gc_model *model = controller->model;
   const gc_settings *s = model->settings;
   const uint32_t m = model->cables;
-  const float reach = s->displacement_rate * interval;
+  const float reach = s->displacement_rate * interval, margin = GC_TRAVEL_MARGIN * (s->displacement_max - s->displacement_min);
   float tension[GC_CABLES_MAX], change[GC_CABLES_MAX], largest = 0.0f;
   bool at_rate = false, at_travel = false;
   gc_zero(tension, sizeof tension);
@@ -132,9 +133,8 @@ static void take(gc_inverse_controller *controller, const gc_inverse_problem *pr
     change[i] = path - shape->displacement[i];
     const float wanted = path - gc_min(s->slack, shape->compliance[i][i] * unwanted), before = controller->displacement[i];
     const float displacement = within_limits(s, wanted, before, interval);
-    at_rate = at_rate || gc_abs(displacement - before) > reach - GC_RATE_MARGIN;
-    at_travel = at_travel || displacement > s->displacement_max - GC_RATE_MARGIN ||
-                displacement < s->displacement_min + GC_RATE_MARGIN;
+    at_rate = at_rate || gc_abs(displacement - before) > (1.0f - GC_RATE_MARGIN) * reach;
+    at_travel = at_travel || displacement > s->displacement_max - margin || displacement < s->displacement_min + margin;
     largest = gc_max(largest, gc_abs(displacement - before));
     controller->displacement[i] = displacement;
   }
