@@ -119,7 +119,7 @@ static uint8_t end(gc_model_store *store) {
   if (!store->memory.write(store->memory.context, store->slot, 0u, store->magic)) {
     return GC_STORE_NOT_STORED;  // the loop goes on with the old one, also after a reset
   }
-  (void)gc_standalone_take(store->loop, blob, store->size, store->magic, store->memory.alive);
+  gc_standalone_use(store->loop, &model);
   // Until the next write both places have a whole model of this robot.
   const uint32_t before = store->used;
   store->used = store->slot;

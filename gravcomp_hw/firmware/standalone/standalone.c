@@ -26,13 +26,17 @@ bool gc_standalone_take(gc_standalone *loop, const uint8_t *blob, size_t size, u
   if (loop->refusal != GC_MODEL_OK) {
     return false;
   }
+  gc_standalone_use(loop, &model);
+  return true;
+}
+
+void gc_standalone_use(gc_standalone *loop, const gc_model *model) {
   gc_zero(loop, sizeof *loop);
-  loop->model = model;
+  loop->model = *model;
   loop->loaded = true;
-  gc_gravity_reset(&loop->gravity, model.settings);
+  gc_gravity_reset(&loop->gravity, model->settings);
   gc_equilibrium_reset(&loop->equilibrium, &loop->model);
   gc_inverse_reset(&loop->controller, &loop->model);  // homing leaves the cables where the straight robot has them
-  return true;
 }
 
 // Convert a sample's counts: gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false for ranges that the chip does not have.

@@ -37,6 +37,9 @@ typedef struct {
 // before goes on. After the first model only those of the same robot are taken. magic and alive: of gc_model_open.
 bool gc_standalone_take(gc_standalone *loop, const uint8_t *blob, size_t size, uint32_t magic, gc_alive *alive);
 
+// Start with a model that was opened, and the stored target.
+void gc_standalone_use(gc_standalone *loop, const gc_model *model);
+
 // Let a loop that was copied to another place in memory go on with the same model, `model`, which was opened there.
 void gc_standalone_moved(gc_standalone *loop, const gc_model *model);
 
