@@ -36,9 +36,7 @@ def estimate_recording(
     row: tuple | None = None
     temperatures = _temperatures(recording)
     next_temperature = next(temperatures, None)
-    # Python numbers: with NumPy scalars a sample takes 1.5 times as long.
-    samples = zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist())
-    for i, (stamp_ns, gyro, accel) in enumerate(samples):
+    for i, (stamp_ns, gyro, accel) in enumerate(recording.samples()):
         while next_temperature is not None and next_temperature[0] <= stamp_ns:
             estimator.add_temperature(*next_temperature)
             next_temperature = next(temperatures, None)
