@@ -49,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
     from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
     from gravcomp.orientation.inclination import inclination_rmse
+    from gravcomp.orientation.offline import without_rate_spikes
     from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         if correction is not None:
             recording = calibrated(recording, correction)
         if args.average > 1:
-            recording = recording.averaged(args.average)
+            recording = without_rate_spikes(recording).averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         options, mount = _of_robot(args.robot)
         estimator = GravityEstimator(options, mount, model)
