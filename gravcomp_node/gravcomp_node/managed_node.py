@@ -119,15 +119,25 @@ class ManagedNode(LifecycleNode):
         return publisher
 
     def create_subscription(
-        self, msg_type: type, topic: str, callback: Callable, qos_profile: QoSProfile | int, **options: Any
+        self,
+        msg_type: type,
+        topic: str,
+        callback: Callable,
+        qos_profile: QoSProfile | int,
+        *,
+        takes: Callable | None = None,
+        **options: Any,
     ) -> Subscription:
-        """Create a subscription, as rclpy does. Raises ConfigError for an override that is not allowed."""
+        """Create a subscription, as rclpy does. Raises ConfigError for an override that is not allowed.
+
+        takes: callback for the values that nodes of this process publish (gravcomp_node.local_topics.Adapted).
+        """
         if not self._is_made:
             return super().create_subscription(msg_type, topic, callback, qos_profile, **options)
         subscription = self._create(super().create_subscription, msg_type, topic, callback, qos_profile, **options)
         if self.local is not None and not subscription.raw:
             polled = isinstance(subscription.callback_group, NeverExecuted)
-            self.local.add_subscription(self, subscription, None if polled else callback)
+            self.local.add_subscription(self, subscription, None if polled else callback, takes)
         return subscription
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
