@@ -65,8 +65,8 @@ def compare(progress: Callable[[str], None], *, pairs: int, listen: float, warm_
     if pairs >= _FEWEST and not (found.is_known and len(delays[True]) >= _FEWEST):
         raise TimeoutError(
             f"after {len(delays[True])} of {pairs} pairs of runs the ratio is known to +- {found.within:.0f} % only"
-            f" ({found.less:.0f} % less): other programs move the delay more than the nodes do; measure again when the machine does"
-            " nothing else"
+            f" ({found.less:.0f} % less): other programs move the delay more than the nodes do; measure again when the machine"
+            " does nothing else"
         )
     tails = {kind: [float(np.percentile(run, 99)) for run in runs] for kind, runs in delays.items()}
     apart, together = ({"median": medians[kind], "p99": tails[kind]} for kind in (False, True))
