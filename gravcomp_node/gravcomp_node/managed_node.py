@@ -17,7 +17,7 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-from gravcomp.config import ConfigError
+from gravcomp.config import ConfigError, declared_parameters
 from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.shared import SharedParameters
 from gravcomp_node import ros_parameters
@@ -54,6 +54,7 @@ class ManagedNode(LifecycleNode):
         self.parameters = ros_parameters.declare(
             self, self.parameters_class, section, f"{self.robot_file.source}: nodes.{self.name}"
         )
+        self._own_keys = {leaf.key for leaf in declared_parameters(self.parameters_class)}
         ros_parameters.refuse_unknown_overrides(self, (SharedParameters, self.parameters_class))
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._apply_change)
@@ -244,6 +245,8 @@ class ManagedNode(LifecycleNode):
         return section
 
     def _check_change(self, changes: list) -> SetParametersResult:
+        if not self._are_own(changes):
+            return SetParametersResult(successful=True)
         try:
             self.check_parameters(ros_parameters.read(self, self.parameters_class, changes))
         except ConfigError as error:
@@ -251,9 +254,15 @@ class ManagedNode(LifecycleNode):
         return SetParametersResult(successful=True)
 
     def _apply_change(self, changes: list) -> None:
+        if not self._are_own(changes):
+            return
         old, self.parameters = self.parameters, ros_parameters.read(self, self.parameters_class)
         if old != self.parameters:
             self.parameters_changed(old, self.parameters)
+
+    def _are_own(self, changes: list) -> bool:
+        """Return whether there are declared parameters among the changes: each override of a quality of service is one, too."""
+        return any(change.name in self._own_keys for change in changes)
 
     def _publish_diagnostics(self) -> None:
         status = DiagnosticStatus(
