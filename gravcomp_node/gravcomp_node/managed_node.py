@@ -88,13 +88,17 @@ class ManagedNode(LifecycleNode):
         """Set the level, message and values that /diagnostics publishes from now on."""
         self._level, self._sentence, self._values = level, sentence, values
 
-    def start(self) -> None:
-        """Configure and activate if `autostart` is set. Raises ConfigError when the node refuses a transition."""
+    def start(self, may_activate: Callable[[], bool] = lambda: True) -> None:
+        """Configure and, if then `may_activate()`, activate; not without `autostart`.
+
+        Raises ConfigError when the node refuses a transition.
+        """
         if not self.autostart:
             return
-        for transition in (self.trigger_configure, self.trigger_activate):
-            if transition() != TransitionCallbackReturn.SUCCESS:
-                raise ConfigError(self.failure or "could not be started")
+        if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+            raise ConfigError(self.failure or "could not be started")
+        if may_activate() and self.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+            raise ConfigError(self.failure or "could not be started")
 
     def shut_down(self) -> None:
         """Deactivate and clean up from any state. Logs exceptions instead of raising them."""
