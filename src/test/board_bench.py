@@ -87,8 +87,11 @@ class Bench:
         return next(frame for _, frame in reversed(self.host) if frame.arbitration_id == frame_id)
 
 
-def blob_of(modes: int = 4, motion: float = 1.0) -> bytes:
-    """A whole blob of six cables in one piece each, on modes that shorten none of them; `motion`: of the tip by the modes."""
+def blob_of(modes: int = 4, motion: float = 1.0, law_points: int = 0, branches: int = 0) -> bytes:
+    """A whole blob of six cables in one piece each, on modes that shorten none of them; `motion`: of the tip by the modes.
+
+    law_points: points at which a law of rubber adds a little; branches: of a material that creeps.
+    """
     pairs, cables, points = modes * (modes + 1) // 2, 6, 2
     section = np.zeros((9, modes))
     section[0, 0], section[1, 1], section[2, 2] = motion, motion, 0.1 * motion
@@ -105,9 +108,11 @@ def blob_of(modes: int = 4, motion: float = 1.0) -> bytes:
         np.zeros((modes, pairs)), np.zeros((pairs, cables)), change, np.eye(3, modes), section,
         (0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), np.tile((0.0, 0.0, 0.1), (cables, 1)), np.zeros((points, 3, modes)),
         np.linspace((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), points), np.full(cables, 0.1), np.full(cables, 1e-4),
-        *[np.zeros(cables)] * 3, np.full(cables, 0.05), settings,
+        *[np.zeros(cables)] * 3, np.full(cables, 0.05),
+        0.3 * np.random.default_rng(3).normal(size=(law_points, modes, 9)), np.tile((8.0, 1.0, 0.3, 0.1, 0.05, 0.1), (law_points, 1)),
+        np.tile((0.2, 0.98, 0.99), (branches, 1)), settings,
     )  # fmt: skip
     body = b"".join(np.asarray(table, "<f4").tobytes() for table in tables) + bytes(range(cables)) + bytes(2)
-    counts = struct.pack("<8I", modes, modes, cables, cables, model_blob.SETTINGS, points, 0, 0)
+    counts = struct.pack("<8I", modes, modes, cables, cables, model_blob.SETTINGS, points, law_points, branches)
     head = struct.pack("<4sIII", model_blob.MAGIC, model_blob.VERSION, 64 + len(body), 0)
     return model_blob.with_crc(head + b"a robot of tests" + counts + body)

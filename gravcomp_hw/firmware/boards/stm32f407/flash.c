@@ -36,6 +36,7 @@ static void unlock(void) {
     FLASH->keyr = FLASH_KEY2;
   }
   FLASH->sr = FLASH_SR_ERRORS;
+  gc_heater_pwm_set(0u);  // after interrupts are off: for up to two seconds nobody watches it; the next tick sets it again
 }
 
 static bool lock(void) {
@@ -85,7 +86,6 @@ extern const uint8_t gc_model_a[], gc_model_b[];
 static bool erase_model(void *context, uint32_t slot, uint32_t sector) {
   (void)context;
   unlock();
-  gc_heater_pwm_set(0u);  // after interrupts are off: for up to two seconds nobody watches it; the next tick sets it again
   erase_sector(FIRST_MODEL_SECTOR + MODEL_SECTORS * slot + sector);
   return lock();
 }
