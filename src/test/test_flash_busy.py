@@ -36,9 +36,7 @@ def answered(b, limit: int) -> int:
     return b.now - begin
 
 
-@pytest.mark.parametrize(
-    ("message", "longest"), [(requests.save(), SAVING), (model_transfer.request("erase", sector=0), SECTOR)]
-)
+@pytest.mark.parametrize(("message", "longest"), [(requests.save(), SAVING), (model_transfer.request("erase", sector=0), SECTOR)])
 def test_while_a_sector_is_erased_motors_and_heater_are_off_and_nothing_hangs(message, longest):
     b = warm(blob_of() if longest == SECTOR else None)
     if longest == SECTOR:
@@ -77,6 +75,17 @@ def test_a_host_that_starts_and_dies_while_a_sector_is_erased_gets_no_current():
     late = [time for time, frame in b.to_motors[sent:] if any(frame.data)]
     assert not late or late[-1] - late[0] <= 2
     assert b.currents(1)[-1][1] == 0
+
+
+def test_the_brown_out_reset_of_the_chip_is_switched_on_once_where_the_supply_is_good():
+    machine = ImageBoard().machine
+    assert (machine.flash.options >> 2 & 3, machine.flash.options_written) == (0, 1)  # 2.7 V
+    assert machine.flash.options & ~0b1100 == 0x0FFFAAEC & ~0b1100  # nothing else has changed
+    machine.reset("power")
+    assert machine.flash.options_written == 1
+    machine.flash.options, machine.supply_low = 0x0FFFAAEC, True
+    machine.reset("supply")
+    assert machine.flash.options_written == 1
 
 
 def test_a_flash_that_is_busy_while_nobody_feeds_the_watchdog_is_a_fault():

@@ -88,7 +88,7 @@ def pack(
         cables.free_length,
         least_tension,
         model.deviation.gradient.reshape(modes, 9, -1).transpose(2, 0, 1),
-        _law_constants(model.deviation),
+        law_constants(model.deviation),
         _branch_table(branches, period),
         settings,
     )
@@ -96,27 +96,21 @@ def pack(
     body = b"".join(np.ascontiguousarray(table, dtype="<f4").tobytes() for table in tables)
     body += cables.cable.astype("u1").tobytes() + bytes(-count % 4)
     points = len(model.section_rest) - 1
-    counts = (modes, linear.shape[1] + missing, len(cables.rest_length), count, len(settings), points, len(model.deviation.weight), len(branches))
+    counts = (
+        modes,
+        linear.shape[1] + missing,
+        len(cables.rest_length),
+        count,
+        len(settings),
+        points,
+        len(model.deviation.weight),
+        len(branches),
+    )
     header = _HEADER.pack(MAGIC, VERSION, _HEADER.size + len(body), 0, robot_digest(robot), *counts)
     return with_crc(header + body)
 
 
-def with_crc(blob: bytes) -> bytes:
-    """Return the blob with the CRC of its content."""
-    return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
-
-
-def blob_bytes(
-    modes: int, strains: int, cables: int, pieces: int, points: int, law_points: int = 0, branches: int = 0
-) -> int:
-    """Return the number of bytes of a blob with these counts."""
-    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
-    floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
-    floats += law_points * (9 * modes + LAW_FLOATS) + branches * BRANCH_FLOATS
-    return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
-
-
-def _law_constants(deviation: LawDeviation) -> np.ndarray:
+def law_constants(deviation: LawDeviation) -> np.ndarray:
     """Return the constants (p, 6) of gc_law: weight times lambda, mu, c10, c20, c30 and c01 in Pa."""
     rows = np.zeros((len(deviation.weight), LAW_FLOATS))
     for row, weight, law, constants in zip(rows, deviation.weight, deviation.law, deviation.constants):
@@ -129,6 +123,19 @@ def _law_constants(deviation: LawDeviation) -> np.ndarray:
         row[:3] = constants[0], constants[1], c10
         row *= weight
     return rows
+
+
+def with_crc(blob: bytes) -> bytes:
+    """Return the blob with the CRC of its content."""
+    return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
+
+
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int, law_points: int = 0, branches: int = 0) -> int:
+    """Return the number of bytes of a blob with these counts."""
+    floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
+    floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
+    floats += law_points * (9 * modes + LAW_FLOATS) + branches * BRANCH_FLOATS
+    return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
 
 
 def _branch_table(branches: Sequence[tuple[float, float]], period: float) -> np.ndarray:

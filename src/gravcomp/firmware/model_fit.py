@@ -146,7 +146,9 @@ def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -
             f"{source}: has {len(branches)} materials that creep differently; the reduced model, and the board, have one"
         )
     if len(_branches(model)) > BRANCHES_MAX:
-        raise ConfigError(f"{source}: a material has {len(_branches(model))} terms in prony; the firmware has room for {BRANCHES_MAX}")
+        raise ConfigError(
+            f"{source}: a material has {len(_branches(model))} terms in prony; the firmware has room for {BRANCHES_MAX}"
+        )
     if cables > min(CABLES_MAX, 8):
         raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
     if len(whole.section_rest) - 1 > POINTS_MAX:

@@ -29,6 +29,25 @@ __attribute__((section(".in_ram"), noinline)) static void write_word(volatile ui
   FLASH->cr = FLASH_CR_WORDS;
 }
 
+__attribute__((section(".in_ram"), noinline)) static void write_options(uint32_t options) {
+  FLASH->optkeyr = FLASH_OPTION_KEY1;
+  FLASH->optkeyr = FLASH_OPTION_KEY2;
+  FLASH->optcr = options;
+  FLASH->optcr = options | FLASH_OPTCR_START;
+  wait();
+  FLASH->optcr = options | FLASH_OPTCR_LOCK;
+}
+
+void gc_flash_guard_supply(void) {
+  const uint32_t options = FLASH->optcr & ~(FLASH_OPTCR_LOCK | FLASH_OPTCR_START);
+  if ((options & FLASH_OPTCR_BROWN_OUT) == 0u || (PWR->csr & PWR_CSR_PVDO) != 0u) {
+    return;
+  }
+  __asm__ volatile("cpsid i" ::: "memory");
+  write_options(options & ~FLASH_OPTCR_BROWN_OUT);
+  __asm__ volatile("cpsie i" ::: "memory");
+}
+
 static void unlock(void) {
   __asm__ volatile("cpsid i" ::: "memory");
   if ((FLASH->cr & FLASH_CR_LOCK) != 0u) {
