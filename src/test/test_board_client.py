@@ -35,7 +35,7 @@ SLOW = 0.2
 
 
 class FreeMotors:
-    """Motors behind a board that have the current they are told, and do not turn."""
+    """Motors behind a board that have the commanded current, and do not turn."""
 
     def __init__(self, board, motors):
         self.board, self.current = board, dict.fromkeys(motors, 0.0)
