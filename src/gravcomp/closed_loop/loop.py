@@ -233,13 +233,14 @@ class ClosedLoop:
         estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
         if not isinstance(estimate, Problem):
             self._gravity = np.array(estimate.gravity)
+            if self._turn is not None:
+                self._turn.add(sample.stamp, self._mount @ np.array(estimate.imu.angular_velocity))
         released = self._target is None
         gravity = np.zeros(3)
         if released or not self._weightless:
             gravity = self._gravity
-            if self._turn is not None and not isinstance(estimate, Problem):
-                rate = self._mount @ np.array(estimate.imu.angular_velocity)
-                gravity = gravity + self._turn.acceleration(sample.stamp, rate)
+            if self._turn is not None:
+                gravity = gravity + self._turn.acceleration(sample.stamp)
         # The model starts at rest and relaxed, and creeps from then on.
         elapsed = None if self.shape is None else SAMPLE_PERIOD
         carried = None if self._load is None else self._load.wrench(gravity, self.time)

@@ -15,6 +15,7 @@ and w is low-passed by a share of it before it is differentiated: the robot foll
 of the base itself are not in the field: where the IMU sits on the base is not known well enough to tell them from its errors.
 """
 
+import collections
 import math
 
 import numpy as np
@@ -23,11 +24,14 @@ from gravcomp.external_loads.options import BaseTurnOptions
 from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.robot_model import RobotModel
 
+_KEPT = 16  # rates that wait for a later sample of gravity
+_STALE = 10.0  # intervals between rates, after which the last one says nothing
+
 
 class BaseTurn:
     """Follows the rate of a base.
 
-    Attributes: height in m, h of the module; period in s, T; options, which may be replaced while it runs.
+    Attributes: height in m, h of the module; period in s, T; options, of which `lag` may be replaced while it runs.
     """
 
     def __init__(self, model: RobotModel, options: BaseTurnOptions):
@@ -37,29 +41,39 @@ class BaseTurn:
 
     def reset(self) -> None:
         """Forget the rates: the next one begins."""
-        self._time = -math.inf
-        self._rate = np.zeros(3)
+        self._waiting: collections.deque[tuple[float, np.ndarray]] = collections.deque(maxlen=_KEPT)
+        self._time, self._interval = -math.inf, math.inf
+        self._rate, self._acting = np.zeros(3), np.zeros(3)
 
-    def acceleration(self, time: float, rate: np.ndarray) -> np.ndarray:
-        """Return what adds to gravity (3,) in m/s^2 in soft_base; rate (3,) in rad/s in soft_base at `time` s.
+    def add(self, time: float, rate: np.ndarray) -> None:
+        """Take the rate (3,) in rad/s in soft_base at `time` s; one that is not finite is left out."""
+        if np.isfinite(rate).all():
+            self._waiting.append((time, np.array(rate, dtype=float)))
 
-        Time that runs backwards begins anew, as after a restart of a replay.
+    def acceleration(self, time: float) -> np.ndarray:
+        """Return what adds to gravity (3,) in m/s^2 in soft_base at `time` s, by the rates before it; zeros without fresh ones.
+
+        The rate of the sample itself does not count: in the graph it may come a little later, and the result does not depend on
+        that.
         """
-        if not self.options.enabled:
-            return np.zeros(3)
-        if not time > self._time:
-            self._time = -math.inf
+        while self._waiting and self._waiting[0][0] < time:
+            self._follow(*self._waiting.popleft())
+        fresh = 0.0 < time - self._time <= _STALE * self._interval
+        return self._acting if self.options.enabled and fresh else np.zeros(3)
+
+    def _follow(self, time: float, rate: np.ndarray) -> None:
+        """Go on to a rate; time that runs backwards begins anew, as after a restart of a replay."""
+        if not math.isfinite(self._time) or time <= self._time:
+            self._time, self._interval = time, math.inf
+            self._rate, self._acting = rate, np.zeros(3)
+            return
         share = lag_share(self._time, time, self.options.lag * self.period)
-        began, self._time = self._time, time
-        if not math.isfinite(began):
-            self._rate = np.array(rate, dtype=float)
-            return np.zeros(3)
-        step = share * (rate - self._rate)
-        self._rate = self._rate + step
-        ax, ay, _ = (step / (time - began)).tolist()
+        step, self._interval = share * (rate - self._rate), time - self._time
+        self._rate, self._time = self._rate + step, time
+        ax, ay, _ = (step / self._interval).tolist()
         wx, wy, wz = self._rate.tolist()
         # - a x r - w x (w x r) at r = (0, 0, h)
-        return self.height * np.array([-ay - wx * wz, ax - wy * wz, wx * wx + wy * wy])
+        self._acting = self.height * np.array([-ay - wx * wz, ax - wy * wz, wx * wx + wy * wy])
 
 
 def _height_and_period(model: RobotModel) -> tuple[float, float]:

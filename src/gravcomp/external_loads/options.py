@@ -26,7 +26,9 @@ class BaseTurnOptions:
     """Whether the forces of the base's turns act on the model, and how smooth they are."""
 
     enabled: bool = parameter(
-        True, description="forces of the base's turns, from the rate in imu/data, act on the model of a robot without a scene"
+        True,
+        read_only=True,
+        description="forces of the base's turns, from the rate in imu/data, act on the model; not in a scene",
     )
     lag: float = parameter(
         0.1, minimum=0.01, maximum=10.0, description="time of the low-pass of the rate, over the robot's first period"

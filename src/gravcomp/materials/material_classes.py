@@ -1,5 +1,6 @@
-"""How materials of a class creep, damp and rub inside: what a robot file does not say, the virtual robot draws around it, and a
-calibration begins with it.
+"""How materials of a class creep, damp and rub inside, where a robot file does not say it.
+
+The virtual robot is drawn around these values, and the fit of a calibration begins with them.
 
 Elastomers: silicones and PolyJet rubbers relax by 5 to 15 % within a minute. Thermoplastic elastomers (printed TPU) relax more;
 metals and fibres hardly. `damping` is the damping ratio of the first bending motion, `slip` the share of a rate-independent
