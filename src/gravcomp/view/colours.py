@@ -17,6 +17,7 @@ BRAND: Rgb = (47, 111, 237)
 WALL: Rgb = (138, 160, 190)
 ZONE: Rgb = (239, 68, 68)
 PLACED: Rgb = (245, 158, 11)
+TISSUE: Rgb = (226, 150, 136)
 LOAD: Rgb = (168, 85, 247)
 
 # Full scale of the colours; compensation of the robot's own weight needs less.

@@ -11,10 +11,12 @@ from gravcomp.description import Robot
 from gravcomp.view import colours
 from gravcomp.view.controls import Controls
 from gravcomp.view.graphics import chosen
+from gravcomp.view.inset import Inset
 from gravcomp.view.options import PageOptions
 from gravcomp.view.plots import Plots
 from gravcomp.view.requests import Request
 from gravcomp.view.scene import Scene
+from gravcomp.view.skin import half_width
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.status import cables_html, legend_html, status_html, touches_html
 from gravcomp.view.timeline import Timeline
@@ -57,6 +59,7 @@ class Page:
             self._plots = Plots(self._server, self._names, options)
         panel.dock_left()
         panel.set_width(_PANEL_WIDTH)
+        self._inset = Inset(gui, shapes, robot.length, half_width(robot))
         self._server.on_client_disconnect(self._on_disconnect)
 
     @property
@@ -117,6 +120,7 @@ class Page:
         self._status.content = status_html(snapshot, held_at)
         self._cables.content = cables_html(snapshot, self._names)
         touches = touches_html(snapshot)
+        self._inset.show(snapshot)
         self._touches.content, self._touches.visible = touches, bool(touches)
         self._legend.content = legend_html(snapshot.truth is not None)
 
