@@ -84,6 +84,10 @@ ROWS = {
             5.0,
         ),
         Row("standalone_residual_pct", "the same with the loop on the board", "%", 5.0),
+        Row("robots.*.tip_mm", "loop on the board against the host's, worst tip of the model", "mm"),
+        Row("robots.*.command_mm", "the same, worst cable command", "mm"),
+        Row("robots.*.basis_error_mm", "tip with the basis that fits against that with all modes, worst", "mm"),
+        Row("robots.*.ms", "step of the loop on the board, estimated at 168 MHz, worst", "ms", 10.0),
     ),
     "contact": (
         Row("contact_error_pct", "tip and force of contact against closed forms, worst", "%", 0.5),

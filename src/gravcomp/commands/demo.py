@@ -110,6 +110,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
     alone = args.board == "standalone"
+    if args.board != "virtual":
+        output.note(f"The board is on the bus `--interface udp_multicast --channel {channels.split(',')[0]}`")
     parameters: dict[str, dict] = {"virtual_robot": motion}
     if alone:
         _prepare_alone(args.robot)
