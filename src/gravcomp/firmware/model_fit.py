@@ -55,9 +55,8 @@ _REST_CYCLES = 215_000  # inverse problem, filter, tip, compliance: hardly depen
 class Fit:
     """A basis that fits: its model, bytes of the blob, multiply-adds of a step, estimated ms, and error in m.
 
-    error: worst distance of the tip from that of the whole reduced model in the closed loop, with a law of rubber that of the loop on
-    the board; reduction_error: of that from the
-    full model, where it was built.
+    error: worst distance of the tip from that of the whole reduced model in the closed loop, with a law of rubber that of the
+    loop on the board; reduction_error: of that from the full model, where it was built.
     """
 
     model: ReducedModel
