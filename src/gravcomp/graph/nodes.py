@@ -106,6 +106,7 @@ NODES = (
         f"{_PARAMETERS}.fem_simulator:FemSimulatorParameters",
         subscribes=(
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2, in soft_base"),
+            Port("imu/data", "sensor_msgs/msg/Imu", "rate of the base in rad/s (turn.enabled)", optional=True),
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
             Port("external/wrench", "geometry_msgs/msg/WrenchStamped", "known force (N) and moment (N m); the frame says where"),

@@ -39,6 +39,7 @@ class Page:
         self.address = f"http://{shown}:{self._server.get_port()}"
         self._names = robot.cable_names
         self._frame, self._idle_frames = 0, max(1, round(options.rate))
+        self._has_model = False  # whether the last snapshot had one
         self._shown: Snapshot | None = None  # while the page shows an earlier state
         gui = self._server.gui
         gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
@@ -70,8 +71,8 @@ class Page:
     def show(self, snapshot: Snapshot) -> None:
         """Draw a snapshot: the scene at each call, plots at every second, texts and figures at every fourth.
 
-        Without a browser the page is updated once per second, so that a new browser shows the current state. While the user looks
-        back, the page does not change.
+        Without a browser the page is updated once per second and when the model begins, so that a new browser shows the current
+        state. While the user looks back, the page does not change.
         """
         self._plots.add(snapshot)
         self._timeline.add(snapshot)
@@ -96,7 +97,9 @@ class Page:
     def _draw(self, snapshot: Snapshot) -> None:
         """Draw the live state."""
         alone = not self.clients
-        if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
+        begins = snapshot.tension is not None and not self._has_model
+        self._has_model = snapshot.tension is not None
+        if alone and not begins and self._frame % self._idle_frames != 1 % self._idle_frames:
             return
         with self._server.atomic():
             self._scene.show(snapshot)
