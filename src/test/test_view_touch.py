@@ -3,10 +3,14 @@
 import asyncio
 import dataclasses
 import math
+import time
 import types
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
+import viser
 
 from gravcomp.description import load_robot_file
 from gravcomp.operator.picture import Camera
@@ -70,6 +74,13 @@ def test_drawn_surfaces_lie_on_the_walls_and_face_into_the_free_space():
             nearest = min((gap_to(own, row, corners.mean(axis=0), normal), tuple(normal)) for row in rows)[1]
             assert out @ np.array(nearest) > 0.5 * np.linalg.norm(out), shape.name
         assert shape.in_world == (shape.name == "plane 2")
+
+
+def test_the_example_has_a_lumen_a_zone_and_a_table():
+    file = load_robot_file(Path(__file__).resolve().parents[1] / "examples" / "lumen_robot.yaml")
+    shapes = obstacle_shapes(file.scene, LENGTH) + obstacle_shapes(file.zones, LENGTH, forbidden=True)
+    assert {(shape.name, shape.in_world, shape.forbidden) for shape in shapes} == {
+        ("table", True, False), ("lumen", False, False), ("vessel", False, True)}  # fmt: skip
 
 
 def test_a_place_in_the_inset_is_that_of_the_operators_picture():
@@ -244,3 +255,46 @@ def test_what_no_page_sends_is_refused_with_a_sentence_and_nothing_else_is_lost(
     assert browsers.page.requests() == [] and "allowed: up to 1000 mm" in browsers.notified[-1]
     browsers.drag(browsers.hand, "update", (0.01, 0.0, 0.1))
     assert len(browsers.page.requests()) == 1
+
+
+def test_controls_that_a_browser_sets_to_nonsense_are_refused(browsers):
+    page, target = browsers.page, types.SimpleNamespace
+    for handle in page._server.gui._gui_input_handle_from_uuid.values():
+        if getattr(handle, "label", None) in ("bend °", "roll °", "cables", "motors", "presets"):
+            handle._impl.value = "nonsense"
+            for callback in handle._impl.update_cb:
+                callback(target(client=object(), target=handle))
+    assert page.requests() == [] and len(browsers.notified) == 4  # the preset is none, and asks for nothing
+
+
+def until_closed(connection):
+    while True:
+        connection.recv(timeout=20.0)
+
+
+def test_a_browser_that_sends_nonsense_disturbs_no_other(browsers):
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    address = browsers.page.address.replace("http://", "ws://")
+    subprotocol = f"viser-v{viser.__version__}"
+    with connect(address, subprotocols=[subprotocol], max_size=None) as good:
+        for nonsense in (b"\xff\x00\x93", b"", "text", msgspec.msgpack.encode({"type": "NoSuchMessage"})):
+            with connect(address, subprotocols=[subprotocol], max_size=None) as bad:
+                bad.send(nonsense)
+                with pytest.raises(ConnectionClosed):
+                    until_closed(bad)
+        drag = {
+            "type": "SceneNodeDragMessage", "name": "/robot/hand", "instance_index": None, "start_screen_pos": [0.5, 0.5],
+            "end_screen_pos": [0.5, 0.5], "start_position": [0.0, 0.0, 0.0], "button": "left", "modifier": None, "owner": "",
+        }  # fmt: skip
+        for phase, place in (("start", [0.1, 0.0, math.nan]), ("update", "here"), ("update", [0.5, 0.0, 0.1])):
+            good.send(msgspec.msgpack.encode({**drag, "phase": phase, "end_position": place}))
+        end = time.monotonic() + 20.0
+        while not (pushes := browsers.page.requests()):
+            assert time.monotonic() < end, "the page hears nobody any more"
+            time.sleep(0.02)
+        assert isinstance(pushes[0], Push) and np.isfinite(pushes[0].place).all()
+    while Push(None) not in browsers.page.requests():  # the connection has gone
+        assert time.monotonic() < end, "the tip is still held"
+        time.sleep(0.02)

@@ -36,8 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--page",
         action="store_true",
-        help=f"take the pictures of the live page in {TOUCHES} again, in which a user touches the virtual robot, and build nothing"
-        " (needs Chromium)",
+        help="take the pictures of the live page in which a user touches the virtual robot again, and build nothing",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository) or the pictures"

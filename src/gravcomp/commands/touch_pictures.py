@@ -49,6 +49,7 @@ def draw_touches(root: Path, folder: Path) -> list[Path]:
             page.show(_snapshot(loop))
 
     pictures = []
+    run(4.0)  # the browser takes a page that shows something
     try:
         with Browser() as browser:
             browser.open(f"{page.address}?fixedDpr=1")  # full resolution, even when drawing is slow
@@ -59,7 +60,6 @@ def draw_touches(root: Path, folder: Path) -> list[Path]:
                 browser.save(pictures[-1])
                 output.note(f"{pictures[-1]}")
 
-            run(4.0)
             run(2.0, np.array([0.012, 0.0, 0.95 * length]))
             take("pulled")
             bystander.order_hand("release", "virtual/hand", loop.time)

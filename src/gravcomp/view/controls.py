@@ -73,8 +73,8 @@ class Controls:
             modes = self._gui.add_button_group("cables", tuple(_MODES))
             bridge = self._gui.add_button_group("motors", ("Home", "Stop"))
             record = self._gui.add_button("Record a bag")
-        modes.on_click(lambda e: self._requests.put(Compensate(_MODES[e.target.value])))
-        bridge.on_click(lambda e: self._requests.put(BridgeService(e.target.value.lower())))
+        modes.on_click(lambda e: self._requests.put(Compensate(_MODES.get(str(e.target.value), str(e.target.value)))))
+        bridge.on_click(lambda e: self._requests.put(BridgeService(str(e.target.value).lower())))
         record.on_click(lambda _: self._requests.put(Record(not self._recording)))
         return record
 
