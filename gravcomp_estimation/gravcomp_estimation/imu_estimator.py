@@ -11,6 +11,7 @@ from pathlib import Path
 
 from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.serialised_imu import read_sample
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float32
@@ -69,7 +70,7 @@ class ImuEstimator(ManagedNode):
         self._code: int | None = None
         reliability = self.parameters.reliability
         self._streams = [
-            SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability),
+            SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability, raw=True),
             SensorStream(self, Temperature, "imu/temperature", self._on_temperature, reliability),
         ]
         self._known, self._known_stamp_ns = (0.0, 0.0, 0.0), 0
@@ -129,10 +130,14 @@ class ImuEstimator(ManagedNode):
 
     # Samples.
 
-    def _on_sample(self, message: Imu) -> None:
+    def _on_sample(self, serialised: bytes) -> None:
         now = time.monotonic()
         self._sample_time = now
-        stamp, gyro, accel = messages.sample_of(message)
+        try:
+            stamp, gyro, accel = read_sample(serialised)
+        except ValueError as error:
+            self.get_logger().warning(f"imu/data_raw: {error}", throttle_duration_sec=1.0)
+            return
         known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
         continued = self._counter.continued(stamp)
         estimate = self._estimator.update(continued, gyro, accel, known)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from gravcomp_node.local_topics import Adapted
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.timer import Timer
@@ -30,7 +31,8 @@ from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
-from gravcomp_fem.conversion import deformation_message, pose_message, seconds
+from gravcomp_fem.conversion import pose_message, seconds
+from gravcomp_fem.deformed import PublishedShape
 from gravcomp_fem.load_inputs import LoadInputs
 from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
@@ -206,7 +208,7 @@ class FemSimulator(ManagedNode):
             )
             return
         header = Header(stamp=message.header.stamp, frame_id=self.parameters.base_frame)
-        self._deformation.publish(deformation_message(shape, header))
+        self._deformation.publish(Adapted(PublishedShape(shape, header), PublishedShape.message))
         self._loads.observe(header, shape, self._simulator, carried, self._cables)
         if self._tip.get_subscription_count():
             tip = pose_message(shape.tip_position, shape.tip_orientation)

@@ -5,6 +5,9 @@ process and their quality of service fits its own; nothing is serialised for it 
 subscription receives everything from the middleware, until that publisher has gone (`follow`). The middleware gets a message when
 somebody receives from it. Publishers and subscriptions stay visible to other processes in either case.
 
+A publisher may also publish an `Adapted` value (type adaptation as in REP-2007): a subscription of the process that takes values
+gets it as it is. The message is made only when somebody else receives it.
+
 Who publishes a message leaves it to its receivers, and does not change it afterwards. A receiver's callback is called while the
 publisher publishes; where the receiver's node is itself publishing, its message waits until the executor comes to it.
 """
@@ -12,6 +15,7 @@ publisher publishes; where the receiver's node is itself publishing, its message
 import collections
 import contextlib
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from typing import Any
@@ -25,11 +29,24 @@ FOLLOW_PERIOD = 0.5
 """s between two looks for publishers in other processes."""
 
 
+class Adapted:
+    """A value to publish, and `to_message`, which makes the message from it."""
+
+    def __init__(self, value: Any, to_message: Callable[[Any], Any]):
+        self.value, self._to_message = value, to_message
+
+    @functools.cached_property
+    def message(self) -> Any:
+        """The message, made when it is first asked for."""
+        return self._to_message(self.value)
+
+
 @dataclasses.dataclass
 class _Receiver:
     node: Node
     subscription: Subscription
     callback: Callable[[Any], None] | None  # None: it is polled
+    takes: Callable[[Any], None] | None  # its callback for values
     is_local: bool = False
     kept: collections.deque = dataclasses.field(default_factory=collections.deque)  # of a polled one: message, ns, number
 
@@ -47,7 +64,7 @@ class LocalTopics:
         self.wake: Callable[[], None] = lambda: None
         self._publishers: dict[str, list[LocalPublisher]] = collections.defaultdict(list)
         self._receivers: dict[str, list[_Receiver]] = collections.defaultdict(list)
-        self._waiting: collections.deque[tuple[_Receiver, Any]] = collections.deque()
+        self._waiting: collections.deque[tuple[_Receiver, Callable[[Any], None], Any]] = collections.deque()
         self._publishing: list[Node] = []  # nodes that publish now, each one in a callback that the one before it called
         self._followed = 0.0
 
@@ -57,10 +74,16 @@ class LocalTopics:
         self._publishers[publisher.topic_name].append(publisher)
         self._decide(publisher.topic_name)
 
-    def add_subscription(self, node: Node, subscription: Subscription, callback: Callable[[Any], None] | None) -> None:
-        """Take a subscription of a node of this process; callback: None for a polled one."""
+    def add_subscription(
+        self,
+        node: Node,
+        subscription: Subscription,
+        callback: Callable[[Any], None] | None,
+        takes: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Take a subscription of a node of this process; callback: None for a polled one; takes: its callback for values."""
         depth = subscription.qos_profile.depth if subscription.qos_profile.history == HistoryPolicy.KEEP_LAST else None
-        receiver = _Receiver(node, subscription, callback, kept=collections.deque(maxlen=depth))
+        receiver = _Receiver(node, subscription, callback, takes, kept=collections.deque(maxlen=depth))
         self._receivers[subscription.topic_name].append(receiver)
         self._decide(subscription.topic_name)
 
@@ -70,7 +93,7 @@ class LocalTopics:
             publishers[:] = [publisher for publisher in publishers if publisher is not entity]
         for receivers in self._receivers.values():
             receivers[:] = [receiver for receiver in receivers if receiver.subscription is not entity]
-        self._waiting = collections.deque(pair for pair in self._waiting if pair[0].subscription is not entity)
+        self._waiting = collections.deque(call for call in self._waiting if call[0].subscription is not entity)
 
     def is_local(self, subscription: Subscription) -> bool:
         """Whether a subscription receives locally now."""
@@ -91,7 +114,7 @@ class LocalTopics:
         return sum(receiver.is_local for receiver in self._receivers.get(topic, ()))
 
     def deliver(self, publisher: "LocalPublisher", message: Any) -> None:
-        """Hand a message to the local receivers of its topic."""
+        """Hand a message or an `Adapted` value to the local receivers of its topic."""
         receivers = [receiver for receiver in self._receivers.get(publisher.topic_name, ()) if receiver.is_local]
         if not receivers:
             return
@@ -99,11 +122,16 @@ class LocalTopics:
         try:
             for receiver in receivers:
                 if receiver.callback is None:
-                    receiver.kept.append((message, time.time_ns(), publisher.count))
-                elif self.spins and receiver.node not in self._publishing:
-                    receiver.callback(message)
+                    receiver.kept.append((message_of(message), time.time_ns(), publisher.count))
+                    continue
+                if receiver.takes is not None and isinstance(message, Adapted):
+                    callback, taken = receiver.takes, message.value
                 else:
-                    self._waiting.append((receiver, message))
+                    callback, taken = receiver.callback, message_of(message)
+                if self.spins and receiver.node not in self._publishing:
+                    callback(taken)
+                else:
+                    self._waiting.append((receiver, callback, taken))
                     self.wake()
         finally:
             self._publishing.pop()
@@ -116,9 +144,8 @@ class LocalTopics:
     def call_next(self) -> None:
         """Call the callback of the oldest message that waits, if there is one."""
         with contextlib.suppress(IndexError):
-            receiver, message = self._waiting.popleft()
-            assert receiver.callback is not None
-            receiver.callback(message)
+            _, callback, taken = self._waiting.popleft()
+            callback(taken)
 
     def follow(self) -> None:
         """Look for publishers in other processes, every FOLLOW_PERIOD."""
@@ -148,6 +175,11 @@ class LocalTopics:
             self.changed()
 
 
+def message_of(message: Any) -> Any:
+    """Return the message that an `Adapted` value becomes; a message is returned as it is."""
+    return message.message if isinstance(message, Adapted) else message
+
+
 def _fits(publisher: Publisher, subscription: Subscription) -> bool:
     offered, wanted = publisher.qos_profile, subscription.qos_profile
     compatible, _ = qos_check_compatible(offered, wanted)
@@ -162,13 +194,13 @@ class LocalPublisher(Publisher):
     count = 0
 
     def publish(self, message: Any) -> None:
-        """Publish a message."""
+        """Publish a message, or an `Adapted` value."""
         if self.local is None:
-            super().publish(message)
+            super().publish(message_of(message))
             return
         self.count += 1
         # First to the middleware: the receivers here may take a while.
         latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL  # kept for those who subscribe later
         if latched or self.get_subscription_count() > self.local.receivers(self.topic_name):
-            super().publish(message)
+            super().publish(message_of(message))
         self.local.deliver(self, message)

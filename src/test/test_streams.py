@@ -11,6 +11,7 @@ from gravcomp.bench.stream_faults import FAULTS
 from gravcomp.bench.streams import outcome
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.orientation.spike_review import AHEAD, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
 from gravcomp.recordings.imu import RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
@@ -127,6 +128,27 @@ def test_fast_motion_is_not_taken_for_spikes():
     signal = 10.0 * np.sin(2.0 * np.pi * 8.0 * 0.01 * np.arange(400))  # 8 Hz, 570 deg/s, at 100 Hz
     counted, count = gated(signal)
     assert count == 0 and (counted[20:] == signal[20:]).all()
+
+
+def reviewed(values):
+    """Return what a review counts of rates (n, 3) in rad/s at 95 Hz."""
+    review, counted = SpikeReview(math.radians(20.0), SpikeOptions()), np.array(values)
+    for i, value in enumerate(values.tolist()):
+        decided = review.take(0.0105, tuple(value))
+        if decided is not None:
+            counted[i - AHEAD] = decided
+    return counted
+
+
+@pytest.mark.parametrize("all_axes", [True, False])
+def test_spikes_are_found_in_motion_that_changes_as_fast_as_they_do(all_axes):
+    time = 0.0105 * np.arange(600)[:, None]
+    signal = 5.0 * np.sin(2.0 * np.pi * 4.0 * time + np.arange(3.0))  # 4 Hz, 290 deg/s: 60 deg/s from sample to sample
+    random = np.random.default_rng(4)
+    hit = random.random((600, 1)) < 0.02 if all_axes else np.arange(600)[:, None] % 40 == np.array([5, 15, 25])
+    spiky = signal + hit * random.choice([-1.0, 1.0], (600, 3)) * random.uniform(1.5, 7.0, (600, 3))
+    assert (reviewed(signal) == signal).all()
+    assert np.abs(reviewed(spiky) - signal).max() < 0.35  # 20 deg/s
 
 
 def test_a_counter_that_wraps_is_continued_live():

@@ -35,6 +35,7 @@ autosummary_generate = True
 autodoc_default_options = {"members": True, "undoc-members": True, "ignore-module-all": True}
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+autodoc_use_type_comments = False  # all types are annotations; the search for comments parses every function again
 napoleon_google_docstring = False
 # In docstrings `name` is code.
 default_role = "code"

@@ -43,6 +43,15 @@ class Places(NamedTuple):
     rocking: np.ndarray
 
 
+class Pressed(NamedTuple):
+    """The p places that are pressed: numbers (p,) of them; along (p,): m along the robot; position (p, 3) and gap (p,) in m."""
+
+    numbers: np.ndarray
+    along: np.ndarray
+    position: np.ndarray
+    gap: np.ndarray
+
+
 @njit(cache=True)
 def deepest(
     scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
@@ -76,21 +85,32 @@ def deepest(
 
 @njit(cache=True)
 def all_gaps(
-    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, own: np.ndarray, normal: np.ndarray
-) -> np.ndarray:
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, asked: np.ndarray, own: np.ndarray,
+    normal: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """Return gaps (k, s) of all stations to all rows of the scene for sections (s, 3, 3).
 
-    Stations whose middle is farther than `reach` (s,) from touching have the gap of their middle less their size. Writes own
-    (k, s, 2) and normal (k, s, 3) of the others.
+    Stations whose middle is farther than `reach` (s,) from touching have the gap of their middle less their size, or, where no
+    neighbour can touch either and they are not `asked` (k, s) for, a lower bound of it: a gap changes by no more than the way
+    from one station to the next. Writes own (k, s, 2) and normal (k, s, 3) of the others.
     """
     stations = len(surface.place)
-    gap = np.empty((len(scene.kind), stations))
+    gap, way, size = np.empty((len(scene.kind), stations)), np.zeros(stations), np.empty(stations)
+    for s in range(stations):
+        size[s] = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
+        if s:
+            way[s] = _length(sections[s, 0] - sections[s - 1, 0])
+    far = reach.max() + 2.0 * way.max() + size.max() - size.min()
     for k in range(len(scene.kind)):
+        middle = -np.inf
         for s in range(stations):
-            stretch = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
+            middle -= way[s]
+            if middle - size[s] > far and not asked[k, s]:
+                gap[k, s] = middle - size[s]
+                continue
             middle = gap_to(scene, k, sections[s, 0], normal[k, s])
-            if middle - stretch > reach[s]:
-                gap[k, s] = middle - stretch
+            if middle - size[s] > reach[s]:
+                gap[k, s] = middle - size[s]
             else:
                 gap[k, s] = deepest(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
     return gap
@@ -110,17 +130,20 @@ def find_places(
     reach = np.empty(stations)
     for s in range(stations):
         reach[s] = margin + _length(moved[s])
-    gap = all_gaps(scene, surface, sections, reach, own, normal)
-    count = 0
+    # A force moves from station to station as the robot slides or tilts.
     chosen = np.zeros((rows, stations), dtype=np.bool_)
     for k in range(rows):
         for s in range(stations):
-            free = gap[k, s] + normal[k, s] @ moved[s]
-            # A force moves from station to station as the robot slides or tilts.
-            near = last[k, max(s - 1, 0)].any() or last[k, s].any() or last[k, min(s + 1, stations - 1)].any()
-            if near or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
-                chosen[k, s] = True
-                count += 1
+            if last[k, s, 0] != 0.0 or last[k, s, 1] != 0.0 or last[k, s, 2] != 0.0:
+                chosen[k, max(s - 1, 0) : s + 2] = True
+    gap = all_gaps(scene, surface, sections, reach, chosen, own, normal)
+    count = 0
+    for k in range(rows):
+        for s in range(stations):
+            if gap[k, s] < reach[s] and not chosen[k, s]:
+                free = gap[k, s] + normal[k, s] @ moved[s]
+                chosen[k, s] = gap[k, s] < margin or free < margin
+            count += chosen[k, s]
     result = empty_places(count)
     i = 0
     for k in range(rows):
@@ -220,6 +243,41 @@ def positions(places: Places, sections: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
+def missed(scene: SceneArrays, places: Places, softness: np.ndarray, pressed: np.ndarray, sections: np.ndarray) -> float:
+    """Return by how much in m the places are beside the wall that presses them, or in one that does not, at most.
+
+    softness (c,): m/N of walls that yield; pressed (c,): normal forces in N; sections (s, 3, 3): of the stations now.
+    """
+    point, normal, worst = positions(places, sections), np.empty(3), 0.0
+    for i in range(len(point)):
+        gap = gap_to(scene, places.row[i], point[i], normal) + softness[i] * pressed[i]
+        worst = max(worst, abs(gap) if pressed[i] > 0.0 else -gap)
+    return worst
+
+
+@njit(cache=True)
+def pressed_places(
+    scene: SceneArrays, surface: ContactSurface, places: Places, forces: np.ndarray, sections: np.ndarray
+) -> Pressed:
+    """Return the places that are pressed by the forces (c, 3), where the stations are now at `sections` (s, 3, 3)."""
+    point, normal = positions(places, sections), np.empty(3)
+    chosen, count = np.empty(len(point), dtype=np.int64), 0
+    for i in range(len(point)):
+        if forces[i] @ places.normal[i] > 0.0:
+            chosen[count] = i
+            count += 1
+    chosen = chosen[:count]
+    along, gap, position = np.zeros(count), np.empty(count), np.empty((count, 3))
+    for k in range(count):
+        i = chosen[k]
+        for n in range(3):
+            along[k] += places.share[i, n] * surface.place[places.first[i] + n]
+        position[k] = point[i]
+        gap[k] = gap_to(scene, places.row[i], point[i], normal)
+    return Pressed(chosen, along, position, gap)
+
+
+@njit(cache=True)
 def _length(vector: np.ndarray) -> float:
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
@@ -286,15 +344,12 @@ def remember(places: Places, forces: np.ndarray, force: np.ndarray) -> None:
 
 
 @njit(cache=True)
-def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places that rock, and the stiffness D (c + rocking places,) in N/m of the normal forces that turn and move.
+def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the places whose forces turn, those whose forces move, and their stiffness D (turns + moves,) in N/m.
 
-    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts.
+    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts. A force of 0
+    does neither, nor does that of a plane turn.
     """
-    rocks = np.flatnonzero(places.rocking)
-    bend = np.empty(len(pressed) + len(rocks))
-    for i in range(len(pressed)):
-        bend[i] = pressed[i] * places.curvature[i]
-    for n in range(len(rocks)):
-        bend[len(pressed) + n] = pressed[rocks[n]] * places.rocking[rocks[n]]
-    return rocks, bend
+    stiffness, moving = pressed * places.curvature, pressed * places.rocking
+    turns, moves = np.flatnonzero(stiffness), np.flatnonzero(moving)
+    return turns, moves, np.concatenate((stiffness[turns], moving[moves]))

@@ -1,6 +1,7 @@
 """What the robot's body is made of: materials, caps, and how tubes are divided into elements."""
 
 import dataclasses
+import math
 
 from gravcomp.config import parameter
 
@@ -70,6 +71,12 @@ class Material:
                 raise ValueError(f"prony has the time {time:g} s {times.count(time)} times; the terms' times must differ")
 
     @property
+    def axial_modulus(self) -> float:
+        """Young's modulus along the axis (Pa), with the part of the fibres' stiffness that lies along it."""
+        along = 0.0 if self.fibres is None else self.fibres.ratio * math.cos(self.fibres.angle) ** 4
+        return self.youngs_modulus * (1.0 + along)
+
+    @property
     def branches(self) -> tuple[tuple[float, float], ...]:
         """The Maxwell branches: stiffness over the long-term stiffness, and relaxation time in s; see `full_model.viscosity`."""
         if not self.prony:
@@ -97,4 +104,17 @@ class Elements:
     equal_stiffness: bool = parameter(
         False,
         description="let the facets of round walls stand out a little, so that the section bends as stiffly as the round one",
+    )
+    first_layer: float | None = parameter(
+        None,
+        edge="mm",
+        minimum=1e-3,
+        maximum=1000.0,
+        description="thickness of the layer at the clamp, from where layers grow up to an even thickness, instead of grading",
+    )
+    softness: float = parameter(
+        0.0,
+        minimum=0.0,
+        maximum=1.0,
+        description="power with which layers are denser where the body is softer in bending than at its stiffest; 0: not denser",
     )

@@ -24,6 +24,9 @@ MODEL_AT = 0x08040000
 MEMORY_AT = 0x20008000
 """Begin of the RAM that the image's own data leave free."""
 
+LAW_SHARE = 4
+"""Points of which a step computes the stiffness of a law (GC_LAW_SHARE)."""
+
 _LINE, _WAIT, _WAIT_BEHIND, _INSTRUCTION_LINES = 4, 5, 1, 64
 _TAKEN = 2
 _CHAINED = ("vmla", "vmls", "vfma", "vfms", "vnmla", "vnmls", "vfnma", "vfnms")
@@ -204,11 +207,13 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
 def table_waits(blob: bytes) -> int:
     """Return the cycles for which a step waits for the model's tables, read line by line of 16 bytes, with nothing in the cache.
 
-    The step reads B and the pieces of the cables twice, the cables' stiffness once, and the tip's section for each cable.
+    The step reads B, the pieces of the cables and the points of the law twice, the cables' stiffness once, and the tip's section
+    for each cable; of some points of the law it computes the stiffness.
     """
-    modes, strains, cables, pieces = struct.unpack_from("<4I", blob, 32)
+    modes, strains, cables, pieces, _, _, points, _ = struct.unpack_from("<8I", blob, 32)
     pairs = modes * (modes + 1) // 2
     floats = pairs * (2 * strains + cables) + 6 * pieces * modes + 3 * modes + 9 * modes * (cables + 1)
+    floats += 18 * modes * points + min(points, LAW_SHARE) * (81 * modes + 9 * pairs // 4)
     return _WAIT * (4 * floats >> _LINE)
 
 

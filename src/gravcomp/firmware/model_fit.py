@@ -8,9 +8,11 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.cache import cache_path, content_key
 from gravcomp.config import ConfigError
-from gravcomp.firmware.cycles import CLOCK_HZ
+from gravcomp.firmware.cycles import CLOCK_HZ, LAW_SHARE
 from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import (
+    BRANCHES_MAX,
+    LAW_POINTS_MAX,
     MODES_MAX,
     PIECES_MAX,
     POINTS_MAX,
@@ -21,9 +23,10 @@ from gravcomp.firmware.model_blob import (
     pack,
     truncated,
 )  # fmt: skip
-from gravcomp.firmware.model_settings import CABLES_MAX, LoopParameters, least_tensions, settings
+from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, least_tensions, settings
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.store import Reduction, load, why_not
 from gravcomp.reduction.tracking import ReducedTracker
@@ -40,7 +43,8 @@ _EXTRA = (36, 16, 8, 4, 0)
 
 # Cycles of the Cortex-M4 for one multiply-add of each part, with its loads and the wait states of the flash; measured on the
 # emulated image (`bench board`).
-_CYCLES = {"elasticity": 4.1, "cables": 8.4, "factor": 9.7, "answers": 6.1, "tension": 14.5}
+_CYCLES = {"elasticity": 4.1, "cables": 8.4, "factor": 9.7, "answers": 6.1, "tension": 14.5, "law": 6.0}
+_LAW_FORCE, _LAW_STIFFNESS = 150, 1100  # multiply-adds at a point, whatever the number of modes
 _REST_CYCLES = 215_000  # inverse problem, filter, tip, compliance: hardly depend on the basis
 
 
@@ -68,7 +72,7 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     """
     whole = reduction.reduced_model(model)
     _check(model, whole, parameters)
-    run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200))
+    run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200), rise=True)
     best: tuple[float, ReducedModel] | None = None
     for smaller in _candidates(whole):
         error = _error(smaller, model, run)
@@ -78,7 +82,7 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
         raise ConfigError(_too_big(whole, parameters))
     error, chosen = best
     values = settings(parameters, chosen.reach, joystick_bend)
-    blob = pack(chosen, model.robot, values, least_tensions(parameters))
+    blob = pack(chosen, model.robot, values, least_tensions(parameters), _branches(model))
     adds, milliseconds = cost(chosen)
     return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
 
@@ -117,22 +121,34 @@ def cost(model: ReducedModel) -> tuple[int, float]:
         "factor": r**3 // 6,
         "answers": r * r * -(-(m + 4) // 4) * 4,
         "tension": pairs * m,
+        "law": law_cost(r, len(model.deviation.weight)),
     }
     cycles = sum(_CYCLES[name] * count for name, count in parts.items()) + _REST_CYCLES
     return sum(parts.values()), 1e3 * cycles / CLOCK_HZ
 
 
+def law_cost(modes: int, points: int) -> int:
+    """Return the multiply-adds of a step for a law of rubber at these points: the force at all, the stiffness at some."""
+    due = min(points, LAW_SHARE)
+    return points * (18 * modes + _LAW_FORCE) + due * (81 * modes + 9 * modes * (modes + 1) // 2 + _LAW_STIFFNESS)
+
+
 def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -> None:
     """Raise ConfigError for a robot that the loop on the board does not model, whatever the basis."""
     source, points, cables = parameters.source, len(whole.deviation.weight), len(whole.cables.rest_length)
-    if points:
-        adds = 9 * points * whole.size * (whole.size + 3)
+    if points > LAW_POINTS_MAX:
         raise ConfigError(
-            f"{source}: the material's law needs {points} points of the body and {1e-6 * adds:.2f} million multiply-adds a step,"
-            f" {1e3 * adds * _CYCLES['elasticity'] / CLOCK_HZ:.0f} ms of {LONGEST_MS:g} ms; the loop on the board has the law svk"
+            f"{source}: the material's law needs {points} points of the body; the firmware has room for {LAW_POINTS_MAX}"
         )
-    if any(material.branches for material in model.mesh.materials):
-        raise ConfigError(f"{source}: a material creeps; the loop on the board has no memory of the material")
+    branches = {material.branches for material in model.mesh.materials}
+    if len(branches) > 1:
+        raise ConfigError(
+            f"{source}: has {len(branches)} materials that creep differently; the reduced model, and the board, have one"
+        )
+    if len(_branches(model)) > BRANCHES_MAX:
+        raise ConfigError(
+            f"{source}: a material has {len(_branches(model))} terms in prony; the firmware has room for {BRANCHES_MAX}"
+        )
     if cables > min(CABLES_MAX, 8):
         raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
     if len(whole.section_rest) - 1 > POINTS_MAX:
@@ -161,18 +177,29 @@ def fits(model: ReducedModel) -> bool:
 
 def _bytes(model: ReducedModel) -> int:
     r, k = model.elasticity.linear.shape
-    return blob_bytes(r, k + -k % TILE, len(model.cables.rest_length), len(model.cables.cable), len(model.section_rest) - 1)
+    cables, points = len(model.cables.rest_length), len(model.section_rest) - 1
+    return blob_bytes(r, k + -k % TILE, cables, len(model.cables.cable), points, len(model.deviation.weight), BRANCHES_MAX)
+
+
+def _branches(model: RobotModel) -> tuple[tuple[float, float], ...]:
+    """Return the branches of the material, of a robot with one kind of them."""
+    return model.mesh.materials[0].branches
 
 
 def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:
     """Return the worst distance in m of the tip from the run's with the same gravity and commands, infinite where it is lost."""
     tracker, count = ReducedTracker(smaller, model.length), len(model.robot.cables)
     tracker.place(np.zeros(smaller.size), np.zeros(count), Sliding.none(count))
+    branches = _branches(model)
+    memory = Memory.of(branches, np.zeros(smaller.size), tracker.strain)
     worst = 0.0
     for gravity, wound, tip in zip(run.gravity, run.wound, run.tip):
-        state = tracker.track(gravity, CableInput(wound=wound), iterations=10)
+        creep = memory.stress(SAMPLE_PERIOD) if branches else None
+        state = tracker.track(gravity, CableInput(wound=wound), iterations=10, creep=creep)
         if not state.converged:
             return np.inf
+        if branches:
+            memory = memory.after(state.q, tracker.strain, SAMPLE_PERIOD)
         worst = max(worst, float(np.linalg.norm(smaller.tip(state.q) - tip)))
     return worst
 

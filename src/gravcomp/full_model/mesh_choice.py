@@ -24,7 +24,7 @@ from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
 from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, mesh_loads, shapes_under
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.mesh.layers import least_layers
+from gravcomp.mesh.layers import least_layers, softest
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.refusal import well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
@@ -33,7 +33,7 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 4  # part of the key; to be raised when the choice changes
+_FORMAT = 5  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -41,6 +41,8 @@ _ORDER = {"along": 1.0, "around": 1.5, "radial": 1.0}
 # The sections are measured only where the change along the robot is within this part of `ACCURACY`.
 _ALONG_FIRST = 1.0
 _START_ALONG = 8
+# The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
+_SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
 
 
@@ -115,10 +117,12 @@ def _choose(robot: Robot) -> MeshChoice:
         gains: dict[str, float] = {}
         for direction in _ORDER:
             finer = _finer(robot, here, direction)
-            if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
+            if finer == here:
                 continue
             twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
             changes[direction] = twice * tips.change(here, finer)
+            if tips.unknowns(finer) > _MOST_UNKNOWNS:  # too many to be used, but the error has to be known
+                continue
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
@@ -190,13 +194,20 @@ def _start(robot: Robot) -> Elements:
     around = 4 if coarse_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
     # Between disks the layers are even; else they are graded towards the clamp, whose corner is singular.
-    start = Elements(around=around, along=along, radial=1, grading=1.0, equal_stiffness=True)
+    start = Elements(
+        around=around, along=along, radial=1, grading=1.0, equal_stiffness=True, softness=0.0 if disks else _softness(robot)
+    )
     shaped = well_shaped(robot, start)
     if shaped is None:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
     return _not_deep(robot, shaped if disks else with_grading(robot, shaped))
+
+
+def _softness(robot: Robot) -> float:
+    """The power with which layers are denser where the body is soft: none where the layers would hardly move."""
+    return _SOFTNESS if softest(robot.pieces) < _ALIKE else 0.0
 
 
 def _not_deep(robot: Robot, elements: Elements) -> Elements:

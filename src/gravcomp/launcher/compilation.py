@@ -22,6 +22,9 @@ LOOP = ("model", "controller")
 VIRTUAL = ("virtual_robot",)
 """Parts of the virtual robot."""
 
+SURROUNDED = ("contact", "surroundings")
+"""Parts of a robot with obstacles or zones around it, of the model and of the controller; the set-up does not compile them."""
+
 
 def missing(parts: Iterable[str]) -> list[str]:
     """Return those of the parts that are not compiled yet."""
@@ -67,6 +70,35 @@ def _model() -> None:
         simulator.step(gravity, cables)
 
 
+def _contact() -> None:
+    """Let the article's robot lie on a floor that rubs, with the full model and with a reduced one of a few shapes."""
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.reduction.serving import ReducedServing
+    from gravcomp.scene import PlaneWall, SceneSection
+    from gravcomp.scene.scene import Scene
+    from gravcomp.simulation import Simulator
+    from gravcomp.training import BuildOptions, TrainingOptions
+    from gravcomp.training.build import trained
+
+    robot = load_robot_file("article").robot
+    floor = PlaneWall(name="floor", normal=(1.0, 0.0, 0.0), point=(-0.1 * robot.length, 0.0, 0.0), friction=0.2)
+    simulator = Simulator(robot, reduced=False, scene=Scene(SceneSection(planes=(floor,))))
+    for cables in (None, np.zeros(len(robot.cables))):
+        simulator.step(np.array([-9.81, 0.0, 0.0]), cables)
+    few = BuildOptions(modes=8, strains=4, training=TrainingOptions(paths=2, steps=8))
+    reduction = trained(simulator.model, few)
+    ReducedServing(simulator.model, reduction.reduced_model(simulator.model), simulator.solver).warm_up()
+
+
+def _surroundings() -> None:
+    from gravcomp.description import load_robot_file
+    from gravcomp.inverse import warm_up
+
+    warm_up(load_robot_file("article").robot, surrounded=True)
+
+
 def _controller() -> None:
     import numpy as np
 
@@ -86,7 +118,13 @@ def _virtual_robot() -> None:
     warm_up()
 
 
-_WORK = {"model": _model, "controller": _controller, "virtual_robot": _virtual_robot}
+_WORK = {
+    "model": _model,
+    "controller": _controller,
+    "virtual_robot": _virtual_robot,
+    "contact": _contact,
+    "surroundings": _surroundings,
+}
 
 
 def main(parts: list[str]) -> int:

@@ -242,5 +242,5 @@ class ReducedServing:
             model="reduced",
             status=ShapeStatus.OK,
             message=self._beyond_range,
-            contacts=Contacts.none() if self._tracker.contact is None else self._tracker.contact.contacts(state.q),
+            contacts=Contacts.none() if self._tracker.contact is None else self._tracker.contact.contacts(),
         )

@@ -6,11 +6,23 @@ import queue
 import viser
 
 from gravcomp.view.graphics import GRAPHICS
-from gravcomp.view.requests import BridgeService, Compensate, Record, Request, SetTarget, TiltBase
+from gravcomp.view.requests import (
+    BridgeService,
+    Compensate,
+    PlaceWall,
+    Push,
+    Record,
+    Request,
+    SetTarget,
+    TiltBase,
+    objection,
+)
 from gravcomp.view.scene import BASE, WORLD, Scene
 from gravcomp.view.target_controls import TargetControls
 from gravcomp.view.virtual_controls import VirtualControls
 
+# Of these only the newest one counts.
+_REPLACED = (SetTarget, TiltBase, Push, PlaceWall)
 _MODES = {"Compensate": "compensate", "Hold": "hold", "Release": "relax"}
 
 
@@ -23,16 +35,24 @@ class Controls:
         self._recording = False
         self._target = TargetControls(server.gui, scene.target.gizmo, length, self._requests.put)
         self._record = self._add_compensation()
-        self._virtual = VirtualControls(server.gui, cables, self._requests.put)
+        self._length = length
+        scene.wall.put = self._requests.put
+        self._virtual = VirtualControls(server.gui, cables, scene.wall, self._requests.put)
         self._add_view(graphics)
 
-    def requests(self) -> list[Request]:
-        """Return the requests since the last call; of targets and tilts only the newest."""
-        taken = []
+    def requests(self) -> tuple[list[Request], list[str]]:
+        """Return the requests since the last call, of targets and the like only the newest, and why others are refused."""
+        taken: list[Request] = []
         while not self._requests.empty():
             taken.append(self._requests.get())
-        newest = {type(r): r for r in taken if isinstance(r, (SetTarget, TiltBase))}
-        return [r for r in taken if not isinstance(r, (SetTarget, TiltBase))] + list(newest.values())
+        push = self._scene.hand.request()
+        if push is not None:
+            taken.append(push)
+        refused = {request: objection(request, self._length) for request in taken}
+        taken = [request for request in taken if not refused[request]]
+        newest = {type(r): r for r in taken if isinstance(r, _REPLACED)}
+        accepted = [r for r in taken if not isinstance(r, _REPLACED)] + list(newest.values())
+        return accepted, list(dict.fromkeys(filter(None, refused.values())))
 
     def show_virtual(self, virtual: bool) -> None:
         """Show the controls of the virtual robot only if there is one."""
@@ -65,6 +85,8 @@ class Controls:
                 "rest": self._gui.add_checkbox("rest shape", True),
                 "truth": self._gui.add_checkbox("ground truth", True),
                 "target": self._gui.add_checkbox("target", True),
+                "obstacles": self._gui.add_checkbox("obstacles", True),
+                "forces": self._gui.add_checkbox("forces", True),
             }
             handle = self._gui.add_checkbox("drag the target", False, hint="handle at the tip of the target")
         quality.on_update(lambda _: self._scene.set_graphics(quality.value))
