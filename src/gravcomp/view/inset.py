@@ -23,9 +23,7 @@ _REACH = 0.5  # of the robot's length: where the camera's light has fallen to a 
 class Inset:
     """A panel over the scene. It is there while there is something to see: obstacles, or a wall that the user has placed."""
 
-    def __init__(
-        self, gui: viser.GuiApi, shapes: "Sequence[ObstacleShape]", length: float, radius: float
-    ) -> None:
+    def __init__(self, gui: viser.GuiApi, shapes: "Sequence[ObstacleShape]", length: float, radius: float) -> None:
         """shapes: the obstacles; length, radius: of the robot, m."""
         self._shapes, self._length, self._radius = shapes, length, radius
         self._camera = None

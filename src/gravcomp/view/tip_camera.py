@@ -69,9 +69,7 @@ def place(own: np.ndarray) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def _draw(
-    own: np.ndarray, faces: np.ndarray, paint: np.ndarray, reach: float, colour: np.ndarray, depth: np.ndarray
-) -> None:
+def _draw(own: np.ndarray, faces: np.ndarray, paint: np.ndarray, reach: float, colour: np.ndarray, depth: np.ndarray) -> None:
     """Draw triangles of vertices (v, 3) m in the camera's frame into colour (n, n, 3) and depth (n, n) m, the nearest first."""
     n, count = depth.shape[0], own.shape[0]
     right, down, angle, away = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
