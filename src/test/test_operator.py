@@ -47,6 +47,12 @@ def closed_loop(person: Person, seconds: float, seed: int = 1, force: float = 0.
     return np.array(course), hand
 
 
+def test_a_camera_that_faces_back_sees_nothing():
+    backward = np.diag([1.0, -1.0, -1.0])
+    picture = camera().look(np.array([0.0, 0.0, -0.05]), backward, np.array([0.0, 5e-3, 0.05]))
+    assert picture.target is None and picture.ahead is None and picture.off_middle == np.inf
+
+
 def test_the_hand_waits_for_its_delay_and_then_aims_at_the_crossover_frequency():
     course, _ = closed_loop(Person(), 8.0)
     late = round(0.25 / PERIOD)

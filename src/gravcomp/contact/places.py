@@ -2,7 +2,8 @@
 
 At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
 half of g'^2 / g'': where it is a minimum along the robot, the place moves there, so that no point of the surface is deeper in
-a wall than at these places, within a few micrometres.
+a wall than at these places, within a few micrometres. Where a wall is across the robot, the points on the rim of the tip's face
+are places too; the nearest one of the rim is one then only where it is deeper than they are, as in a small tilt.
 """
 
 from typing import NamedTuple
@@ -11,26 +12,29 @@ import numpy as np
 from numba import njit
 
 from gravcomp.contact.surface import ContactSurface
-from gravcomp.scene.distance import SceneArrays, gap_to
+from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
 
 _TURNS = 4  # corrections of the direction in which the outline is nearest
 _SETTLED = 1e-7  # of the radius
 _MOVES = 3  # corrections of the place along the robot
+_ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
 _WORTH = 1e-4  # of the radius: a place moves along the robot if that makes the gap smaller by this
 
 
 class Places(NamedTuple):
     """c places.
 
-    row (c,): of the obstacle in the scene; station (c,): the nearest one; first (c,) and share (c, 3): the first of three
-    neighbours, and their weights; own (c, 2): x and y in the section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent
-    in the section; along (c, 3): the other tangent; curvature (c,) of the obstacle across the robot in 1/m: change of the
-    normal along `around`, positive next to a ball; tilt (c, 3): weights of the three stations for the slope along the robot, a
-    station; rocking (c,): -1 / g'' a station in 1/m, by which the place moves along the robot when it tilts; 0 where it does not.
+    row (c,): of the obstacle in the scene; station (c,): the nearest one; slot (c,): the station, or, after all of them, the
+    point of the rim; first (c,) and share (c, 3): the first of three neighbours, and their weights; own (c, 2): x and y in the
+    section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent in the section; along (c, 3): the other tangent; curvature
+    (c,) of the obstacle across the robot in 1/m: change of the normal along `around`, positive next to a ball; tilt (c, 3):
+    weights of the three stations for the slope along the robot, a station; rocking (c,): -1 / g'' a station in 1/m, by which
+    the place moves along the robot when it tilts; 0 where it does not.
     """
 
     row: np.ndarray
     station: np.ndarray
+    slot: np.ndarray
     first: np.ndarray
     share: np.ndarray
     own: np.ndarray
@@ -41,6 +45,15 @@ class Places(NamedTuple):
     curvature: np.ndarray
     tilt: np.ndarray
     rocking: np.ndarray
+
+
+class Pressed(NamedTuple):
+    """The p places that are pressed: numbers (p,) of them; along (p,): m along the robot; position (p, 3) and gap (p,) in m."""
+
+    numbers: np.ndarray
+    along: np.ndarray
+    position: np.ndarray
+    gap: np.ndarray
 
 
 @njit(cache=True)
@@ -76,21 +89,32 @@ def deepest(
 
 @njit(cache=True)
 def all_gaps(
-    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, own: np.ndarray, normal: np.ndarray
-) -> np.ndarray:
+    scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, asked: np.ndarray, own: np.ndarray,
+    normal: np.ndarray,
+) -> np.ndarray:  # fmt: skip
     """Return gaps (k, s) of all stations to all rows of the scene for sections (s, 3, 3).
 
-    Stations whose middle is farther than `reach` (s,) from touching have the gap of their middle less their size. Writes own
-    (k, s, 2) and normal (k, s, 3) of the others.
+    Stations whose middle is farther than `reach` (s,) from touching have the gap of their middle less their size, or, where no
+    neighbour can touch either and they are not `asked` (k, s) for, a lower bound of it: a gap changes by no more than the way
+    from one station to the next. Writes own (k, s, 2) and normal (k, s, 3) of the others.
     """
     stations = len(surface.place)
-    gap = np.empty((len(scene.kind), stations))
+    gap, way, size = np.empty((len(scene.kind), stations)), np.zeros(stations), np.empty(stations)
+    for s in range(stations):
+        size[s] = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
+        if s:
+            way[s] = _length(sections[s, 0] - sections[s - 1, 0])
+    far = reach.max() + 2.0 * way.max() + size.max() - size.min()
     for k in range(len(scene.kind)):
+        middle = -np.inf
         for s in range(stations):
-            stretch = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
+            middle -= way[s]
+            if middle - size[s] > far and not asked[k, s]:
+                gap[k, s] = middle - size[s]
+                continue
             middle = gap_to(scene, k, sections[s, 0], normal[k, s])
-            if middle - stretch > reach[s]:
-                gap[k, s] = middle - stretch
+            if middle - size[s] > reach[s]:
+                gap[k, s] = middle - size[s]
             else:
                 gap[k, s] = deepest(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
     return gap
@@ -103,30 +127,62 @@ def find_places(
     """Return the places that touch, or would touch if nothing held the robot.
 
     sections (s, 3, 3): p, f_1, f_2 of the stations; moved (s, 3): how far p goes in m with the forces of last time; margin:
-    places with a smaller gap in m are returned too; last (k, s, 3): forces of last time.
+    places with a smaller gap in m are returned too; last (k, slots, 3): forces of last time.
     """
-    rows, stations = len(scene.kind), len(surface.place)
+    rows, stations, rim = len(scene.kind), len(surface.place), len(surface.rim)
     own, normal = np.zeros((rows, stations, 2)), np.zeros((rows, stations, 3))
     reach = np.empty(stations)
     for s in range(stations):
         reach[s] = margin + _length(moved[s])
-    gap = all_gaps(scene, surface, sections, reach, own, normal)
-    count = 0
+    # A force moves from station to station as the robot slides or tilts.
     chosen = np.zeros((rows, stations), dtype=np.bool_)
     for k in range(rows):
+        if last[k, stations:].any():
+            chosen[k, stations - 1] = True
         for s in range(stations):
-            free = gap[k, s] + normal[k, s] @ moved[s]
-            # A force moves from station to station as the robot slides or tilts.
-            near = last[k, max(s - 1, 0)].any() or last[k, s].any() or last[k, min(s + 1, stations - 1)].any()
-            if near or gap[k, s] < margin or (gap[k, s] < reach[s] and free < margin):
-                chosen[k, s] = True
-                count += 1
+            if last[k, s, 0] != 0.0 or last[k, s, 1] != 0.0 or last[k, s, 2] != 0.0:
+                chosen[k, max(s - 1, 0) : s + 2] = True
+    gap = all_gaps(scene, surface, sections, reach, chosen, own, normal)
+    count = 0
+    for k in range(rows):
+        for s in range(stations):
+            if gap[k, s] < reach[s] and not chosen[k, s]:
+                free = gap[k, s] + normal[k, s] @ moved[s]
+                chosen[k, s] = gap[k, s] < margin or free < margin
+            count += chosen[k, s]
+    # The tip's face.
+    tip, shift = sections[stations - 1], moved[stations - 1]
+    axis = _cross(tip[1], tip[2])
+    least = _ACROSS * _length(axis)
+    on_rim, edge, there = np.zeros((rows, rim), dtype=np.bool_), np.empty((rows, rim)), np.empty((rows, rim, 3))
+    for k in range(rows):
+        if not chosen[k, stations - 1] or abs(normal[k, stations - 1] @ axis) < least:
+            continue
+        lowest, some = np.inf, False
+        for n in range(rim):
+            point = tip[0] + surface.rim[n, 0] * tip[1] + surface.rim[n, 1] * tip[2]
+            edge[k, n] = gap_to(scene, k, point, there[k, n])
+            lowest = min(lowest, edge[k, n])
+            free = edge[k, n] + there[k, n] @ shift
+            pressed = last[k, stations + n, 0] != 0.0 or last[k, stations + n, 1] != 0.0 or last[k, stations + n, 2] != 0.0
+            on_rim[k, n] = pressed or edge[k, n] < margin or free < margin
+            some |= on_rim[k, n]
+            count += on_rim[k, n]
+        if some and gap[k, stations - 1] > lowest - _WORTH * surface.radius[stations - 1]:
+            chosen[k, stations - 1] = False
+            count -= 1
     result = empty_places(count)
     i = 0
     for k in range(rows):
         for s in range(stations):
             if chosen[k, s]:
                 _write_place(scene, surface, sections, gap, own, normal, k, s, result, i)
+                i += 1
+        for n in range(rim):
+            if on_rim[k, n]:
+                result.row[i], result.station[i], result.slot[i] = k, stations - 1, stations + n
+                result.first[i], result.share[i, 2] = stations - 3, 1.0
+                _write_frame(scene, surface, tip, surface.rim[n], edge[k, n], there[k, n], result, i)
                 i += 1
     return result
 
@@ -135,9 +191,9 @@ def find_places(
 def empty_places(count: int) -> Places:
     """Return arrays for `count` places, in which nothing is written yet."""
     return Places(
-        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
-        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
-        np.zeros((count, 3)), np.zeros(count),
+        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64),
+        np.empty(count, dtype=np.int64), np.zeros((count, 3)), np.empty((count, 2)), np.empty(count), np.empty((count, 3)),
+        np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.zeros((count, 3)), np.zeros(count),
     )  # fmt: skip
 
 
@@ -150,7 +206,7 @@ def _write_place(
     stations = len(surface.place)
     first = min(max(s - 1, 0), stations - 3)
     share, place = result.share[i], float(s - first)
-    result.row[i], result.station[i], result.first[i] = k, s, first
+    result.row[i], result.station[i], result.slot[i], result.first[i] = k, s, s, first
     section = sections[s].copy()
     best, here, there = gap[k, s], own[k, s].copy(), normal[k, s].copy()
     before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
@@ -176,21 +232,42 @@ def _write_place(
     _section_at(sections, first, place, share, section)
     tilt = result.tilt[i]
     tilt[0], tilt[1], tilt[2] = place - 1.5, 2.0 - 2.0 * place, place - 0.5
-    result.own[i], result.gap[i], result.normal[i] = here, best, there
-    axis = np.cross(section[1], section[2])
-    around = np.cross(axis, there)
+    _write_frame(scene, surface, section, here, best, there, result, i)
+
+
+@njit(cache=True)
+def _write_frame(
+    scene: SceneArrays, surface: ContactSurface, section: np.ndarray, own: np.ndarray, gap: float, normal: np.ndarray,
+    result: Places, i: int,
+) -> None:  # fmt: skip
+    """Write gap, normal, tangents and curvature of place i, which is at own (2,) in a section (3, 3)."""
+    result.own[i], result.gap[i], result.normal[i] = own, gap, normal
+    axis = _cross(section[1], section[2])
+    around = _cross(axis, normal)
     length = _length(around)
     if length < 1e-6 * _length(axis):  # the wall is across the robot
-        around[:] = section[1] - (section[1] @ there) * there
+        around[:] = section[1] - (section[1] @ normal) * normal
         length = _length(around)
     around /= length
-    result.around[i], result.along[i] = around, np.cross(there, around)
-    h = 0.02 * surface.radius[s]
-    one, other_side = np.empty(3), np.empty(3)
-    gap_to(scene, k, section[0] + h * around, one)
-    gap_to(scene, k, section[0] - h * around, other_side)
-    bend_across = ((one - other_side) @ around) / (2.0 * h)
-    result.curvature[i] = min(max(bend_across, -1.0 / h), 1.0 / h)
+    result.around[i], result.along[i] = around, _cross(normal, around)
+    if scene.kind[result.row[i]] == PLANE:
+        result.curvature[i] = 0.0
+        return
+    h = 0.02 * surface.radius[result.station[i]]
+    one, other = np.empty(3), np.empty(3)
+    gap_to(scene, result.row[i], section[0] + h * around, one)
+    gap_to(scene, result.row[i], section[0] - h * around, other)
+    bend = ((one - other) @ around) / (2.0 * h)
+    result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
+
+
+@njit(cache=True)
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    result = np.empty(3)
+    result[0] = a[1] * b[2] - a[2] * b[1]
+    result[1] = a[2] * b[0] - a[0] * b[2]
+    result[2] = a[0] * b[1] - a[1] * b[0]
+    return result
 
 
 @njit(cache=True)
@@ -217,6 +294,41 @@ def positions(places: Places, sections: np.ndarray) -> np.ndarray:
             for j in range(3):
                 result[i, j] += places.share[i, n] * (section[0, j] + x * section[1, j] + y * section[2, j])
     return result
+
+
+@njit(cache=True)
+def missed(scene: SceneArrays, places: Places, softness: np.ndarray, pressed: np.ndarray, sections: np.ndarray) -> float:
+    """Return by how much in m the places are beside the wall that presses them, or in one that does not, at most.
+
+    softness (c,): m/N of walls that yield; pressed (c,): normal forces in N; sections (s, 3, 3): of the stations now.
+    """
+    point, normal, worst = positions(places, sections), np.empty(3), 0.0
+    for i in range(len(point)):
+        gap = gap_to(scene, places.row[i], point[i], normal) + softness[i] * pressed[i]
+        worst = max(worst, abs(gap) if pressed[i] > 0.0 else -gap)
+    return worst
+
+
+@njit(cache=True)
+def pressed_places(
+    scene: SceneArrays, surface: ContactSurface, places: Places, forces: np.ndarray, sections: np.ndarray
+) -> Pressed:
+    """Return the places that are pressed by the forces (c, 3), where the stations are now at `sections` (s, 3, 3)."""
+    point, normal = positions(places, sections), np.empty(3)
+    chosen, count = np.empty(len(point), dtype=np.int64), 0
+    for i in range(len(point)):
+        if forces[i] @ places.normal[i] > 0.0:
+            chosen[count] = i
+            count += 1
+    chosen = chosen[:count]
+    along, gap, position = np.zeros(count), np.empty(count), np.empty((count, 3))
+    for k in range(count):
+        i = chosen[k]
+        for n in range(3):
+            along[k] += places.share[i, n] * surface.place[places.first[i] + n]
+        position[k] = point[i]
+        gap[k] = gap_to(scene, places.row[i], point[i], normal)
+    return Pressed(chosen, along, position, gap)
 
 
 @njit(cache=True)
@@ -249,7 +361,8 @@ def yielding(scene: SceneArrays, surface: ContactSurface, places: Places) -> np.
     result = np.zeros(len(places.row))
     for i in range(len(result)):
         if np.isfinite(scene.stiffness[places.row[i]]):
-            result[i] = 1.0 / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
+            parts = len(surface.rim) if places.slot[i] >= len(surface.place) else 1
+            result[i] = parts / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
     return result
 
 
@@ -267,11 +380,11 @@ def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray
 
 @njit(cache=True)
 def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, s, 3) in N: of `remember`."""
+    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, slots, 3) in N: of `remember`."""
     count = len(places.row)
     pressed, rub = np.empty(count), np.empty((count, 2))
     for i in range(count):
-        last = force[places.row[i], places.station[i]]
+        last = force[places.row[i], places.slot[i]]
         pressed[i] = max(places.normal[i] @ last, 0.0)
         rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
     return pressed, rub
@@ -279,22 +392,19 @@ def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @njit(cache=True)
 def remember(places: Places, forces: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (c, 3) of the places to force (k, s, 3), by obstacle and station; 0 elsewhere."""
+    """Write the forces (c, 3) of the places to force (k, slots, 3), by obstacle and slot; 0 elsewhere."""
     force[:] = 0.0
     for i in range(len(places.row)):
-        force[places.row[i], places.station[i]] = forces[i]
+        force[places.row[i], places.slot[i]] = forces[i]
 
 
 @njit(cache=True)
-def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places that rock, and the stiffness D (c + rocking places,) in N/m of the normal forces that turn and move.
+def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the places whose forces turn, those whose forces move, and their stiffness D (turns + moves,) in N/m.
 
-    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts.
+    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts. A force of 0
+    does neither, nor does that of a plane turn.
     """
-    rocks = np.flatnonzero(places.rocking)
-    bend = np.empty(len(pressed) + len(rocks))
-    for i in range(len(pressed)):
-        bend[i] = pressed[i] * places.curvature[i]
-    for n in range(len(rocks)):
-        bend[len(pressed) + n] = pressed[rocks[n]] * places.rocking[rocks[n]]
-    return rocks, bend
+    stiffness, moving = pressed * places.curvature, pressed * places.rocking
+    turns, moves = np.flatnonzero(stiffness), np.flatnonzero(moving)
+    return turns, moves, np.concatenate((stiffness[turns], moving[moves]))

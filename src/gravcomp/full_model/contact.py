@@ -11,10 +11,11 @@ from gravcomp.contact.condensed import SLIDING, contact_forces
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.places import (
     Places,
+    Pressed,
     all_gaps,
     find_places,
     forces_at,
-    positions,
+    pressed_places,
     remember,
     remembered,
     rubbing,
@@ -28,7 +29,7 @@ from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.turning_loads import TurningFactor
 from gravcomp.mechanics.block_matrix import BlockCholesky
 from gravcomp.mesh.sections import section_functionals
-from gravcomp.scene.distance import SceneArrays, gap_to
+from gravcomp.scene.distance import SceneArrays
 from gravcomp.scene.scene import Scene
 
 # Parts of the radius: a place nearer than the first is a candidate; one nearer than the second at the last equilibrium rubs.
@@ -40,8 +41,9 @@ class FullContact:
 
     Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
     nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
-    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of
-    contact hold; longest: largest step in m that cannot pass over an obstacle.
+    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; force (k, slots, 3): those of
+    `places.remember`; settled: whether all conditions of contact hold; longest: largest step in m that cannot pass over an
+    obstacle.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -61,7 +63,7 @@ class FullContact:
 
     def reset(self) -> None:
         """Forget the forces: nothing touches."""
-        self._force = np.zeros((len(self.arrays.kind), len(self.surface.place), 3))
+        self.force = np.zeros((len(self.arrays.kind), self.surface.slots, 3))
         self._start = self.sections_at_rest
         self.longest = np.inf
         self.pull, self.settled = np.zeros(3 * self._model.n_free), True
@@ -87,10 +89,10 @@ class FullContact:
 
     def depth(self, u: np.ndarray) -> float:
         """Return in m how deep the robot is in an obstacle at the displacements u (n, 3); 0 outside."""
-        shape = self._force.shape[:2]
+        shape = len(self.arrays.kind), len(self.surface.place)
         reach = np.full(shape[1], self.margin)
-        own, normal = np.zeros((*shape, 2)), np.zeros((*shape, 3))
-        gaps = all_gaps(self.arrays, self.surface, self.sections(u), reach, own, normal)
+        own, normal, asked = np.zeros((*shape, 2)), np.zeros((*shape, 3)), np.zeros(shape, dtype=np.bool_)
+        gaps = all_gaps(self.arrays, self.surface, self.sections(u), reach, asked, own, normal)
         return max(0.0, -float(gaps.min(initial=0.0)))
 
     def respond(
@@ -109,14 +111,14 @@ class FullContact:
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self._force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self.force)
         if not len(places.row):
             state.compliance, state.answer = compliance, answer
             self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m)), np.zeros(len(y)))
             return y + answer @ tension, tension
-        pressed, rub = remembered(places, self._force)
-        rocks, bend = turning(places, pressed)
-        directions, friction, slid = self._directions(places, rocks), np.zeros(0), np.zeros(0)
+        pressed, rub = remembered(places, self.force)
+        turns, moves, bend = turning(places, pressed)
+        directions, friction, slid = self._directions(places, turns, moves), np.zeros(0), np.zeros(0)
         arrays, count = self.arrays, len(places.row)
         if self.rubbing:
             friction, slid = rubbing(arrays, self.surface, places, self._start, sections, TOUCHED)
@@ -133,46 +135,47 @@ class FullContact:
         )  # fmt: skip
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
-        remember(places, forces, self._force)
+        remember(places, forces, self.force)
         self._keep(places, forces, held, change[m : m + count], force[m:] @ directions)
         return y + columns @ force, force[:m]
 
     def contacts(self, u: np.ndarray) -> Contacts:
         """Return what touched in the last solution, with the gaps at the displacements u (n, 3)."""
-        if self._last is None:
+        if self._last is None or not len(self._last[0].row):
             return Contacts.none()
-        return self.described(*self._last, self.sections(u))
+        places, forces, held, by_tension = self._last
+        pressed = pressed_places(self.arrays, self.surface, places, forces, self.sections(u))
+        return self.described(places, forces, held, by_tension, pressed)
 
     def described(
-        self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, sections: np.ndarray
+        self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pressed: Pressed
     ) -> Contacts:
-        """Return the places that are pressed by forces (c, 3), where the stations are at `sections` (s, 3, 3).
+        """Return the pressed places.
 
-        held (c,): states of `contact.condensed`; by_tension (c, m): changes of the normal forces by the tensions.
+        Of all places: forces (c, 3), states (c,) of `contact.condensed`, and changes (c, m) of the normal forces by the tensions.
         """
-        pressed = np.flatnonzero((forces * places.normal).sum(axis=1) > 0.0)
-        position, row = positions(places, sections)[pressed], places.row[pressed]
-        along, normal = self.surface.place / self._model.length, np.zeros(3)
+        chosen = pressed.numbers
+        obstacle = self.arrays.obstacle[places.row[chosen]]
         return Contacts(
-            obstacle=self.arrays.obstacle[row],
-            station=(places.share[pressed] * along[places.first[pressed, None] + np.arange(3)]).sum(axis=1),
-            position=position,
-            normal=places.normal[pressed],
-            force=forces[pressed],
-            gap=np.array([gap_to(self.arrays, k, point, normal) for k, point in zip(row, position)]),
-            sliding=held[pressed] == SLIDING,
-            by_tension=by_tension[pressed],
-            names=tuple(self.scene.names[self.arrays.obstacle[k]] for k in row),
+            obstacle=obstacle,
+            station=pressed.along / self._model.length,
+            position=pressed.position,
+            normal=places.normal[chosen],
+            force=forces[chosen],
+            gap=pressed.gap,
+            sliding=held[chosen] == SLIDING,
+            by_tension=by_tension[chosen],
+            names=tuple(self.scene.names[k] for k in obstacle),
         )
 
     def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray) -> None:
         if not len(places.row):
-            self._force[:], self.settled = 0.0, True
+            self.force[:], self.settled = 0.0, True
         self._last, self.pull = (places, forces, held, by_tension), pull
         self.longest = float(self.surface.radius.min()) if len(places.row) else np.inf
 
-    def _directions(self, places: Places, rocks: np.ndarray) -> np.ndarray:
-        """Rows (r, 3 n_free) of `contact.condensed`: normals, tangents if anything rubs, tangents of the middle, tilts."""
+    def _directions(self, places: Places, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Rows (r, 3 n_free) of `contact.condensed`: normals, tangents if anything rubs, then those of `turning`."""
         from scipy.sparse import csr_matrix
 
         count, n = len(places.row), self._model.n_free
@@ -195,7 +198,8 @@ class FullContact:
         if self.rubbing:
             both = np.stack([along(point, places.around), along(point, places.along)], axis=1)
             parts.append(both.reshape(2 * count, 3 * n))
-        parts.append(along(middle, places.around))
-        if len(rocks):
-            parts.append(along(at(tilt, rocks)[1], places.normal[rocks]))
+        if len(turns):
+            parts.append(along(middle[turns], places.around[turns]))
+        if len(moves):
+            parts.append(along(at(tilt, moves)[1], places.normal[moves]))
         return np.vstack(parts)

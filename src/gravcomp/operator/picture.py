@@ -50,7 +50,7 @@ class Camera:
         chosen = np.flatnonzero(within)
         share = np.linspace(0.0, 1.0, _SIGHTS, endpoint=False)[1:]
         sights = tip + share[None, :, None] * (points[chosen] - tip)[:, None]
-        gap = nearest_of_all(self._scene, sights.reshape(-1, 3))[0].reshape(len(chosen), -1)
+        gap = nearest_of_all(self._scene, sights.reshape(-1, 3))[0].reshape(len(chosen), _SIGHTS - 1)
         within[chosen] = (gap > 0.0).all(axis=1)
         return within
 

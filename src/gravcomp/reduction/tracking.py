@@ -143,17 +143,19 @@ class ReducedTracker:
     ) -> ReducedState:  # fmt: skip
         """Return the state as `track` does, with contact."""
         assert self.contact is not None
-        state, (longest, _, tolerance) = self.state, self._limits
+        state, (longest, near, tolerance) = self.state, self._limits
         touching = self.contact.touching(state.q, gravity)
+        longest = min(longest, touching.surface.radius.min())
         (
             converged, self._point, q, tension, displacement, compliance, answer, residual, places, forces, held, by_tension,
+            pressed,
         ) = tracked_touching(
             self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
-            self._kept, iterations, min(longest, touching.surface.radius.min()), tolerance, touching,
+            self._kept, iterations, longest, min(longest, near), tolerance, touching,
         )  # fmt: skip
         if not converged:
             return replace(state, residual=np.inf, converged=False)
-        self.contact.keep(touching, places, forces, held, by_tension)
+        self.contact.keep(touching, places, forces, held, by_tension, pressed)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 

@@ -19,6 +19,7 @@ from gravcomp.scene.surface_distance import SurfaceArrays, surface_gap
 PLANE, SPHERE, BOX, TUBE, SURFACE = range(5)
 
 _NEWTON_STEPS = 30
+_EXACT = 1e-7  # of a piece of a curve: after a step of Newton's method that is shorter, the next one would be rounding error
 
 
 class SceneArrays(NamedTuple):
@@ -67,15 +68,15 @@ def gap_to(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) ->
     """Return the gap in m between a point (3,) and row k of `scene`, and write its normal (3,), a unit vector into free space."""
     r = scene.rotation[k]
     x, y, z = point[0] - scene.origin[k, 0], point[1] - scene.origin[k, 1], point[2] - scene.origin[k, 2]
-    own = np.empty(3)
-    for i in range(3):
-        own[i] = r[0, i] * x + r[1, i] * y + r[2, i] * z
-    here = np.empty(3)
     kind = scene.kind[k]
     if kind == PLANE:
-        here[0], here[1], here[2] = 0.0, 0.0, 1.0
-        gap = own[2]
-    elif kind == SPHERE:
+        for i in range(3):
+            normal[i] = r[i, 2]
+        return r[0, 2] * x + r[1, 2] * y + r[2, 2] * z
+    own, here = np.empty(3), np.empty(3)
+    for i in range(3):
+        own[i] = r[0, i] * x + r[1, i] * y + r[2, i] * z
+    if kind == SPHERE:
         gap = scene.sign[k] * (_from_centre(own, here, scene.sign[k]) - scene.size[k, 0])
     elif kind == BOX:
         gap = _box(own, scene.size[k], here)
@@ -141,12 +142,12 @@ def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> fl
             low = t
         else:
             high = t
-        following = t - slope / curvature if curvature < 0.0 else 0.5 * (low + high)
+        following, within = t - slope / curvature if curvature < 0.0 else np.inf, _EXACT
         if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - t) < 1e-14 * (1.0 + abs(t)):
+            following, within = 0.5 * (low + high), 1e-14 * (1.0 + abs(t))
+        change, t = abs(following - t), following
+        if change < within:
             break
-        t = following
     value, slope, _ = _along(scene, last, t, own, d)
     length = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
     if scene.sign[k] < 0.0:
