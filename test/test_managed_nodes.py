@@ -122,7 +122,7 @@ def test_a_change_of_a_parameter_is_an_event_and_a_refused_one_is_not(start, obs
     line, values = "ros2 param set /imu_estimator prediction.horizon_ms", iter(range(1, 100))
 
     def is_heard() -> bool:  # the event of an earlier change may have come before the node knew of the subscription
-        with pytest.raises(AssertionError, match="out of range Min: 0.0, Max: 500.0, value: 501.0"):
+        with pytest.raises(AssertionError, match=r"out of range Min: 0\.0, Max: 500\.0, value: 501\.0"):
             observer.run(f"{line} 501.0")
         observer.run(f"{line} {next(values)}.0")
         return any(event.changed_parameters for event in events if event.node == "/imu_estimator")
