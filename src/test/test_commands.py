@@ -140,3 +140,17 @@ def test_citation_and_changelog_name_the_version():
     assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text()
     assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text()
     assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_what_is_compiled_is_said_and_what_fails_is_named(monkeypatch, capsys):
+    """Without a terminal, where no status is shown."""
+    from gravcomp.commands.preparation import compile_parts
+    from gravcomp.launcher import compilation
+
+    failing = [sys.executable, "-I", "-S", "-c", "raise SystemExit('no room on the disk')"]
+    monkeypatch.setattr(compilation, "missing", list)
+    monkeypatch.setattr(compilation, "start", lambda parts: [subprocess.Popen(failing, stderr=subprocess.PIPE, text=True)])
+    compile_parts(("contact",))
+    said = capsys.readouterr().err
+    assert "compiling, once for this machine (about a minute): contact" in said
+    assert "compiling the contact failed (no room on the disk)" in said

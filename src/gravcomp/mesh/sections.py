@@ -48,7 +48,7 @@ def _known_of(mesh: Mesh) -> dict[float, np.ndarray]:
         return {}
     content = hashlib.blake2b(mesh.kind.encode(), digest_size=16)
     for array in (mesh.nodes, mesh.straight, mesh.elements):
-        content.update(np.ascontiguousarray(array))
+        content.update(array.tobytes())
     key = content.digest()
     with _guard:
         found = _known.setdefault(key, {})
