@@ -90,7 +90,7 @@ ROWS = {
         Row("robots.*.ms", "step of the loop on the board, estimated at 168 MHz, worst", "ms", 10.0),
     ),
     "contact": (
-        Row("contact_error_pct", "tip and force of contact against closed forms, worst", "%", 0.5),
+        Row("contact_error_pct", "tip and force of contact against closed forms and CalculiX, worst", "%", 0.5),
         Row("penetration_mm", "deepest place in a rigid wall, 200 seeded scenes with motion", "mm", 0.02),
         Row("contact_step_ms", "reduced model with inverse problem, in contact, median", "ms", 0.5),
         Row("contact_energy", "energy gained from contact over a closed path, share of the weight's work, worst scene", "", 1e-3),
