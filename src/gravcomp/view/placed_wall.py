@@ -42,7 +42,7 @@ class WallHandle:
         scene.add_line_segments(
             "/robot/placed_wall/edge", scaled(np.stack([edge[:-1], edge[1:]], axis=1)), colours.PLACED, thickness=SCALE * 0.0006
         )
-        scene.add_label("/robot/placed_wall/text", _TEXT, position=tuple(SCALE * edge[0]), anchor="bottom-right")
+        scene.add_label("/robot/placed_wall/text", _TEXT, position=SCALE * edge[0], anchor="bottom-right")
         self._rings = scene.add_transform_controls(
             "/robot/placed_wall_rings", scale=SCALE * 0.22 * length, disable_axes=True, disable_sliders=True,
             depth_test=False, opacity=0.85, visible=False)  # fmt: skip
