@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.calibration.course import COURSE_OPTIONS, predict_course
+from gravcomp.calibration.course import course_options, predict_course
 from gravcomp.calibration.measured import Measured
 from gravcomp.calibration.motion import fit_motion
 from gravcomp.calibration.parameters import with_moduli
@@ -124,7 +124,7 @@ def _rayleigh_fall(robot: Robot, fall: Measured, modulus: float, damping: float,
     damping: C of the article's robot; slower: first period over that robot's.
     """
     options = dataclasses.replace(
-        COURSE_OPTIONS, damping="rayleigh", rayleigh_mass=damping / slower, rayleigh_stiffness=damping * slower
+        course_options(robot), damping="rayleigh", rayleigh_mass=damping / slower, rayleigh_stiffness=damping * slower
     )
     moduli = np.array([material.youngs_modulus for material in robot.materials])
     return predict_course(with_moduli(robot, moduli * modulus * 1e6 / moduli[0]), fall, options)[0]

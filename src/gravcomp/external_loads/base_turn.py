@@ -62,7 +62,7 @@ class BaseTurn:
         return self._acting if self.options.enabled and fresh else np.zeros(3)
 
     def _follow(self, time: float, rate: np.ndarray) -> None:
-        """Go on to a rate; time that runs backwards begins anew, as after a restart of a replay."""
+        """Go on to a rate; time that runs backwards begins again, as after a restart of a replay."""
         if not math.isfinite(self._time) or time <= self._time:
             self._time, self._interval = time, math.inf
             self._rate, self._acting = rate, np.zeros(3)
