@@ -211,7 +211,7 @@ def test_an_earlier_state_has_no_handles(browsers):
     assert browsers.page.requests() == [] and not browsers.hand._ball.visible
 
 
-def test_a_wall_is_put_beside_the_robot_and_dragged_along_its_normal(browsers, robot):
+def test_a_wall_is_put_next_to_the_robot_and_dragged_along_its_normal(browsers, robot):
     browsers.wall.put_up("below")
     (placed,) = browsers.page.requests()
     point, normal = (np.array(vector) for vector in placed.plane)
@@ -228,7 +228,7 @@ def test_a_wall_is_put_beside_the_robot_and_dragged_along_its_normal(browsers, r
     assert browsers.page.requests() == [PlaceWall(None)]
 
 
-@pytest.mark.parametrize("side", ["below", "above", "beside", "ahead"])
+@pytest.mark.parametrize("side", ["below", "above", "side", "ahead"])
 def test_a_new_wall_is_one_that_the_virtual_robot_takes(browsers, robot, side):
     from gravcomp.virtual.placed_wall import parse_wall
 

@@ -12,6 +12,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands import output
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
+from gravcomp.inverse import ControllerCode
 from gravcomp.inverse.target import straight_target
 from gravcomp.view.backbone import Backbone
 from gravcomp.view.browser import Browser, BrowserError
@@ -95,7 +96,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
         truth=Backbone(station, truth.backbone_position, truth.backbone_orientation),
         target=TargetView(np.array([0.0, 0.0, loop.setup.robot.length])),
         status=command.message if command is not None else "",
-        status_level="ok",
+        status_level="ok" if command is not None and command.code == ControllerCode.OK else "warn",
         virtual=True,
         model_touches=tuple(model),
         virtual_touches=tuple(touched),

@@ -17,7 +17,7 @@ from gravcomp.view.requests import PlaceWall, Request
 from gravcomp.view.scale import SCALE, scaled
 from gravcomp.view.snapshot import Snapshot
 
-SIDES = ("below", "above", "beside", "ahead")
+SIDES = ("below", "above", "side", "ahead")
 _GAP = 0.08  # between a new wall and the robot, in lengths of the robot
 _TEXT = "unknown wall: the model does not know it"
 
@@ -94,7 +94,7 @@ class WallHandle:
             up = -snapshot.gravity / np.linalg.norm(snapshot.gravity)
         if side == "ahead":
             return -axis
-        if side != "beside":
+        if side != "side":
             return up if side == "below" else -up
         across = np.cross(axis, up)
         return across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-3 else np.array([1.0, 0.0, 0.0])

@@ -40,7 +40,7 @@ class TipHandle:
             self._held = None
 
     def drop(self) -> None:
-        """Let go, whoever holds the tip."""
+        """Let go, in whatever browser the tip is held."""
         self._held = None
 
     def request(self) -> Push | None:
