@@ -32,6 +32,7 @@ def test_the_firmware_is_tested(type_in):
     ("line", "expected"),
     [
         ("./gravcomp doctor --board --interface socketcan --channel can0", 1),
+        ("./gravcomp doctor --board --motor 1 --current 0.2 --out reports --interface socketcan --channel can0", 1),
         ("./gravcomp firmware parameters ROBOT.yaml --interface socketcan --channel can0", 2),
         ("./gravcomp firmware send build/firmware/NAME.model --interface socketcan --channel can0", 2),
     ],

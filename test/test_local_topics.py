@@ -5,7 +5,7 @@ import time
 import pytest
 import rclpy
 from gravcomp_node.executor import StreamExecutor
-from gravcomp_node.local_topics import LocalPublisher, LocalTopics
+from gravcomp_node.local_topics import Adapted, LocalPublisher, LocalTopics
 from gravcomp_node.polled import Polled
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -36,9 +36,9 @@ class Process:
         self.local.add_publisher(node, publisher)
         return publisher
 
-    def subscribe(self, node, topic, callback, qos=QOS):
+    def subscribe(self, node, topic, callback, qos=QOS, takes=None):
         subscription = node.create_subscription(Int32, topic, callback, qos)
-        self.local.add_subscription(node, subscription, callback)
+        self.local.add_subscription(node, subscription, callback, takes)
         return subscription
 
     def until(self, condition, what="nothing came"):
@@ -76,6 +76,35 @@ def test_a_message_arrives_as_the_object_and_is_not_serialised(process, monkeypa
     process.until(lambda: publisher.get_subscription_count() == 1)  # other processes see the subscription
     publisher.publish(Int32())
     assert serialised == [] and len(heard) == 2
+
+
+def test_a_value_arrives_as_it_is_and_becomes_a_message_only_for_those_who_need_one(process):
+    values, messages, there, made = [], [], [], []
+
+    def to_message(value):
+        made.append(value)
+        return Int32(data=int(value))
+
+    process.subscribe(process.second, "numbers", lambda _: pytest.fail("it takes values"), takes=values.append)
+    publisher = process.publisher(process.first, "numbers")
+    publisher.publish(Adapted("7", to_message))
+    assert values == ["7"] and made == []
+    process.subscribe(process.second, "numbers", messages.append)
+    process.elsewhere.create_subscription(Int32, "numbers", there.append, QOS)
+    process.until(lambda: publisher.get_subscription_count() == 3)
+    publisher.publish(Adapted("8", to_message))
+    process.until(lambda: there)
+    assert values == ["7", "8"] and [m.data for m in messages + there] == [8, 8] and made == ["8"]
+
+
+def test_a_value_is_published_as_a_message_by_a_node_that_is_alone(process):
+    there = []
+    publisher = process.first.create_publisher(Int32, "numbers", QOS, publisher_class=LocalPublisher)
+    process.elsewhere.create_subscription(Int32, "numbers", there.append, QOS)
+    process.until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(Adapted("3", lambda value: Int32(data=int(value))))
+    process.until(lambda: there)
+    assert there[0].data == 3
 
 
 def test_a_subscriber_elsewhere_receives_as_well(process):

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.serialised_imu import read_sample
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import Imu, Temperature
 from std_msgs.msg import Float32
@@ -69,7 +70,7 @@ class ImuEstimator(ManagedNode):
         self._code: int | None = None
         reliability = self.parameters.reliability
         self._streams = [
-            SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability),
+            SensorStream(self, Imu, "imu/data_raw", self._on_sample, reliability, raw=True),
             SensorStream(self, Temperature, "imu/temperature", self._on_temperature, reliability),
         ]
         self._known, self._known_stamp_ns = (0.0, 0.0, 0.0), 0
@@ -129,18 +130,22 @@ class ImuEstimator(ManagedNode):
 
     # Samples.
 
-    def _on_sample(self, message: Imu) -> None:
+    def _on_sample(self, serialised: bytes) -> None:
         now = time.monotonic()
         self._sample_time = now
-        stamp, gyro, accel = messages.sample_of(message)
+        try:
+            stamp, gyro, accel = read_sample(serialised)
+        except ValueError as error:
+            self.get_logger().warning(f"imu/data_raw: {error}", throttle_duration_sec=1.0)
+            return
         known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
         continued = self._counter.continued(stamp)
         estimate = self._estimator.update(continued, gyro, accel, known)
-        self._monitor.add(continued, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
         problem = estimate if isinstance(estimate, Problem) else estimate.imu.problem
         if problem is not Problem.NONE:
             self._problem, self._problem_time = problem, now
         if isinstance(estimate, Problem):
+            self._monitor.add(continued, gyro, accel)
             return
         step = (stamp - self._stamp_ns) * 1e-9
         if 0.0 < step < self.parameters.filter.sensor.largest_gap:
@@ -148,6 +153,7 @@ class ImuEstimator(ManagedNode):
         self._stamp_ns, self._estimate = stamp, estimate
         parameters = self.parameters
         self._gravity.publish(messages.vector(stamp, parameters.base_frame, estimate.gravity))
+        self._monitor.add(continued, gyro, estimate.accel)  # the loop waits for gravity, not for the checks of the stream
         if self._imu.get_subscription_count():
             self._imu.publish(messages.imu_data(estimate, parameters.imu_frame, self._period, parameters.filter))
         if not 0 <= stamp - self._bias_stamp_ns < BIAS_PERIOD_NS:

@@ -21,12 +21,6 @@ def header(stamp: int, frame: str) -> Header:
     return message
 
 
-def sample_of(message: Imu) -> tuple[int, tuple, tuple]:
-    """Return stamp in ns, angular rate (3,) in rad/s and specific force (3,) in m/s^2."""
-    rate, accel = message.angular_velocity, message.linear_acceleration
-    return stamp_ns(message.header), (rate.x, rate.y, rate.z), (accel.x, accel.y, accel.z)
-
-
 def raw_imu(stamp: int, frame: str, gyro: list[float], accel: list[float]) -> Imu:
     """Return the message of a raw sample: rate (3,) in rad/s and specific force (3,) in m/s^2, without orientation."""
     message = Imu(header=header(stamp, frame))

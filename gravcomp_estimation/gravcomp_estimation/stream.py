@@ -23,9 +23,9 @@ class SensorStream:
     Attribute reliable: whether the current subscription is reliable.
     """
 
-    def __init__(self, node: Node, kind: type, topic: str, callback: Callable, reliability: str):
-        """Subscribe to `topic`; `reliability`: auto, best_effort or reliable."""
-        self._node, self._kind, self._topic, self._callback = node, kind, topic, callback
+    def __init__(self, node: Node, kind: type, topic: str, callback: Callable, reliability: str, *, raw: bool = False):
+        """Subscribe to `topic`; `reliability`: auto, best_effort or reliable; raw: the callback takes serialised messages."""
+        self._node, self._kind, self._topic, self._callback, self._raw = node, kind, topic, callback, raw
         self._follows = reliability == "auto"
         self.reliable = reliability == "reliable"
         self._subscription = self._subscribe()
@@ -49,4 +49,6 @@ class SensorStream:
         qos = LOSSLESS if self.reliable else SENSOR
         # Without overrides by parameters, which would fix the reliability that it follows.
         none = QoSOverridingOptions([])
-        return self._node.create_subscription(self._kind, self._topic, self._callback, qos, qos_overriding_options=none)
+        return self._node.create_subscription(
+            self._kind, self._topic, self._callback, qos, qos_overriding_options=none, raw=self._raw
+        )

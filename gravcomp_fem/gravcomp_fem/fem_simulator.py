@@ -2,7 +2,8 @@
 
 The model is fixed in `soft_base` while its gravity turns. Its cable displacements are the commanded ones, limited to the speed
 of the winches, or the measured ones. Before the first message about the cables they are released. In the mode `dynamic` the
-model moves from one stamp to the next, starting at rest in the first equilibrium.
+model moves from one stamp to the next, starting at rest in the first equilibrium. While the base turns, the forces of its turn
+are added to gravity (`gravcomp.external_loads.base_turn`), from the rate in imu/data, if anybody publishes it.
 """
 
 import os
@@ -12,23 +13,26 @@ from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
+from gravcomp_node.local_topics import Adapted
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.timer import Timer
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
 from gravcomp.arm.shape_chain import joint_names, joint_positions
 from gravcomp.config import ConfigError
 from gravcomp.external_loads import LivePayload
+from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
-from gravcomp_fem.conversion import deformation_message, pose_message, seconds
+from gravcomp_fem.conversion import pose_message, seconds
+from gravcomp_fem.deformed import PublishedShape
 from gravcomp_fem.load_inputs import LoadInputs
 from gravcomp_fem.markers import RobotMarkers
 from gravcomp_fem.transforms import TransformPublisher
@@ -64,6 +68,9 @@ class FemSimulator(ManagedNode):
         for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
             self._simulator.step(np.zeros(3), cables)
         within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
+        # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
+        around = scene or self.robot_file.zones or not self.parameters.turn.enabled
+        self._turn = None if around else BaseTurn(self._simulator.model, self.parameters.turn)
         self._late_reduction = LateReduction(self._simulator)
         self._builder: subprocess.Popen | None = None
         self._builder_timer: Timer | None = None
@@ -92,12 +99,17 @@ class FemSimulator(ManagedNode):
             self._cable_topic = Polled(self, CableCommand, "cable/command", COMMAND)
         else:
             self._cable_topic = Polled(self, CableState, "cable/state", SENSOR)
+        if self._turn is not None:
+            self._turn.reset()
+            self._imu_topic = Polled(self, Imu, "imu/data", SENSOR)
         self.report(WARN, "waiting for gravity")
 
     def deactivate(self) -> None:
         """Unsubscribe."""
         self.destroy_subscription(self._gravity_subscription)
         self._cable_topic.destroy()
+        if self._turn is not None:
+            self._imu_topic.destroy()
         self._loads.end()
 
     def cleanup(self) -> None:
@@ -122,6 +134,8 @@ class FemSimulator(ManagedNode):
         """Apply a new payload and new options of the loads."""
         if hasattr(self, "_loads"):
             self._loads.change(old, new)
+            if self._turn is not None:
+                self._turn.options = new.turn
 
     def _start_builder(self) -> None:
         """Build the reduced model in a process of low priority, when no launcher does."""
@@ -155,6 +169,16 @@ class FemSimulator(ManagedNode):
             return
         self._wanted = displacement
 
+    def _turned(self, stamp: float) -> np.ndarray:
+        """Return what the base's turn adds to gravity (3,) at `stamp` s."""
+        if self._turn is None:
+            return np.zeros(3)
+        for received in self._imu_topic.take_all():
+            rate = received.message.angular_velocity
+            in_base = self.robot_file.robot.imu_mount.rotation @ np.array([rate.x, rate.y, rate.z])
+            self._turn.add(seconds(received.message.header), in_base)
+        return self._turn.acceleration(stamp)
+
     def _move_cables(self, interval: float) -> None:
         """Move the model's cables toward the wanted displacements, for `interval` (s)."""
         if self._cables is None or self.parameters.cables_from != "command":
@@ -172,6 +196,7 @@ class FemSimulator(ManagedNode):
         last, self._last_stamp = self._last_stamp, stamp
         elapsed = None if last is None or stamp <= last else stamp - last
         interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
+        gravity = gravity + self._turned(stamp)
         self._move_cables(interval or _LONGEST_GAP)
         self._late_reduction.exchange()
         carried = self._loads.carried(gravity, stamp)
@@ -183,7 +208,7 @@ class FemSimulator(ManagedNode):
             )
             return
         header = Header(stamp=message.header.stamp, frame_id=self.parameters.base_frame)
-        self._deformation.publish(deformation_message(shape, header))
+        self._deformation.publish(Adapted(PublishedShape(shape, header), PublishedShape.message))
         self._loads.observe(header, shape, self._simulator, carried, self._cables)
         if self._tip.get_subscription_count():
             tip = pose_message(shape.tip_position, shape.tip_orientation)

@@ -9,6 +9,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -22,16 +23,8 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
-from gravcomp_fem.conversion import (
-    contact_of,
-    doubles,
-    gravity_of,
-    point_message,
-    pose_target,
-    response_of,
-    seconds,
-    shape_target,
-)
+from gravcomp_fem.conversion import doubles, point_message, pose_target, seconds, shape_target
+from gravcomp_fem.deformed import Deformed, PublishedShape, from_message, from_shape
 from gravcomp_fem.tracker_input import TrackerInput
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
@@ -84,7 +77,9 @@ class InverseController(ManagedNode):
         self._question: HoldProcess | None = None
         self._asked = not self.parameters.check_hold
         self._inputs = [
-            self.create_subscription(Deformation, "robot/deformation", self._on_deformation, SENSOR),
+            self.create_subscription(
+                Deformation, "robot/deformation", self._on_deformation, SENSOR, takes=self._on_published_shape
+            ),
             self.create_subscription(PoseStamped, "target", self._on_pose_target, COMMAND),
             self.create_subscription(ShapeTarget, "target/shape", self._on_shape_target, COMMAND),
             self._tracker.subscription(),
@@ -139,58 +134,64 @@ class InverseController(ManagedNode):
     # The loop.
 
     def _on_deformation(self, message: Deformation) -> None:
+        self._take(message, message.status, message.message, message.header, from_message)
+
+    def _on_published_shape(self, published: PublishedShape) -> None:
+        self._take(published, published.shape.status, published.shape.message, published.header, from_shape)
+
+    def _take(self, given: Any, status: int, sentence: str, header: Header, read: Callable[[Any], Deformed]) -> None:
+        """Follow a deformation that `read` takes from what was given."""
         self._last_arrival = self.get_clock().now()
-        if message.status == Deformation.FAILED:
-            self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {message.message}", message.header)
+        if status == Deformation.FAILED:
+            self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {sentence}", header)
             return
         try:
-            response, contact, gravity = response_of(message), contact_of(message), gravity_of(message)
+            deformed = read(given)
         except ValueError as error:
-            self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", message.header)
+            self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", header)
             return
-        if len(message.cable_tension) != len(self.robot_file.robot.cables):
-            found, own = len(message.cable_tension), len(self.robot_file.robot.cables)
-            self._publish_code(
-                ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", message.header
-            )
+        if len(deformed.cable_tension) != len(self.robot_file.robot.cables):
+            found, own = len(deformed.cable_tension), len(self.robot_file.robot.cables)
+            self._publish_code(ControllerCode.REFUSED, f"robot/deformation has {found} cables; this robot has {own}", header)
             return
-        self._check_hold(message)
-        self._tracker.predict(message, response)
-        interval = self._interval(message)
+        self._follow(deformed)
+
+    def _follow(self, deformed: Deformed) -> None:
+        header = deformed.header
+        self._check_hold(deformed.gravity)
+        self._tracker.predict(deformed)
+        interval = self._interval(header)
         if self._relaxing:
-            command = self._problem.relax(response, interval=interval)
+            command = self._problem.relax(deformed.response, interval=interval)
         elif self._enabled and self._target is not None:
             command = self._problem.step(
-                response,
-                self._tracker.corrected(self._target, message.header),
-                backbone_station=message.backbone_station,
-                tension=message.cable_tension,
+                deformed.response,
+                self._tracker.corrected(self._target, header),
+                backbone_station=deformed.backbone_station,
+                tension=deformed.cable_tension,
                 interval=interval,
-                followed=message.status != Deformation.NOT_CONVERGED,
-                contact=contact,
-                gravity=gravity,
+                followed=deformed.status != Deformation.NOT_CONVERGED,
+                contact=deformed.contact,
+                gravity=deformed.gravity,
             )
         else:
-            self._publish_code(
-                ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", message.header
-            )
+            self._publish_code(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", header)
             return
         self._command.publish(
-            CableCommand(header=message.header, displacement=doubles(command.displacement), tension=doubles(command.tension))
+            CableCommand(header=header, displacement=doubles(command.displacement), tension=doubles(command.tension))
         )
-        self._publish_status(command, message.header)
+        self._publish_status(command, header)
 
-    def _interval(self, message: Deformation) -> float:
+    def _interval(self, header: Header) -> float:
         """Return s between the stamps of this and the last deformation; 0.01 when the stamp has not increased."""
-        stamp = seconds(message.header)
+        stamp = seconds(header)
         interval = 0.01 if self._last_stamp is None else stamp - self._last_stamp
         self._last_stamp = stamp
         return interval if interval > 0.0 else 0.01
 
-    def _check_hold(self, message: Deformation) -> None:
+    def _check_hold(self, gravity: np.ndarray) -> None:
         """Ask once whether the target can be held against the gravity of a deformation, and take the answer when it is there."""
         if not self._asked and self._target is not None and self._target.tip_position_weight > 0.0:
-            gravity = np.array([message.gravity.x, message.gravity.y, message.gravity.z])
             self._asked = True
             if np.linalg.norm(gravity) > 0.0:
                 self._question = HoldProcess(self.robot_file.source, gravity, self._target)

@@ -10,10 +10,9 @@ from std_msgs.msg import Header
 
 from gravcomp.description import Robot
 from gravcomp.inverse import Target
-from gravcomp.simulation import Response
 from gravcomp.tip_observer import TipObserver, TipObserverOptions
-from gravcomp_fem.conversion import doubles, seconds
-from gravcomp_msgs.msg import Deformation
+from gravcomp_fem.conversion import seconds
+from gravcomp_fem.deformed import Deformed
 from gravcomp_node import SENSOR
 
 
@@ -32,16 +31,15 @@ class TrackerInput:
         """Return a subscription to measured/tip; its owner destroys it."""
         return self._node.create_subscription(PoseStamped, "measured/tip", self._on_measured, SENSOR)
 
-    def predict(self, message: Deformation, response: Response) -> None:
+    def predict(self, deformed: Deformed) -> None:
         """Remember a shape of the model for the measurements that belong to it."""
-        p, q = message.tip.position, message.tip.orientation
         self._observer.predict(
-            seconds(message.header),
-            np.array([p.x, p.y, p.z]),
-            np.array([q.x, q.y, q.z, q.w]),
-            response,
-            np.array(doubles(message.cable_tension)),
-            bool(message.contact_obstacle),
+            seconds(deformed.header),
+            deformed.tip_position,
+            deformed.tip_orientation,
+            deformed.response,
+            deformed.cable_tension,
+            len(deformed.contact) > 0,
         )
 
     def corrected(self, target: Target, header: Header) -> Target:

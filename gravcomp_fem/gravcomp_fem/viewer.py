@@ -5,6 +5,7 @@ affected. No node of the loop depends on it.
 """
 
 import sys
+from typing import TYPE_CHECKING
 
 from gravcomp_node.managed_node import OK
 
@@ -13,6 +14,9 @@ from gravcomp.view.page import Page
 from gravcomp_fem.viewer_observer import GraphObserver
 from gravcomp_fem.viewer_requests import RequestSender
 from gravcomp_node import ManagedNode, run
+
+if TYPE_CHECKING:
+    from gravcomp.view.obstacle_shapes import ObstacleShape
 
 
 class Viewer(ManagedNode):
@@ -23,14 +27,24 @@ class Viewer(ManagedNode):
 
     def configure(self) -> None:
         """Start to serve the page; create publishers and clients."""
-        self._page = Page(self.robot_file.robot, self.parameters)
+        self._page = Page(self.robot_file.robot, self.parameters, self._shapes())
         bridge = "joint_bridge" if self.robot_file.has_joints else "can_bridge"
         self.sender = RequestSender(self, self.parameters, self.robot_file.robot.length, self._page.notify, bridge)
         self.get_logger().info(f"the page is at {self._page.address}")
 
+    def _shapes(self) -> "list[ObstacleShape]":
+        """Return the obstacles to draw. Raises ConfigError for a file of the scene that cannot be read."""
+        self._walls = None
+        if not self.robot_file.section("scene"):
+            return []
+        from gravcomp.view.obstacle_shapes import obstacle_shapes  # imports Numba
+
+        self._walls, length = self.robot_file.scene, self.robot_file.robot.length
+        return obstacle_shapes(self._walls, length) + obstacle_shapes(self.robot_file.zones, length, forbidden=True)
+
     def activate(self) -> None:
         """Subscribe, and update the page from now on."""
-        self.observer = GraphObserver(self, self.robot_file.robot.length)
+        self.observer = GraphObserver(self, self.robot_file.robot.length, self._walls)
         self._frames = self.create_timer(1.0 / self.parameters.rate, self._frame)
 
     def deactivate(self) -> None:

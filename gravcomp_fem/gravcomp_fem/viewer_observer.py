@@ -1,9 +1,10 @@
 """The viewer's subscriptions, and the snapshot of the graph that the page shows."""
 
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
-from geometry_msgs.msg import PoseArray, PoseStamped
+from geometry_msgs.msg import Point, PoseArray, PoseStamped, Vector3
 from gravcomp_node.polled import Polled, Received
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -12,9 +13,13 @@ from rclpy.time import Time
 from gravcomp.inverse import Holdable, TargetError
 from gravcomp.view.backbone import arc_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
+from gravcomp.view.touches import Touch, model_touches
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target
-from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget
+from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, LATCHED
+
+if TYPE_CHECKING:
+    from gravcomp.scene.scene import Scene
 
 _STREAM = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
 _LEVELS = {
@@ -34,16 +39,18 @@ _CLOCK_TOLERANCE = 10.0  # s
 
 
 class GraphObserver:
-    """Reads the newest message of each topic for a robot of `length` (m)."""
+    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it."""
 
-    def __init__(self, node: LifecycleNode, length: float):
-        self._node, self._length = node, length
+    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None" = None):
+        self._node, self._length, self._walls = node, length, walls
         self._streams = {
             "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
             "command": Polled(node, CableCommand, "cable/command", _STREAM),
             "motors": Polled(node, CableState, "cable/state", _STREAM),
             "status": Polled(node, ControllerStatus, "controller/status", LATCHED),
             "truth": Polled(node, PoseArray, "truth/backbone", _STREAM),
+            "forces": Polled(node, VirtualForces, "truth/forces", _STREAM),
+            "load": Polled(node, WrenchEstimate, "estimated/wrench", _STREAM),
             "target": Polled(node, PoseStamped, "target", COMMAND),
             "shape": Polled(node, ShapeTarget, "target/shape", COMMAND),
         }
@@ -72,6 +79,14 @@ class GraphObserver:
                 backbone=backbone_of(d), gravity=np.array([d.gravity.x, d.gravity.y, d.gravity.z]),
                 tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
                 model=d.model, model_time=d.solve_time)  # fmt: skip
+            shown.update(model_touches=self._model_touches(d))
+        forces, load = self._current("forces"), self._current("load")
+        if forces:
+            shown.update(virtual_touches=_touches(forces.message), wall=_wall(forces.message))
+        if load and deformation and np.isfinite(_vector(load.message.wrench.force)).all():
+            place, force = shown["backbone"].tip, _vector(load.message.wrench.force)
+            variance = np.trace(np.reshape(load.message.covariance, (6, 6))[:3, :3])
+            shown.update(load=Touch("estimated", place, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
         if motors:
             m = motors.message
             shown.update(
@@ -104,6 +119,13 @@ class GraphObserver:
             return None
         # A latched status is valid until it is replaced.
         return received if name == "status" or time.time_ns() - received.sent < _STALE * 1e9 else None
+
+    def _model_touches(self, message: Deformation) -> tuple[Touch, ...]:
+        """Return the forces of walls on the model; none where this node does not know the walls."""
+        if self._walls is None or not message.contact_obstacle:
+            return ()
+        places = np.array(message.contact_position).reshape(-1, 3)
+        return model_touches(self._walls, _vector(message.gravity), message.contact_obstacle, message.contact_force, places)
 
     def _delays(self) -> dict[str, float]:
         """Return s from the IMU sample to the message of each stage."""
@@ -140,6 +162,21 @@ class GraphObserver:
                 self._target = TargetView(target.tip_position, bent if shape.message.bend else None)
         except TargetError:
             return  # the controller refuses it and reports it
+
+
+def _vector(message: Point | Vector3) -> np.ndarray:
+    return np.array([message.x, message.y, message.z])
+
+
+def _touches(message: VirtualForces) -> tuple[Touch, ...]:
+    return tuple(
+        Touch(source, _vector(place), _vector(force))
+        for source, place, force in zip(message.source, message.position, message.force)
+    )
+
+
+def _wall(message: VirtualForces) -> tuple[np.ndarray, np.ndarray] | None:
+    return (_vector(message.wall_point), _vector(message.wall_normal)) if message.has_wall else None
 
 
 def _status_text(status: ControllerStatus) -> str:

@@ -37,7 +37,7 @@ class Notify(Protocol):
 class RequestSender:
     """Sends requests; reports answers and failures with `notify`.
 
-    Attributes: shape_target, base, fault (publishers), services (clients by name), recorder (its process, or None).
+    Attributes: shape_target, base, fault, hand, wall (publishers), services (clients by name), recorder (its process, or None).
     """
 
     def __init__(
@@ -50,6 +50,8 @@ class RequestSender:
         self.base = node.create_publisher(QuaternionStamped, "virtual/base_orientation", COMMAND)
         faults = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, depth=20)
         self.fault = node.create_publisher(String, "virtual/fault", faults)
+        self.hand = node.create_publisher(String, "virtual/hand", COMMAND)
+        self.wall = node.create_publisher(String, "virtual/wall", COMMAND)
         self._bridge = bridge
         kinds = {**_SERVICES, **{f"{bridge}/{name}": Trigger for name in _BRIDGE_SERVICES}}
         self.services = {name: node.create_client(kind, name) for name, kind in kinds.items()}
@@ -58,7 +60,7 @@ class RequestSender:
 
     def destroy(self) -> None:
         """Destroy publishers and clients."""
-        for publisher in (self.shape_target, self.base, self.fault):
+        for publisher in (self.shape_target, self.base, self.fault, self.hand, self.wall):
             self._node.destroy_publisher(publisher)
         for client in self.services.values():
             self._node.destroy_client(client)
@@ -74,6 +76,13 @@ class RequestSender:
                 self._tilt(inclination, roll)
             case requests.InjectFault(text):
                 self.fault.publish(String(data=text))
+            case requests.Push(place):
+                self.hand.publish(String(data="release" if place is None else f"{{place_mm: {_in_mm(place)}}}"))
+            case requests.PlaceWall(None):
+                self.wall.publish(String(data="clear"))
+            case requests.PlaceWall((point, normal)):
+                wall = f"{{name: unknown wall, point_mm: {_in_mm(point)}, normal: {[float(f'{n:.6f}') for n in normal]}}}"
+                self.wall.publish(String(data=wall))
             case requests.Compensate("relax"):
                 self._call("inverse_controller/relax", Trigger.Request())
             case requests.Compensate(mode):
@@ -127,3 +136,7 @@ class RequestSender:
 
     def _show_answer(self, name: str, answer: Any) -> None:
         self.notify(name, answer.message or "done", good=answer.success)
+
+
+def _in_mm(place: requests.Triple) -> list[float]:
+    return [round(1e3 * x, 4) for x in place]

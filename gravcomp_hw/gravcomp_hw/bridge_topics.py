@@ -70,19 +70,21 @@ class ImuTopics:
     """The topics imu/data_raw and imu/temperature of a node; `frame`: of the IMU."""
 
     def __init__(self, node: LifecycleNode, frame: str):
-        self._node, self._frame, self._count = node, frame, 0
+        self._node, self._count = node, 0
         self._imu = node.create_publisher(Imu, "imu/data_raw", SENSOR)
         self._temperature = node.create_publisher(Temperature, "imu/temperature", SENSOR)
+        # One message for all samples, because making it takes longer than to publish it: it is serialised before the next one.
+        self._message = Imu()
+        self._message.header.frame_id = frame
+        self._message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
 
     def publish(self, sample: ImuSample) -> None:
         """Publish a sample, and with one in ten the temperature."""
-        message = Imu()
+        message = self._message
         message.header.stamp = to_time(round(1e9 * sample.stamp))
-        message.header.frame_id = self._frame
         a, w = message.linear_acceleration, message.angular_velocity
         a.x, a.y, a.z = sample.specific_force
         w.x, w.y, w.z = sample.angular_rate
-        message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
         self._imu.publish(message)
         if self._count % _TEMPERATURE_EVERY == 0:
             self._temperature.publish(Temperature(header=message.header, temperature=float(sample.temperature)))

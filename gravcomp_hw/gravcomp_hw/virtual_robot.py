@@ -6,10 +6,12 @@ subscribes to truth/*.
 
 import dataclasses
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import yaml
-from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3Stamped
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
 from rclpy.duration import Duration
@@ -31,6 +33,7 @@ from gravcomp.virtual.realtime import RealtimeRobot
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.tracker import VirtualTracker
 from gravcomp.virtual.truth import Truth
+from gravcomp_msgs.msg import VirtualForces
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 # Several faults may arrive in a row, and none must be lost.
@@ -60,6 +63,7 @@ class VirtualRobotNode(ManagedNode):
         self._publisher_tip = self.create_publisher(PoseStamped, "truth/tip", SENSOR)
         self._publisher_backbone = self.create_publisher(PoseArray, "truth/backbone", SENSOR)
         self._publisher_gravity = self.create_publisher(Vector3Stamped, "truth/gravity", SENSOR)
+        self._publisher_forces = self.create_publisher(VirtualForces, "truth/forces", SENSOR)
         self._tracker, self._publisher_measured = None, None
         if self.parameters.tracker.rate > 0.0:
             self._tracker = VirtualTracker(self.parameters.tracker, virtual.robot.length, virtual.seed)
@@ -81,13 +85,18 @@ class VirtualRobotNode(ManagedNode):
             self._live.start()
         except BusError as error:
             raise ConfigError(str(error)) from error
-        self._fault_orders = self.create_subscription(String, "virtual/fault", self._inject, _FAULTS)
+        self._orders = [
+            self.create_subscription(String, "virtual/fault", self._inject, _FAULTS),
+            self.create_subscription(String, "virtual/hand", self._hold, COMMAND),
+            self.create_subscription(String, "virtual/wall", self._place_wall, COMMAND),
+        ]
         self._watch = self.create_timer(0.5, self._report)
 
     def deactivate(self) -> None:
         """Stop the robot's thread and leave the bus."""
         self.destroy_timer(self._watch)
-        self.destroy_subscription(self._fault_orders)
+        for subscription in self._orders:
+            self.destroy_subscription(subscription)
         self._live.stop()
         if self._base is not None:
             self._base.destroy()
@@ -95,7 +104,8 @@ class VirtualRobotNode(ManagedNode):
 
     def cleanup(self) -> None:
         """Destroy the publishers."""
-        for name in ("_publisher_tip", "_publisher_backbone", "_publisher_gravity", "_publisher_measured", "_publisher_tension"):
+        for name in ("tip", "backbone", "gravity", "forces", "measured", "tension"):
+            name = f"_publisher_{name}"
             if getattr(self, name, None) is not None:
                 self.destroy_publisher(getattr(self, name))
                 delattr(self, name)
@@ -113,6 +123,8 @@ class VirtualRobotNode(ManagedNode):
         if self._publisher_backbone.get_subscription_count():
             poses = [_pose(p, q) for p, q in zip(truth.backbone_position, truth.backbone_orientation)]
             messages.append((self._publisher_backbone, PoseArray(poses=poses)))
+        if self._publisher_forces.get_subscription_count():
+            messages.append((self._publisher_forces, _forces(truth)))
         if self._tracker is not None:
             for measured in self._tracker.observe(truth):
                 message = PoseStamped(pose=_pose(measured.position, measured.orientation))
@@ -156,6 +168,24 @@ class VirtualRobotNode(ManagedNode):
             return
         self.get_logger().info(f"fault: {message.data}")
 
+    def _hold(self, message: String) -> None:
+        """`{place_mm: [10, 0, 95]}` pulls the tip there by a spring, `release` lets go."""
+        self._obey(message, "virtual/hand", lambda order, source: self._live.robot.bystander.order_hand(
+            order, source, self._live.robot.time))  # fmt: skip
+
+    def _place_wall(self, message: String) -> None:
+        """A plane in the keys of `scene.planes` puts the wall there, `clear` takes it away."""
+        self._obey(message, "virtual/wall", self._live.robot.bystander.order_wall)
+
+    def _obey(self, message: String, topic: str, order: Callable[[Any, str], None]) -> None:
+        """Carry out an order in YAML; an order that is refused is named in the log and changes nothing."""
+        try:
+            wanted = yaml.safe_load(message.data)
+            with self._live.lock:
+                order(wanted, topic)
+        except (ConfigError, yaml.YAMLError) as error:
+            self.get_logger().error(str(error))
+
     def _report(self) -> None:
         live = self._live
         if live.error is not None:
@@ -182,6 +212,23 @@ def _pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
     x, y, z = position.tolist()
     qx, qy, qz, qw = orientation.tolist()
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def _forces(truth: Truth) -> VirtualForces:
+    """Return the message of the forces that act from outside."""
+    message = VirtualForces(source=list(truth.contact_obstacle), has_wall=truth.wall is not None)
+    places, forces = list(truth.contact_place), list(truth.contact_force)
+    if truth.hand_force.any():
+        message.source.append("hand")
+        places.append(truth.tip_position)
+        forces.append(truth.hand_force)
+    message.position = [Point(x=x, y=y, z=z) for x, y, z in map(np.ndarray.tolist, places)]
+    message.force = [Vector3(x=x, y=y, z=z) for x, y, z in map(np.ndarray.tolist, forces)]
+    if truth.wall is not None:
+        point, normal = message.wall_point, message.wall_normal
+        point.x, point.y, point.z = truth.wall[0].tolist()
+        normal.x, normal.y, normal.z = truth.wall[1].tolist()
+    return message
 
 
 def main() -> int:

@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 
 from gravcomp.config import ConfigError
+from gravcomp_msgs.msg import VirtualForces
 from gravcomp_node import COMMAND, SENSOR
 
 
@@ -101,6 +102,49 @@ def test_faults_begin_and_end_and_wrong_ones_are_refused():
             publisher.publish(String(data=bad))
         publisher.publish(String(data="clear"))
         graph.until(lambda: robot.faults == (), "the faults do not end")
+
+
+def test_a_hand_pulls_the_tip_until_it_lets_go_or_is_not_heard_of():
+    with Graph() as graph:
+        graph.start()
+        graph.listener.create_subscription(VirtualForces, "truth/forces", lambda m: graph.received.update(forces=m), SENSOR)
+        hand = graph.listener.create_publisher(String, "virtual/hand", COMMAND)
+        graph.until(lambda: hand.get_subscription_count() == 1 and "truth/tip" in graph.received, "no virtual/hand")
+        rest = height(graph)
+
+        def pulled():
+            hand.publish(String(data="{place_mm: [30, 0, 95]}"))
+            return height(graph) > rest + 0.005 and "hand" in graph.received["forces"].source
+
+        graph.until(pulled, "the hand does not pull")
+        for bad in ("{place_mm: [1, 2]}", "{place_mm: [.nan, 0, 0]}", "[", "7"):
+            hand.publish(String(data=bad))
+        graph.until(pulled, "a wrong order has ended the pull")
+        hand.publish(String(data="release"))
+        graph.until(lambda: "hand" not in graph.received["forces"].source, "the hand does not let go")
+        graph.until(lambda: height(graph) < rest + 0.001, "the tip does not come back")
+        graph.until(pulled, "the hand does not pull again")
+        graph.until(lambda: "hand" not in graph.received["forces"].source, "a hand that is not heard of does not let go")
+
+
+def test_a_wall_can_be_put_next_to_the_robot_and_taken_away():
+    with Graph() as graph:
+        graph.start()
+        graph.listener.create_subscription(VirtualForces, "truth/forces", lambda m: graph.received.update(forces=m), SENSOR)
+        wall = graph.listener.create_publisher(String, "virtual/wall", COMMAND)
+        graph.until(lambda: wall.get_subscription_count() == 1 and "forces" in graph.received, "no virtual/wall")
+        below = 1e3 * height(graph) + 1.0  # the robot's radius is 4.5 mm
+        wall.publish(String(data=f"{{name: slab, normal: [1, 0, 0], point_mm: [{below}, 0, 0]}}"))
+        graph.until(lambda: graph.received["forces"].source[:1] == ["slab"], "the wall does not push")
+        message = graph.received["forces"]
+        assert message.has_wall and message.wall_normal.x == 1.0 and message.force[0].x > 0.0
+        wall.publish(String(data="{normal: [1, 0, 0], point_mm: [0, 0, 0]}"))  # through the base: refused
+        wall.publish(String(data="clear"))
+        graph.until(lambda: not graph.received["forces"].has_wall and not graph.received["forces"].source, "the wall stays")
+
+
+def height(graph):
+    return graph.received["truth/tip"].pose.position.x
 
 
 @pytest.mark.parametrize(

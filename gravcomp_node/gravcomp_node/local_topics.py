@@ -5,13 +5,16 @@ process and their quality of service fits its own; nothing is serialised for it 
 subscription receives everything from the middleware, until that publisher has gone (`follow`). The middleware gets a message when
 somebody receives from it. Publishers and subscriptions stay visible to other processes in either case.
 
+A publisher may also publish an `Adapted` value (type adaptation as in REP-2007): a subscription of the process that takes values
+gets it as it is. The message is made only when somebody else receives it.
+
 Who publishes a message leaves it to its receivers, and does not change it afterwards. A receiver's callback is called while the
 publisher publishes; where the receiver's node is itself publishing, its message waits until the executor comes to it.
 """
 
 import collections
-import contextlib
 import dataclasses
+import functools
 import time
 from collections.abc import Callable
 from typing import Any
@@ -25,11 +28,24 @@ FOLLOW_PERIOD = 0.5
 """s between two looks for publishers in other processes."""
 
 
+class Adapted:
+    """A value to publish, and `to_message`, which makes the message from it."""
+
+    def __init__(self, value: Any, to_message: Callable[[Any], Any]):
+        self.value, self._to_message = value, to_message
+
+    @functools.cached_property
+    def message(self) -> Any:
+        """The message, made when it is first asked for."""
+        return self._to_message(self.value)
+
+
 @dataclasses.dataclass
 class _Receiver:
     node: Node
     subscription: Subscription
     callback: Callable[[Any], None] | None  # None: it is polled
+    takes: Callable[[Any], None] | None  # its callback for values
     is_local: bool = False
     kept: collections.deque = dataclasses.field(default_factory=collections.deque)  # of a polled one: message, ns, number
 
@@ -47,21 +63,29 @@ class LocalTopics:
         self.wake: Callable[[], None] = lambda: None
         self._publishers: dict[str, list[LocalPublisher]] = collections.defaultdict(list)
         self._receivers: dict[str, list[_Receiver]] = collections.defaultdict(list)
-        self._waiting: collections.deque[tuple[_Receiver, Any]] = collections.deque()
+        self._of: dict[int, _Receiver] = {}  # by the id of the subscription; rclpy asks the middleware for the name of its topic
+        self._waiting: collections.deque[tuple[_Receiver, Callable[[Any], None], Any]] = collections.deque()
         self._publishing: list[Node] = []  # nodes that publish now, each one in a callback that the one before it called
         self._followed = 0.0
 
     def add_publisher(self, node: Node, publisher: "LocalPublisher") -> None:
         """Take a publisher of a node of this process."""
-        publisher.local, publisher.node = self, node
+        publisher.local, publisher.node, publisher.receivers = self, node, self._receivers[publisher.topic_name]
         self._publishers[publisher.topic_name].append(publisher)
         self._decide(publisher.topic_name)
 
-    def add_subscription(self, node: Node, subscription: Subscription, callback: Callable[[Any], None] | None) -> None:
-        """Take a subscription of a node of this process; callback: None for a polled one."""
+    def add_subscription(
+        self,
+        node: Node,
+        subscription: Subscription,
+        callback: Callable[[Any], None] | None,
+        takes: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Take a subscription of a node of this process; callback: None for a polled one; takes: its callback for values."""
         depth = subscription.qos_profile.depth if subscription.qos_profile.history == HistoryPolicy.KEEP_LAST else None
-        receiver = _Receiver(node, subscription, callback, kept=collections.deque(maxlen=depth))
+        receiver = _Receiver(node, subscription, callback, takes, kept=collections.deque(maxlen=depth))
         self._receivers[subscription.topic_name].append(receiver)
+        self._of[id(subscription)] = receiver
         self._decide(subscription.topic_name)
 
     def remove(self, entity: Publisher | Subscription) -> None:
@@ -70,40 +94,39 @@ class LocalTopics:
             publishers[:] = [publisher for publisher in publishers if publisher is not entity]
         for receivers in self._receivers.values():
             receivers[:] = [receiver for receiver in receivers if receiver.subscription is not entity]
-        self._waiting = collections.deque(pair for pair in self._waiting if pair[0].subscription is not entity)
+        self._of.pop(id(entity), None)
+        self._waiting = collections.deque(call for call in self._waiting if call[0].subscription is not entity)
 
     def is_local(self, subscription: Subscription) -> bool:
         """Whether a subscription receives locally now."""
-        receiver = self._receiver(subscription)
+        receiver = self._of.get(id(subscription))
         return receiver is not None and receiver.is_local
 
     def kept(self, subscription: Subscription) -> list[tuple[Any, int, int]]:
         """Return the messages that a polled subscription has received locally since the last call: message, ns, number."""
-        receiver = self._receiver(subscription)
+        receiver = self._of.get(id(subscription))
         if receiver is None:
             return []
         taken = list(receiver.kept)
         receiver.kept.clear()
         return taken
 
-    def receivers(self, topic: str) -> int:
-        """Return the number of subscriptions that receive a topic locally."""
-        return sum(receiver.is_local for receiver in self._receivers.get(topic, ()))
-
-    def deliver(self, publisher: "LocalPublisher", message: Any) -> None:
-        """Hand a message to the local receivers of its topic."""
-        receivers = [receiver for receiver in self._receivers.get(publisher.topic_name, ()) if receiver.is_local]
-        if not receivers:
-            return
+    def deliver(self, publisher: "LocalPublisher", message: Any, receivers: list[_Receiver]) -> None:
+        """Hand a message or an `Adapted` value of a publisher to local receivers of its topic."""
         self._publishing.append(publisher.node)
         try:
             for receiver in receivers:
                 if receiver.callback is None:
-                    receiver.kept.append((message, time.time_ns(), publisher.count))
-                elif self.spins and receiver.node not in self._publishing:
-                    receiver.callback(message)
+                    receiver.kept.append((message_of(message), time.time_ns(), publisher.count))
+                    continue
+                if receiver.takes is not None and isinstance(message, Adapted):
+                    callback, taken = receiver.takes, message.value
                 else:
-                    self._waiting.append((receiver, message))
+                    callback, taken = receiver.callback, message_of(message)
+                if self.spins and receiver.node not in self._publishing:
+                    callback(taken)
+                else:
+                    self._waiting.append((receiver, callback, taken))
                     self.wake()
         finally:
             self._publishing.pop()
@@ -115,10 +138,11 @@ class LocalTopics:
 
     def call_next(self) -> None:
         """Call the callback of the oldest message that waits, if there is one."""
-        with contextlib.suppress(IndexError):
-            receiver, message = self._waiting.popleft()
-            assert receiver.callback is not None
-            receiver.callback(message)
+        try:
+            _, callback, taken = self._waiting.popleft()
+        except IndexError:
+            return
+        callback(taken)
 
     def follow(self) -> None:
         """Look for publishers in other processes, every FOLLOW_PERIOD."""
@@ -128,10 +152,6 @@ class LocalTopics:
         self._followed = now
         for topic in self._receivers:
             self._decide(topic)
-
-    def _receiver(self, subscription: Subscription) -> _Receiver | None:
-        receivers = self._receivers.get(subscription.topic_name, ())
-        return next((receiver for receiver in receivers if receiver.subscription is subscription), None)
 
     def _decide(self, topic: str) -> None:
         own = self._publishers.get(topic, [])
@@ -148,6 +168,11 @@ class LocalTopics:
             self.changed()
 
 
+def message_of(message: Any) -> Any:
+    """Return the message that an `Adapted` value becomes; a message is returned as it is."""
+    return message.message if isinstance(message, Adapted) else message
+
+
 def _fits(publisher: Publisher, subscription: Subscription) -> bool:
     offered, wanted = publisher.qos_profile, subscription.qos_profile
     compatible, _ = qos_check_compatible(offered, wanted)
@@ -159,16 +184,19 @@ class LocalPublisher(Publisher):
 
     local: LocalTopics | None = None
     node: Node
+    receivers: list[_Receiver]
     count = 0
 
     def publish(self, message: Any) -> None:
-        """Publish a message."""
+        """Publish a message, or an `Adapted` value."""
         if self.local is None:
-            super().publish(message)
+            super().publish(message_of(message))
             return
         self.count += 1
         # First to the middleware: the receivers here may take a while.
         latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL  # kept for those who subscribe later
-        if latched or self.get_subscription_count() > self.local.receivers(self.topic_name):
-            super().publish(message)
-        self.local.deliver(self, message)
+        receivers = [receiver for receiver in self.receivers if receiver.is_local]
+        if latched or self.get_subscription_count() > len(receivers):
+            super().publish(message_of(message))
+        if receivers:
+            self.local.deliver(self, message, receivers)

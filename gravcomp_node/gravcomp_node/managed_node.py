@@ -17,7 +17,7 @@ from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverriding
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-from gravcomp.config import ConfigError
+from gravcomp.config import ConfigError, declared_parameters
 from gravcomp.description import load_robot_file
 from gravcomp.graph.parameters.shared import SharedParameters
 from gravcomp_node import ros_parameters
@@ -54,6 +54,7 @@ class ManagedNode(LifecycleNode):
         self.parameters = ros_parameters.declare(
             self, self.parameters_class, section, f"{self.robot_file.source}: nodes.{self.name}"
         )
+        self._own_keys = {leaf.key for leaf in declared_parameters(self.parameters_class)}
         ros_parameters.refuse_unknown_overrides(self, (SharedParameters, self.parameters_class))
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._apply_change)
@@ -87,13 +88,17 @@ class ManagedNode(LifecycleNode):
         """Set the level, message and values that /diagnostics publishes from now on."""
         self._level, self._sentence, self._values = level, sentence, values
 
-    def start(self) -> None:
-        """Configure and activate if `autostart` is set. Raises ConfigError when the node refuses a transition."""
+    def start(self, may_activate: Callable[[], bool] = lambda: True) -> None:
+        """Configure and, if then `may_activate()`, activate; not without `autostart`.
+
+        Raises ConfigError when the node refuses a transition.
+        """
         if not self.autostart:
             return
-        for transition in (self.trigger_configure, self.trigger_activate):
-            if transition() != TransitionCallbackReturn.SUCCESS:
-                raise ConfigError(self.failure or "could not be started")
+        if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+            raise ConfigError(self.failure or "could not be started")
+        if may_activate() and self.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+            raise ConfigError(self.failure or "could not be started")
 
     def shut_down(self) -> None:
         """Deactivate and clean up from any state. Logs exceptions instead of raising them."""
@@ -119,15 +124,25 @@ class ManagedNode(LifecycleNode):
         return publisher
 
     def create_subscription(
-        self, msg_type: type, topic: str, callback: Callable, qos_profile: QoSProfile | int, **options: Any
+        self,
+        msg_type: type,
+        topic: str,
+        callback: Callable,
+        qos_profile: QoSProfile | int,
+        *,
+        takes: Callable | None = None,
+        **options: Any,
     ) -> Subscription:
-        """Create a subscription, as rclpy does. Raises ConfigError for an override that is not allowed."""
+        """Create a subscription, as rclpy does. Raises ConfigError for an override that is not allowed.
+
+        takes: callback for the values that nodes of this process publish (gravcomp_node.local_topics.Adapted).
+        """
         if not self._is_made:
             return super().create_subscription(msg_type, topic, callback, qos_profile, **options)
         subscription = self._create(super().create_subscription, msg_type, topic, callback, qos_profile, **options)
         if self.local is not None and not subscription.raw:
             polled = isinstance(subscription.callback_group, NeverExecuted)
-            self.local.add_subscription(self, subscription, None if polled else callback)
+            self.local.add_subscription(self, subscription, None if polled else callback, takes)
         return subscription
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
@@ -234,6 +249,8 @@ class ManagedNode(LifecycleNode):
         return section
 
     def _check_change(self, changes: list) -> SetParametersResult:
+        if not self._are_own(changes):
+            return SetParametersResult(successful=True)
         try:
             self.check_parameters(ros_parameters.read(self, self.parameters_class, changes))
         except ConfigError as error:
@@ -241,9 +258,15 @@ class ManagedNode(LifecycleNode):
         return SetParametersResult(successful=True)
 
     def _apply_change(self, changes: list) -> None:
+        if not self._are_own(changes):
+            return
         old, self.parameters = self.parameters, ros_parameters.read(self, self.parameters_class)
         if old != self.parameters:
             self.parameters_changed(old, self.parameters)
+
+    def _are_own(self, changes: list) -> bool:
+        """Return whether there are declared parameters among the changes: each override of a quality of service is one, too."""
+        return any(change.name in self._own_keys for change in changes)
 
     def _publish_diagnostics(self) -> None:
         status = DiagnosticStatus(

@@ -4,17 +4,19 @@ import gc
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from gravcomp.config import ConfigError
-from gravcomp.launcher.node_process import ACTIVE_FILE
+from gravcomp.launcher.node_process import ACTIVE_FILE, GATE_FILE
 from gravcomp_node.executor import StreamExecutor
 from gravcomp_node.local_topics import LocalTopics
 from gravcomp_node.managed_node import ManagedNode
 
+_POLL = 0.01  # s
 USAGE = """{name}: a node of gravcomp. {purpose}
 
 usage: ros2 run PACKAGE {name} [--ros-args -p NAME:=VALUE ... -r OLD:=NEW ... -r __ns:=NAMESPACE]
@@ -45,7 +47,7 @@ def run(*node_classes: type[ManagedNode], argv: list[str] | None = None) -> int:
         for node_class in node_classes:
             name = node_class.name
             nodes.append(node_class(local))
-            nodes[-1].start()
+            nodes[-1].start(lambda: _wait_for_gate(stop))
         note = os.environ.get(ACTIVE_FILE)
         if note and all(node.autostart for node in nodes):
             Path(note).touch()
@@ -64,6 +66,14 @@ def run(*node_classes: type[ManagedNode], argv: list[str] | None = None) -> int:
         rclpy.try_shutdown()
         gc.unfreeze()  # the objects frozen by ManagedNode end with the node
     return 0
+
+
+def _wait_for_gate(stop: list) -> bool:
+    """Wait until the launcher lets the nodes become active, where it wants that. Return False after a signal."""
+    gate = os.environ.get(GATE_FILE)
+    while gate and not stop and not os.path.exists(gate):
+        time.sleep(_POLL)
+    return not stop
 
 
 def _help(node_class: type[ManagedNode]) -> str:

@@ -112,6 +112,41 @@ def test_a_fast_arm_does_not_tilt_the_estimate():
     assert worst[True] < 0.2 < 0.4 < worst[False]
 
 
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_published_arm_that_moves_at_2_m_s2_tilts_the_estimate_by_less_than_half_a_degree(arm):
+    """All joints swing, with joint states at 500 Hz, noise of encoders and IMU, and a bias of the gyroscope."""
+    chain, place, random = Chain(urdf_of(arm), ARMS[arm][3]), np.array([0.0, 0.0, 0.05]), np.random.default_rng(1)
+    count = len(chain.moving)
+    step, rest = 0.002, 2.0  # s
+    time = np.arange(0.0, 4.0, step)
+    begin = np.clip((time - rest) / 0.5, 0.0, 1.0)[:, None]
+    frequencies, amplitudes, middle = random.uniform(0.4, 1.0, count), random.normal(size=count), random.uniform(-1.5, 1.5, count)
+    swing = begin**2 * (3.0 - 2.0 * begin) * np.sin(2.0 * math.pi * frequencies * (time - rest)[:, None]) * amplitudes
+    scale = 0.1
+    for _ in range(3):  # until the fastest moment has 2 m/s^2
+        poses = np.array([chain.pose(dict(zip(chain.moving, q))) for q in middle + scale * swing])
+        turns, positions = poses[:, :3, :3], poses[:, :3, 3] + poses[:, :3, :3] @ place
+        accel = np.gradient(np.gradient(positions, step, axis=0), step, axis=0)
+        largest = np.linalg.norm(accel, axis=1).max()
+        scale *= 2.0 / largest
+    assert largest == pytest.approx(2.0, rel=0.02)
+    rates = np.zeros((len(time), 3))
+    rates[1:] = Rotation.from_matrix(np.swapaxes(turns[:-1], 1, 2) @ turns[1:]).as_rotvec() / step
+    estimator, point, known, angles = GravityEstimator(EstimatorOptions()), CarriedPoint(chain, place), np.zeros(3), []
+    for i, (turn, moment) in enumerate(zip(turns, time)):
+        joints = middle + scale * swing[i] + 1e-5 * random.standard_normal(count)
+        found = point.take(moment, dict(zip(chain.moving, joints)))
+        known = known if found is None else found
+        if i % 5 == 0:
+            force = turn.T @ (accel[i] + [0.0, 0.0, STANDARD_GRAVITY]) + 0.02 * random.standard_normal(3)
+            turning = rates[max(0, i - 4) : i + 1].mean(axis=0)
+            rate_measured = turning + [0.003, -0.002, 0.001] + 0.002 * random.standard_normal(3)
+            estimate = estimator.update(1 + round(1e9 * moment), rate_measured, force, known)
+            if not isinstance(estimate, Problem) and moment > rest:
+                angles.append(math.degrees(angle_between(np.array(estimate.gravity), gravity_in(turn))))
+    assert max(angles) < 0.5
+
+
 # TF.
 
 UP = np.eye(3)

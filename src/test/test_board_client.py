@@ -1,5 +1,6 @@
 """The bench test of a board and its parameters over a bus: a board of C code behind python-can's virtual bus, in real time."""
 
+import html
 import threading
 import time
 
@@ -7,10 +8,14 @@ import can
 import numpy as np
 import pytest
 
+from gravcomp.canbus import c610
+from gravcomp.canbus.codec import decode
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import CanInterface, parse_hardware
 from gravcomp.doctor import board as bench_test
+from gravcomp.doctor import board_motor
+from gravcomp.doctor.board_page import write_page
 from gravcomp.firmware import client as client_module
 from gravcomp.firmware.client import BoardClient
 from gravcomp.firmware.settings import settings_of, value_of
@@ -25,11 +30,36 @@ def patient(monkeypatch):
     monkeypatch.setattr(client_module, "_PATIENCE", 20.0)  # s: a busy machine answers late
 
 
+SLOW = 0.2
+"""Of real time, in which a board with motors runs: a busy machine is no dead host."""
+
+
+class FreeMotors:
+    """Motors behind a board that have the commanded current, and do not turn."""
+
+    def __init__(self, board, motors):
+        self.board, self.current = board, dict.fromkeys(motors, 0.0)
+
+    def run(self):
+        for frame in self.board.to_motors():
+            values = decode(frame)
+            self.current |= {
+                motor: i for motor, i in c610.currents_of(values.name, values.values).items() if motor in self.current
+            }
+        self.board.feedback([c610.feedback(motor, 1000, 0, current) for motor, current in self.current.items()])
+
+
 @pytest.fixture
 def live(request):
-    """A board on a bus of its own: the channel, and the board."""
+    """A board on a bus of its own: the channel, and the board. With the parameter "motors", it has those of the article."""
     channel, ending = request.node.name, threading.Event()
-    board = EmulatedBoard(Board(), np.random.default_rng(1))
+    hardware, motors, pace = None, None, 1.0
+    if getattr(request, "param", "") == "motors":
+        file = load_robot_file("article")
+        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    board = EmulatedBoard(Board(), np.random.default_rng(1), hardware)
+    if hardware is not None:
+        motors, pace = FreeMotors(board, [motor.can_id for motor in hardware.motors]), SLOW
 
     def serve():
         begin, samples = time.monotonic(), 0
@@ -40,7 +70,9 @@ def live(request):
                     if message is None:
                         break
                     board.receive(message)
-                now = time.monotonic() - begin
+                now = pace * (time.monotonic() - begin)
+                if motors is not None:
+                    motors.run()
                 if now >= 0.01 * (samples + 1):
                     samples += 1
                     frames = board.sample(np.zeros(3), UP, False)
@@ -67,6 +99,22 @@ def test_the_bench_test_finds_a_good_board_good_and_says_what_is_wrong_with_a_ba
     board.chip.imu_fault = "silent"
     found = {finding.subject: finding for finding in bench_test.examine("virtual", channel, 0.3)}
     assert found["samples"].level == "missing" and "the IMU does not answer" in found["state"].found
+
+
+@pytest.mark.parametrize("live", ["motors"], indirect=True)
+def test_a_current_step_is_measured_and_the_current_ends_when_the_host_does(live, tmp_path, monkeypatch):
+    channel, _ = live
+    monkeypatch.setattr(board_motor, "_DEAD", 1.5)
+    with BoardClient(CanInterface("virtual", channel)) as client:
+        found = {finding.subject: finding for finding in board_motor.examine(client, 2, 0.3)}
+        assert found["current step"].found.startswith("0.300 A for 0.300 A (the board's limit:")
+        assert "current until" in found["dead host"].found and "until 0 ms" not in found["dead host"].found
+        assert board_motor.examine(client, 8, 0.3)[0].level == "missing"  # the robot has six
+        with pytest.raises(ConfigError, match=r"--current is 3; allowed: 0\.05 to 1 A"):
+            board_motor.examine(client, 2, 3.0)
+    page = write_page(list(found.values()), "virtual", channel, tmp_path)
+    text = page.read_text()
+    assert "gravcomp doctor --board" in text and "is unhooked" in text and html.escape(found["current step"].found) in text
 
 
 def test_the_parameters_of_a_robot_are_written_and_stored(live, monkeypatch):

@@ -15,7 +15,7 @@ from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import parse_hardware
 from gravcomp.trials.free_fall import free_fall
-from gravcomp.trials.known_robot import DAMPING_TIME, known_setup, known_windows
+from gravcomp.trials.known_robot import known_setup, known_windows
 
 MODULUS = 0.6e6  # Pa
 LOOSE = -0.03  # m
@@ -88,7 +88,7 @@ def calibrate(capsys, *arguments: str) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
-def check(result: dict) -> None:
+def check(result: dict, setup: Setup) -> None:
     """Check that the known robot is found, that the page shows it, and that the YAML is a robot."""
     found = {p["name"]: p for p in result["data"]["parameters"]}
     moduli = [found[f"Young's modulus of {name}"] for name in ("proximal", "distal")]
@@ -96,7 +96,7 @@ def check(result: dict) -> None:
         assert modulus["value"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
         assert 0.0 < modulus["interval"] < 0.05 * modulus["value"]
     damping, interval = result["data"]["damping_time_ms"]
-    assert damping == pytest.approx(1e3 * DAMPING_TIME, rel=0.05)
+    assert damping == pytest.approx(1e3 * setup.truth.body.damping_time, rel=0.05)
     assert 0.0 < interval < 0.2 * damping
     figures = {f["name"]: f["value"] for f in result["figures"]}
     assert figures["tip error at rest after, RMS"] < 0.1 * figures["tip error at rest before, RMS"]
@@ -112,10 +112,10 @@ def check(result: dict) -> None:
     assert mine.robot.segments[1].material.damping_time == pytest.approx(damping * 1e-3, rel=1e-3)
 
 
-def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured):
+def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured, setup):
     write_csv(measured, here / "tips.csv", load_robot_file("article").robot.cable_names)
     result = calibrate(capsys, "tips.csv")
-    check(result)
+    check(result, setup)
     motors = parse_hardware(load_robot_file("mine.yaml").section("hardware"), source="mine.yaml").motors
     offsets = {f"offset of {m.cable}": 1e3 * m.offset for m in motors}
     found = {p["name"]: p["value"] for p in result["data"]["parameters"] if p["name"] in offsets}

@@ -15,6 +15,7 @@ from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of, make_plan
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
+from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.trials.coverage import RARE, counted, coverage
 
@@ -50,6 +51,17 @@ def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, pl
     assert {name for pose in plan.poses for name in pose.pulled} == set(robot.cable_names)
     for station in {pose.station for pose in plan.poses}:
         assert any(not pose.pulled for pose in plan.poses if pose.station == station)
+
+
+def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
+    """A turn that takes longer than all poses may; a robot that its cables hold, but that has no equilibrium without them."""
+    orientations = planning.ORIENTATIONS[:1]
+    slow = PlanOptions(budget=10.0, rate=np.radians(1.0))
+    with pytest.raises(ConfigError, match=r"robot 'short': no pose of \d+ s fits into 10 s; allow more time \(--time\)"):
+        make_plan(robot, PERIOD, options=slow, orientations=orientations)
+    heavy = dataclasses.replace(robot, payload=dataclasses.replace(robot.payload, mass=20.0))
+    with pytest.raises(ConfigError, match=r"in none of 1 orientations .* no calibration can be planned"):
+        make_plan(heavy, PERIOD, orientations=orientations)
 
 
 def test_a_plan_is_read_as_it_was_saved(plan, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Elements, Material, PronyTerm, load_robot_file
+from gravcomp.full_model.creep import Creep
 from gravcomp.full_model.viscosity import Viscosity
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 from gravcomp.mesh import tube_mesh
@@ -127,3 +128,19 @@ def test_a_nearly_incompressible_material_is_damped_as_a_less_incompressible_one
         shear = 1.0 / (2.0 * (1.0 + ratio))  # over Young's modulus
         forces.append(np.abs(force[model.mesh.tip, 2].sum()) / shear)
     assert forces[1] == pytest.approx(forces[0], rel=1e-6)
+
+
+def test_the_predicted_tangent_of_a_step_that_is_over_is_the_exact_one():
+    """Also with what creep holds: without it Newton's method diverges on slender robots that creep."""
+    model = RobotModel(robot(prony=SERIES))
+    bent = np.array([0.1, 0.0, 0.0]) * (model.mesh.nodes[:, 2:] ** 2 / model.length)
+    creep = Creep(model)
+    creep.relax(-bent)
+    held = creep.step(0.5)
+    exact, predicted, without = (model.new_matrix() for _ in range(3))
+    model.elements.assemble(bent, exact, held)
+    model.elements.assemble(bent, predicted, held, origin=bent.copy())
+    model.elements.assemble(bent, without, ViscousStrain(held.factor, 0.0 * held.past))
+    scale = np.abs(exact.values).max()
+    assert np.abs(predicted.values - exact.values).max() < 1e-9 * scale
+    assert np.abs(without.values - exact.values).max() > 1e-4 * scale

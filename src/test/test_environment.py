@@ -6,6 +6,7 @@ import pytest
 
 from gravcomp.environment import installer, packages
 from gravcomp.environment.pip_settings import parse_pip_settings
+from gravcomp.environment.ready import SEARCH_PATHS, environment
 
 ROOT = Path(__file__).parents[2]
 
@@ -63,3 +64,17 @@ def test_only_equal_libraries_are_linked(tmp_path, same):
     packages._link_equal_files(tmp_path)
     assert one.samefile(other) == same
     assert other.read_bytes()[-1:] == (b"\0" if same else b"1")
+
+
+@pytest.mark.parametrize(("given", "kept"), [({}, ".workspace/bytecode"), ({"PYTHONPYCACHEPREFIX": "elsewhere"}, "elsewhere")])
+def test_who_wants_no_bytecode_next_to_the_sources_gets_it_elsewhere(monkeypatch, tmp_path, given, kept):
+    """Containers often forbid it, and then every process would compile all its modules."""
+    monkeypatch.delenv("PYTHONPYCACHEPREFIX", raising=False)
+    paths = dict.fromkeys(SEARCH_PATHS, "")
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    found = environment(tmp_path, paths)
+    assert "PYTHONDONTWRITEBYTECODE" not in found and found["PYTHONPYCACHEPREFIX"].endswith(kept)
+    monkeypatch.delenv("PYTHONDONTWRITEBYTECODE")
+    assert environment(tmp_path, paths).get("PYTHONPYCACHEPREFIX") == given.get("PYTHONPYCACHEPREFIX")

@@ -243,6 +243,20 @@ def test_a_bus_that_is_off_counts_as_a_dead_host_and_recovers(bench):
     assert b.currents(1)[-1][1] == 200 and not b.board.faults & fault("a bus is off")
 
 
+def test_a_bus_of_the_wrong_rate_is_a_bus_without_a_host_until_the_rates_agree(bench):
+    b = bench()
+    b.run(300, {1: 0.4})
+    dead = b.now
+    b.wrong_rate(True)
+    b.run(200, {1: 0.4})
+    assert b.board.faults & fault("a bus is off") and b.currents(1)[-1][1] == 0
+    assert next(time for time, current in b.currents(1, since=dead) if current == 0) - dead <= 100
+    assert not [frame for time, frame in b.host if time > dead + 1]
+    b.wrong_rate(False)
+    b.run(300, {1: 0.2})
+    assert b.currents(1)[-1][1] == 200 and not b.board.faults & fault("a bus is off") and b.last(0x310)
+
+
 def test_homing_on_the_board_fails_without_motors_and_stops_when_a_cable_never_gets_taut(bench):
     b = bench()
     b.run(10, feedback=False)

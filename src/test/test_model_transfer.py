@@ -33,7 +33,7 @@ def has_model(bench) -> bool:
     ("spoil", "reason"),
     [
         (lambda b: changed(b, 16, 0), "another robot"),
-        (lambda b: changed(b, 4, 2), "another version"),
+        (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: b[:-8], "cut off"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 32, 52), "more modes"),

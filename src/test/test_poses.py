@@ -11,7 +11,7 @@ from gravcomp.calibration.chain import Chain
 from gravcomp.calibration.mapping import Mapping, load_mapping
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.measured import MeasurementError
-from gravcomp.calibration.pose_fit import BASE, MODULUS, fit_poses, held_out
+from gravcomp.calibration.pose_fit import MODULUS, PosePriors, base_unknowns, fit_poses, held_out
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
@@ -80,7 +80,8 @@ def known_poses(offset: np.ndarray) -> Poses:
 def test_a_fit_finds_the_modulus_and_the_base_and_predicts_a_pose_it_has_not_seen():
     offset = np.array([2e-3, -1e-3, 0.0])
     poses = known_poses(offset)
-    fit = fit_poses(ROBOT, poses, (MODULUS, *BASE), noise=0.1e-3)
+    exact = PosePriors(noise_share=0.1e-3 / ROBOT.length)
+    fit = fit_poses(ROBOT, poses, (MODULUS, *base_unknowns(ROBOT, exact)), priors=exact)
     assert fit.parameters.youngs_modulus == pytest.approx(0.4e6, rel=0.01)
     assert fit.parameters.base_position == pytest.approx(offset, abs=0.1e-3)
     assert fit.rms < 0.05e-3 < fit.rms_before

@@ -105,7 +105,7 @@ def changed(blob: bytes, at: int, value: int) -> bytes:
         (lambda b: b[:40], "cut off"),
         (lambda b: b[:-8], "cut off"),
         (lambda b: b"GCMX" + b[4:], "no blob"),
-        (lambda b: changed(b, 4, 2), "another version"),
+        (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: changed(b, 32, 52), "more modes"),
         (lambda b: changed(b, 40, CABLES_MAX + 1), "more modes"),
         (lambda b: changed(b, 8, len(b) - 4), "size"),
@@ -128,9 +128,25 @@ def test_the_settings_have_the_length_that_the_firmware_reads(parameters):
     assert len(settings(parameters, 1.0, 1.0)) == model_blob.SETTINGS == library().gc_loop_settings()
 
 
-def test_a_robot_that_creeps_is_refused(parameters, built):
-    creeping = parameters.robot.with_material(prony=(PronyTerm(share=0.1, time=1.0),))
-    with pytest.raises(ConfigError, match="creeps"):
+def test_a_robot_that_creeps_does_so_on_the_board(parameters, built):
+    creeping = parameters.robot.with_material(prony=(PronyTerm(share=0.4, time=0.3), PronyTerm(share=0.2, time=3.0)))
+    own, model = dataclasses.replace(parameters, robot=creeping), RobotModel(creeping)
+    found, path = fit(model, built[1], own), turning_gravity(np.radians(90.0), 0, 0)[:STEPS]
+    host, still = run_on_host(model, own, path), run_on_host(built[0], parameters, path)
+    loop, apart = started(found.blob, path[0]), 0.0
+    for step, gravity in enumerate(path):
+        assert loop.follow(SAMPLE_PERIOD, gravity)
+        result = loop.read()
+        if step > 20:
+            apart = max(apart, float(np.abs(result.displacement - host.command[step]).max()))
+    memory = np.abs(host.command - still.command)[21:].max()
+    assert memory > 0.15e-3 and apart < 0.3 * memory
+
+
+def test_a_robot_whose_parts_creep_differently_or_by_too_many_terms_is_refused_with_the_number(parameters, built):
+    terms = tuple(PronyTerm(share=0.1, time=float(k)) for k in range(1, 6))
+    creeping = parameters.robot.with_material(prony=terms)
+    with pytest.raises(ConfigError, match="has 5 terms in prony; the firmware has room for 4"):
         fit(RobotModel(creeping), built[1], dataclasses.replace(parameters, robot=creeping))
 
 

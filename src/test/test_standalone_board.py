@@ -1,5 +1,6 @@
 """The loop on the board in a whole board: the same frames from the C code and the image, interrupts in the middle of a step."""
 
+import pytest
 from board_bench import Bench, blob_of
 
 from gravcomp.firmware import requests
@@ -11,9 +12,9 @@ MOTORS = range(1, 7)
 SETTINGS = {"wiring": 1, "motors": 0b111111, "current_limit": 1000, "travel_per_count": 1e-6}
 
 
-def running(kind, preempted_in="") -> Bench:
+def running(kind, preempted_in="", **material) -> Bench:
     """A board whose loop has run for 0.2 s, from a host that drove."""
-    bench = Bench(kind(SETTINGS, model=blob_of()), MOTORS)
+    bench = Bench(kind(SETTINGS, model=blob_of(**material)), MOTORS)
     bench.run(220, {1: 0.1})
     for motor in MOTORS:
         assert bench.ask(requests.request("zero", motor - 1)).done
@@ -27,8 +28,9 @@ def running(kind, preempted_in="") -> Bench:
     return bench
 
 
-def test_host_and_image_send_the_same_frames_while_the_loop_runs():
-    benches = [running(kind) for kind in (HostBoard, ImageBoard)]
+@pytest.mark.parametrize("material", [{}, {"law_points": 6, "branches": 2}], ids=["svk", "rubber that creeps"])
+def test_host_and_image_send_the_same_frames_while_the_loop_runs(material):
+    benches = [running(kind, **material) for kind in (HostBoard, ImageBoard)]
     for bench in benches:
         assert bench.last(0x315).data[1] == STATES.index("standalone") and any(current for _, current in bench.currents(2))
     for sent in (lambda b: b.host, lambda b: b.to_motors):

@@ -319,7 +319,7 @@ def test_looking_back_shows_an_earlier_state_while_the_robot_runs(clicks, robot)
     clicks.set(clicks.handle("look back s"), 1.0)
     frame(260)
     assert "frame 180" in shown()
-    clicks.page._on_disconnect(None)  # the last browser leaves
+    clicks.page._on_disconnect(types.SimpleNamespace(client_id=0))  # the last browser leaves
     for i in range(261, 290):
         frame(i)
     assert "frame 2" in shown() and "ago" not in shown()

@@ -29,10 +29,17 @@ void gc_heater_tick(gc_heater *heater, const gc_parameters *parameters, uint32_t
   if (heater->read_once && now - heater->reading_time > GC_SENSOR_TIMEOUT) {
     heater->read_once = false;
   }
-  heater->expired = !heater->commanded_once;
+  const bool own = !heater->commanded_once && gc_parameter_int(parameters, GC_HEATER_OWN) == 1;
+  heater->expired = !heater->commanded_once && !own;
   heater->unread = !heater->read_once;
   heater->hot = heater->reading > (heater->hot ? limit - HYSTERESIS : limit);
   const uint16_t most = (uint16_t)gc_parameter_int(parameters, GC_HEATER_LIMIT);
   const bool off = heater->expired || heater->unread || heater->hot;
-  heater->duty = off ? 0u : (heater->commanded < most ? heater->commanded : most);
+  uint16_t wanted = heater->commanded;
+  if (own && !off) {
+    wanted = gc_heater_control_step(&heater->control, parameters, heater->reading, now);
+  } else {
+    gc_heater_control_rest(&heater->control);
+  }
+  heater->duty = off ? 0u : (wanted < most ? wanted : most);
 }

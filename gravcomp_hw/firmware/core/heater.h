@@ -1,10 +1,12 @@
-// The heater of the IMU: the host commands its duty; the board limits it and switches it off by itself.
+// The heater of the IMU: the host commands its duty, or without a host the board itself where it is told to. The board limits it and
+// switches it off by itself.
 #ifndef GC_HEATER_H
 #define GC_HEATER_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "heater_control.h"
 #include "parameters.h"
 
 #define GC_HEATER_TIMEOUT 500000u   // us without a command until the heater is off
@@ -22,7 +24,8 @@ typedef struct {
   bool read_once;
   bool hot;      // switched off by temperature, until 5 degC below the limit
   bool unread;   // switched off because no valid reading comes
-  bool expired;  // no fresh command
+  bool expired;  // no fresh command, and the board does not control it itself
+  gc_heater_control control;
 } gc_heater;
 
 // Take a commanded duty (0.0001; more than 10000 counts as 10000).

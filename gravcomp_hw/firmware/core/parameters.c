@@ -49,6 +49,11 @@ static const description descriptions[GC_PARAMETER_COUNT] = {
     [GC_OVERSPEED] = {REAL, 1.2f, 10.0f, 2.0f},
     [GC_STALL_TIME] = {WHOLE, 20.0f, 5000.0f, 180.0f},
     [GC_AT_START] = {WHOLE, 0.0f, 1.0f, 0.0f},
+    [GC_HEATER_OWN] = {WHOLE, 0.0f, 1.0f, 0.0f},
+    [GC_HEATER_TARGET] = {WHOLE, 0.0f, 60.0f, 0.0f},
+    [GC_HEATER_RISE] = {WHOLE, 0.0f, 40.0f, 15.0f},
+    [GC_HEATER_GAIN] = {REAL, 0.0f, 10.0f, 0.25f},
+    [GC_HEATER_INTEGRAL_TIME] = {REAL, 0.1f, 10000.0f, 40.0f},
 };
 
 static bool fits(uint32_t key, uint32_t word) {

@@ -40,10 +40,15 @@ enum {
   GC_OVERSPEED,        // multiple of the velocity limit: runaway
   GC_STALL_TIME,       // ms at the current limit without motion
   GC_AT_START,         // 0: wait for a host; 1: home, then run the loop on the board
+  GC_HEATER_OWN,       // 1: without commands of a host the board controls the IMU's temperature itself
+  GC_HEATER_TARGET,    // degC; 0: GC_HEATER_RISE above the first reading
+  GC_HEATER_RISE,      // degC
+  GC_HEATER_GAIN,      // 1/degC
+  GC_HEATER_INTEGRAL_TIME,  // s
   GC_PARAMETER_COUNT
 };
 
-#define GC_PARAMETER_VERSION 1u
+#define GC_PARAMETER_VERSION 2u
 
 typedef struct {
   uint32_t words[GC_PARAMETER_COUNT];

@@ -47,9 +47,10 @@ static const float *tile_product(const float *restrict b, const float *restrict 
   return b + 40;
 }
 
-void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at) {
+void gc_elasticity_at(const gc_model *model, const float *q, const gc_creep *creep, gc_elasticity *at) {
   const uint32_t r = model->modes, blocks = model->strains / GC_TILE;
   const float *b = model->quadratic;
+  at->scale = creep->scale;
   for (uint32_t i = 0; i < r; ++i) {
     at->force[i] = 0.0f;
   }
@@ -72,9 +73,20 @@ void gc_elasticity_at(const gc_model *model, const float *q, gc_elasticity *at) 
       jacobian[first + 2u][2] += 1.0f, jacobian[first + 3u][3] += 1.0f;
     }
     store(at->strain + first, strain);
+    const four stress = added(loaded(creep->offset + first), creep->scale, strain);
+    store(at->stress + first, stress);
     for (uint32_t i = 0; i < r; ++i) {
       const four row = loaded(jacobian[i]);
-      at->force[i] = (((at->force[i] + row.x * strain.x) + row.y * strain.y) + row.z * strain.z) + row.w * strain.w;
+      at->force[i] = (((at->force[i] + row.x * stress.x) + row.y * stress.y) + row.z * stress.z) + row.w * stress.w;
+    }
+  }
+}
+
+// Write four rows of J times a.
+GC_INLINE void scaled(const float (*rows)[GC_TILE], float scale, float (*to)[GC_TILE]) {
+  for (uint32_t a = 0; a < GC_TILE; ++a) {
+    for (uint32_t k = 0; k < GC_TILE; ++k) {
+      to[a][k] = scale * rows[a][k];
     }
   }
 }
@@ -93,24 +105,28 @@ void gc_elasticity_stiffness(const gc_model *model, const gc_elasticity *at, flo
   }
   for (uint32_t block = 0; block < model->strains / GC_TILE; ++block) {
     const float(*jacobian)[GC_TILE] = at->jacobian[block];
-    const four strain = loaded(at->strain + GC_TILE * block);
+    const float *stress = at->stress + GC_TILE * block;
+    const four own = loaded(stress);
     float *to = matrix;
     for (uint32_t i = 0; i < r; i += GC_TILE) {
-      gc_tile_stiffness(b, jacobian + i, jacobian, at->strain + GC_TILE * block, i, to);
+      float rows[GC_TILE][GC_TILE];
+      scaled(jacobian + i, at->scale, rows);
+      gc_tile_stiffness(b, (const float(*)[GC_TILE])rows, jacobian, stress, i, to);
       b += GC_TILE * GC_TILE * i;
       to += GC_TILE * i;
       const four r_0 = loaded(jacobian[i]), r_1 = loaded(jacobian[i + 1u]);
       const four r_2 = loaded(jacobian[i + 2u]), r_3 = loaded(jacobian[i + 3u]);
-      to[0] = entry_of(to[0], r_0, r_0, strain, b);
-      to[1] = entry_of(to[1], r_1, r_0, strain, b + 4);
-      to[2] = entry_of(to[2], r_1, r_1, strain, b + 8);
-      to[3] = entry_of(to[3], r_2, r_0, strain, b + 12);
-      to[4] = entry_of(to[4], r_2, r_1, strain, b + 16);
-      to[5] = entry_of(to[5], r_2, r_2, strain, b + 20);
-      to[6] = entry_of(to[6], r_3, r_0, strain, b + 24);
-      to[7] = entry_of(to[7], r_3, r_1, strain, b + 28);
-      to[8] = entry_of(to[8], r_3, r_2, strain, b + 32);
-      to[9] = entry_of(to[9], r_3, r_3, strain, b + 36);
+      const four s_0 = loaded(rows[0]), s_1 = loaded(rows[1]), s_2 = loaded(rows[2]), s_3 = loaded(rows[3]);
+      to[0] = entry_of(to[0], s_0, r_0, own, b);
+      to[1] = entry_of(to[1], s_1, r_0, own, b + 4);
+      to[2] = entry_of(to[2], s_1, r_1, own, b + 8);
+      to[3] = entry_of(to[3], s_2, r_0, own, b + 12);
+      to[4] = entry_of(to[4], s_2, r_1, own, b + 16);
+      to[5] = entry_of(to[5], s_2, r_2, own, b + 20);
+      to[6] = entry_of(to[6], s_3, r_0, own, b + 24);
+      to[7] = entry_of(to[7], s_3, r_1, own, b + 28);
+      to[8] = entry_of(to[8], s_3, r_2, own, b + 32);
+      to[9] = entry_of(to[9], s_3, r_3, own, b + 36);
       b += 40;
       to += 10;
     }

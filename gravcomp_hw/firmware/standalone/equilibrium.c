@@ -13,6 +13,7 @@
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model) {
   gc_zero(state, sizeof *state);
   state->model = model;
+  gc_creep_reset(&state->creep);
   for (uint32_t i = 0; i < model->modes; ++i) {
     state->factor[i * (i + 1u) / 2u + i] = 1.0f;  // the stiffness at rest is the identity
   }
@@ -112,16 +113,33 @@ static void solve_answers(gc_equilibrium *state) {
   }
 }
 
+// Factorise the stiffness at q. Where what is known of the law's part does not fit the shape, the step goes without it. Returns false
+// where the stiffness is not positive definite.
+static bool factorise(gc_equilibrium *state) {
+  const gc_model *model = state->model;
+  gc_elasticity_stiffness(model, &state->elasticity, state->stiffness);
+  gc_cables_add_stiffness(model, &state->cables, state->tension, state->stiffness);
+  if (model->law_points > 0u) {
+    gc_law_deviation_add_stiffness(model, &state->law, state->stiffness, 1.0f);
+    if (gc_factorise(state->stiffness, model->modes, state->factor)) {
+      return true;
+    }
+    gc_law_deviation_add_stiffness(model, &state->law, state->stiffness, -1.0f);
+  }
+  return gc_factorise(state->stiffness, model->modes, state->factor);
+}
+
 // Evaluate forces, cables and stiffness at q, and the response of the shape to the tensions. Returns false where the stiffness
 // is not positive definite.
 static bool evaluate(gc_equilibrium *state) {
   const gc_model *model = state->model;
   const uint32_t r = model->modes, m = model->cables;
-  gc_elasticity_at(model, state->q, &state->elasticity);
+  gc_elasticity_at(model, state->q, &state->creep, &state->elasticity);
+  if (model->law_points > 0u) {
+    gc_law_deviation_at(model, state->q, &state->law, state->elasticity.force);
+  }
   gc_cables_at(model, state->q, state->pulling, &state->cables);
-  gc_elasticity_stiffness(model, &state->elasticity, state->stiffness);
-  gc_cables_add_stiffness(model, &state->cables, state->tension, state->stiffness);
-  if (!gc_factorise(state->stiffness, r, state->factor)) {
+  if (!factorise(state)) {
     return false;
   }
   solve_answers(state);
@@ -263,12 +281,28 @@ static bool inside(const gc_model *model, const float *q, const float *correctio
   return squared <= model->settings->reach * model->settings->reach;
 }
 
-void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *wound, gc_shape *shape) {
+// Let the material remember the strain at q plus the correction.
+static void remember(gc_equilibrium *state) {
+  const gc_model *model = state->model;
+  float strain[GC_STRAINS_MAX];
+  for (uint32_t k = 0; model->branches > 0u && k < model->strains; ++k) {
+    const float(*jacobian)[GC_TILE] = (const float(*)[GC_TILE])state->elasticity.jacobian[k / GC_TILE];
+    strain[k] = state->elasticity.strain[k];
+    for (uint32_t a = 0; a < model->modes; ++a) {
+      strain[k] += jacobian[a][k % GC_TILE] * state->correction[a];
+    }
+  }
+  gc_creep_end(&state->creep, model, strain);
+}
+
+void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *wound, float interval,
+                         gc_shape *shape) {
   const gc_model *model = state->model;
   const float length = model->settings->length;
   state->loaded = state->loaded < GC_LOADING_STEPS ? state->loaded + 1u : GC_LOADING_STEPS;
   const float share = (float)state->loaded / (float)GC_LOADING_STEPS;
   const float gravity[3] = {share * full_gravity[0], share * full_gravity[1], share * full_gravity[2]};
+  gc_creep_begin(&state->creep, model, interval);
   if (model->slides) {
     slide(state, wound);
   }
@@ -295,6 +329,7 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
     observe(state, shape);
     observe_length(state, shape);
     describe_cables(state, tension, shape);
+    remember(state);
     for (uint32_t a = 0; a < model->modes; ++a) {
       state->safe_q[a] = state->q[a] + state->correction[a];
     }

@@ -9,6 +9,7 @@
 
 #include "cables.h"
 #include "elasticity.h"
+#include "law_deviation.h"
 
 #define GC_LOADING_STEPS 50u  // calls after a reset over which gravity rises from zero
 #define GC_EFFECTOR_ROWS 6u  // position and direction of the tip
@@ -32,6 +33,8 @@ typedef struct {
 typedef struct {
   const gc_model *model;
   gc_elasticity elasticity;  // at q
+  gc_law_deviation law;      // at q, and at the last shapes
+  gc_creep creep;
   gc_cables cables;          // at q
   float q[GC_MODES_MAX];     // where forces and cables were evaluated last
   float tension[GC_CABLES_MAX];
@@ -55,6 +58,8 @@ void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model);
 // Track the equilibrium to gravity (3,) in m/s^2 in soft_base and to cables pulled in to `wound` (m,) in m, NaN: released.
 // After a reset gravity rises from zero over GC_LOADING_STEPS calls, so that one step a call finds each equilibrium.
 // Where none is found the shape is the last equilibrium, from which the next call starts.
-void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, gc_shape *shape);
+//
+// interval: s since the last call, in which the material creeps.
+void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, float interval, gc_shape *shape);
 
 #endif

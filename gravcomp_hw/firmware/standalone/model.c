@@ -6,16 +6,20 @@
 #define GC_SETTINGS_FLOATS ((uint32_t)(sizeof(gc_settings) / sizeof(float)))
 #define GC_SECTION_ROWS 9u
 
+#define GC_LAW_FLOATS ((uint32_t)(sizeof(gc_law) / sizeof(float)))
+#define GC_BRANCH_FLOATS ((uint32_t)(sizeof(gc_branch) / sizeof(float)))
+
 // Number of floats of all tables, without the numbers of the pieces' cables.
-static size_t float_count(uint32_t r, uint32_t k, uint32_t m, uint32_t s, uint32_t n) {
-  const size_t pairs = (size_t)r * (r + 1u) / 2u;
-  return pairs * (k + m) + (size_t)s * 3u * r + (3u + GC_SECTION_ROWS) * (size_t)r + GC_SECTION_ROWS + (size_t)s * 3u +
-         (size_t)n * 3u * (r + 1u) + (size_t)m * 6u + GC_SETTINGS_FLOATS;
+static size_t float_count(const gc_model_header *h) {
+  const size_t r = h->modes, s = h->pieces, pairs = r * (r + 1u) / 2u;
+  return pairs * (h->strains + h->cables) + s * 3u * r + (3u + GC_SECTION_ROWS) * r + GC_SECTION_ROWS + s * 3u +
+         (size_t)h->points * 3u * (r + 1u) + (size_t)h->cables * 6u + (size_t)h->law_points * (9u * r + GC_LAW_FLOATS) +
+         (size_t)h->branches * GC_BRANCH_FLOATS + GC_SETTINGS_FLOATS;
 }
 
-size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces, uint32_t points) {
-  const size_t numbers = ((size_t)pieces + 3u) / 4u * 4u;
-  return sizeof(gc_model_header) + sizeof(float) * float_count(modes, strains, cables, pieces, points) + numbers;
+size_t gc_model_bytes(const gc_model_header *header) {
+  const size_t numbers = ((size_t)header->pieces + 3u) / 4u * 4u;
+  return sizeof(gc_model_header) + sizeof(float) * float_count(header) + numbers;
 }
 
 #define GC_PART 16384u  // bytes of a check until it says that it goes on
@@ -53,7 +57,8 @@ static uint32_t crc_of(const uint8_t *data, size_t size, gc_alive *alive) {
 static bool fits(const gc_model_header *h) {
   return h->modes >= GC_TILE && h->modes <= GC_MODES_MAX && h->modes % GC_TILE == 0u && h->strains >= h->modes &&
          h->strains <= GC_STRAINS_MAX && h->strains % GC_TILE == 0u && h->cables >= 1u && h->cables <= GC_CABLES_MAX &&
-         h->pieces >= 1u && h->pieces <= GC_PIECES_MAX && h->points <= GC_POINTS_MAX;
+         h->pieces >= 1u && h->pieces <= GC_PIECES_MAX && h->points <= GC_POINTS_MAX &&
+         h->law_points <= GC_LAW_POINTS_MAX && h->branches <= GC_BRANCHES_MAX;
 }
 
 uint32_t gc_model_magic(const uint8_t *blob, size_t size) {
@@ -78,7 +83,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   if (size < header->size) {
     return GC_MODEL_CUT_OFF;
   }
-  if (header->size != gc_model_bytes(header->modes, header->strains, header->cables, header->pieces, header->points)) {
+  if (header->size != gc_model_bytes(header)) {
     return GC_MODEL_WRONG_SIZE;
   }
   const size_t before = offsetof(gc_model_header, robot);
@@ -93,7 +98,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   const uint32_t r = header->modes, k = header->strains, m = header->cables, s = header->pieces;
   const uint32_t n = header->points;
   const float *next = (const float *)(const void *)(blob + sizeof(gc_model_header));
-  const size_t count = float_count(r, k, m, s, n);
+  const size_t count = float_count(header);
   if (!all_finite(next, count, alive)) {
     return GC_MODEL_NOT_FINITE;
   }
@@ -105,6 +110,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   }
   gc_model opened;
   opened.modes = r, opened.strains = k, opened.cables = m, opened.pieces = s, opened.points = n;
+  opened.law_points = header->law_points, opened.branches = header->branches;
   opened.quadratic = next, next += (size_t)r * (r + 1u) / 2u * k;
   opened.cable_stiffness = next, next += (size_t)r * (r + 1u) / 2u * m;
   opened.piece_change = next, next += (size_t)s * 3u * r;
@@ -120,6 +126,9 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   opened.sheath_angle = next, next += m;
   opened.free_length = next, next += m;
   opened.least_tension = next, next += m;
+  opened.law_change = next, next += (size_t)opened.law_points * 9u * r;
+  opened.law = (const gc_law *)(const void *)next, next += (size_t)opened.law_points * GC_LAW_FLOATS;
+  opened.branch = (const gc_branch *)(const void *)next, next += (size_t)opened.branches * GC_BRANCH_FLOATS;
   opened.settings = (const gc_settings *)(const void *)next;
   opened.piece_cable = numbers;
   opened.robot = header->robot;

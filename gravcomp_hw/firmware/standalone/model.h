@@ -9,10 +9,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "law_of_invariants.h"
 #include "settings.h"
 
 #define GC_MODEL_MAGIC 0x424d4347u // "GCMB"
-#define GC_MODEL_VERSION 1u
+#define GC_MODEL_VERSION 2u
 #define GC_TILE 4u // rows of a tile and strains of a block: what one kernel holds in registers
 #define GC_MODES_MAX 48u
 #define GC_STRAINS_MAX 96u
@@ -20,6 +21,8 @@
 #define GC_PIECES_MAX 192u
 #define GC_PAIRS_MAX (GC_MODES_MAX * (GC_MODES_MAX + 1u) / 2u)
 #define GC_POINTS_MAX 64u
+#define GC_LAW_POINTS_MAX 128u
+#define GC_BRANCHES_MAX 4u
 #define GC_ROBOT_BYTES 16u
 
 // First bytes of a blob. crc: CRC-32 (IEEE 802.3) of all bytes after this field.
@@ -35,7 +38,8 @@ typedef struct {
   uint32_t pieces;               // s
   uint32_t settings;             // number of floats of gc_settings
   uint32_t points;               // n, of the backbone
-  uint32_t reserved[2];
+  uint32_t law_points;           // at which a law of rubber is evaluated
+  uint32_t branches;             // of the material's memory
 } gc_model_header;
 
 // Why a blob is refused.
@@ -44,19 +48,24 @@ typedef enum {
   GC_MODEL_CUT_OFF = 1,      // fewer bytes than the header or its size say
   GC_MODEL_FOREIGN = 2,      // not a blob of a model
   GC_MODEL_OTHER_VERSION = 3,
-  GC_MODEL_TOO_BIG = 4,      // more modes, strains, cables or pieces than this firmware has room for
+  GC_MODEL_TOO_BIG = 4,      // more modes, strains, cables, pieces, points or branches than this firmware has room for
   GC_MODEL_WRONG_SIZE = 5,   // the tables do not fill the size
   GC_MODEL_WRONG_CRC = 6,
   GC_MODEL_OTHER_ROBOT = 7,
   GC_MODEL_NOT_FINITE = 8    // a setting or a table has a number that is not finite
 } gc_model_status;
 
+// A Maxwell branch: stiffness over the long-term one, and d and g of creep.h over a period.
+typedef struct {
+  float ratio, decay, gain;
+} gc_branch;
+
 // Tables of a model; r coordinates, k strains, m cables, s pieces; SI units.
 //
 // Symmetric matrices are stored by tiles: for every four rows 4 t to 4 t + 3 the columns j < 4 t, each with its four
 // entries, then the ten entries of the lower triangle on the diagonal, row by row.
 typedef struct {
-  uint32_t modes, strains, cables, pieces, points;
+  uint32_t modes, strains, cables, pieces, points, law_points, branches;
   const float *quadratic;         // [k / 4][r (r + 1) / 2][4] B of every block of four strains, by tiles
   const float *cable_stiffness;   // [r (r + 1) / 2][m] stiffness of each cable under unit tension, by tiles
   const float *piece_change;      // [s][3][r] D: change of the piece by the coordinates
@@ -72,6 +81,9 @@ typedef struct {
   const float *sheath_angle;      // [m] rad
   const float *free_length;       // [m] m
   const float *least_tension;     // [m] N
+  const float *law_change;        // [law_points][r][9] G: change of H, row by row, by the coordinates
+  const gc_law *law;              // [law_points]
+  const gc_branch *branch;        // [branches]
   const gc_settings *settings;
   const uint8_t *piece_cable;     // [s]
   const uint8_t *robot;           // [16]
@@ -91,7 +103,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
 // Return the first word of a blob of `size` bytes, 0 where there is none.
 uint32_t gc_model_magic(const uint8_t *blob, size_t size);
 
-// Return the number of bytes of a blob with these counts, all of them within the maxima.
-size_t gc_model_bytes(uint32_t modes, uint32_t strains, uint32_t cables, uint32_t pieces, uint32_t points);
+// Return the number of bytes of a blob with the counts of a header, all of them within the maxima.
+size_t gc_model_bytes(const gc_model_header *header);
 
 #endif

@@ -91,7 +91,7 @@ static bool by_motors(const gc_standalone *loop, uint8_t motors, float *displace
 }
 
 void gc_standalone_follow(gc_standalone *loop, const float *gravity, float interval) {
-  gc_equilibrium_step(&loop->equilibrium, gravity, loop->controller.displacement, &loop->shape);
+  gc_equilibrium_step(&loop->equilibrium, gravity, loop->controller.displacement, interval, &loop->shape);
   const gc_target target = loop->joystick ? gc_target_joystick(loop->model.settings, loop->stick[0], loop->stick[1])
                                           : gc_target_stored(loop->model.settings);
   gc_inverse_step(&loop->controller, &loop->shape, &target, interval);

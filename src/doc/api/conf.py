@@ -1,6 +1,7 @@
 """Configuration of Sphinx for `./gravcomp docs`, which reads a copy of the repository."""
 
 import builtins
+import logging
 import re
 from pathlib import Path
 from types import GenericAlias
@@ -35,6 +36,7 @@ autosummary_generate = True
 autodoc_default_options = {"members": True, "undoc-members": True, "ignore-module-all": True}
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+autodoc_use_type_comments = False  # all types are annotations; the search for comments parses every function again
 napoleon_google_docstring = False
 # In docstrings `name` is code.
 default_role = "code"
@@ -103,6 +105,7 @@ def unlink_foreign_types(app: Any, doctree: Any) -> None:
 
 def setup(app: Any) -> None:
     """Register the hooks; the conversion comes before napoleon's."""
+    logging.getLogger("sphinx").setLevel(logging.INFO)  # a hundred thousand messages of autodoc for its authors are not made
     app.connect("autodoc-skip-member", skip_aliases)
     app.connect("autodoc-process-docstring", plain_text, priority=400)
     app.connect("doctree-read", unlink_foreign_types)

@@ -4,7 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gravcomp.config import ConfigError
 from gravcomp.description import RobotFile, load_robot_file
+from gravcomp.description.robot_file import shipped_robots
 from gravcomp.firmware.cycles import Cycles, loop_cycles, sample_bytes
 from gravcomp.firmware.emulator.machine import STACK_SIZE
 from gravcomp.firmware.image import build_image
@@ -24,6 +26,7 @@ from gravcomp.training import build
 
 Progress = Callable[[str], None]
 
+_RUBBER = "tentacle"
 _RATES, _SEEDS = (10.0, 90.0), 3  # deg/s
 _STEPS = 400
 _COUNTED = 12  # steps of which the cycles are counted
@@ -44,7 +47,36 @@ def run(progress: Progress, *, every: int = 1) -> dict:
         **memory(progress, found),
         **step_time(progress, file, found, every),
         **estimator(progress, file, found, every),
+        **({"robots": others(progress)} if every == 1 else {}),
     }
+
+
+def others(progress: Progress) -> dict[str, dict]:
+    """Return for the other shipped robots what their models cost on the board and how they compare, or why they do not fit.
+
+    Of those whose reduced models are built (`bench robots` builds all), and of the first one that has a law of rubber.
+    """
+    found: dict[str, dict] = {}
+    for name in shipped_robots():
+        file = load_robot_file(name)
+        if name == "article" or (name != _RUBBER and load(RobotModel(file.robot)) is None):
+            continue
+        progress(f"model of {name} on the board")
+        try:
+            own = model_of(file)
+        except ConfigError as error:
+            found[name] = {"refused": str(error)}
+            continue
+        compared = accuracy(progress, file, own, 2)
+        found[name] = {
+            "modes": own.model.size,
+            "law_points": len(own.model.deviation.weight),
+            "basis_error_mm": round(1e3 * own.error, 4),
+            "tip_mm": compared["board_tip_mm"],
+            "command_mm": compared["board_command_mm"],
+            "ms": step_time(progress, file, own, 4)["board_ms"]["worst"],
+        }
+    return found
 
 
 def model_of(file: RobotFile) -> Fit:

@@ -58,7 +58,7 @@ def disk_masses(robot: Robot) -> list[tuple[float, float, float, float]]:
         if segment.disks:
             diameter, thickness = segment.disks.outer_diameter, segment.disks.thickness
             for height in segment.disks.heights(segment.length):
-                mass = segment.disks.mass_of(segment.outline(height / segment.length).area)
+                mass = segment.disks.mass_of(segment.hole_of_disks(height / segment.length).area)
                 found.append((base + height, mass, mass * (diameter**2 / 16 + thickness**2 / 12), mass * diameter**2 / 8))
         base += segment.full_length
     return found

@@ -22,7 +22,7 @@ from gravcomp.orientation.calibration import RestCalibration
 if TYPE_CHECKING:
     from ruamel.yaml import YAML
 
-_STIFFEST = 1e6  # N: a stiffer cable is described as inextensible
+_LEAST_STRETCH = 1e-5  # at the largest tension: a cable that stretches less is described as inextensible
 _NO_CREEP = 1e-4  # ratio of a branch that is not described
 
 
@@ -274,7 +274,7 @@ def _stiffness(robot: Robot, cable: Cable, compliance: float) -> float | None:
 
     A cable whose line is described to stretch keeps a number, so that the file's defaults do not give it the old one back.
     """
-    length = robot.line_length(cable)
-    if compliance > length / _STIFFEST:
+    length, stiffest = robot.line_length(cable), robot.limits.tension_max / _LEAST_STRETCH
+    if compliance > length / stiffest:
         return length / compliance
-    return _STIFFEST if cable.stretches else None
+    return stiffest if cable.stretches else None

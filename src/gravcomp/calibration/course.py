@@ -6,18 +6,23 @@ import numpy as np
 
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
+from gravcomp.full_model.modes import first_period
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
 
 STRAIGHT = 0.02
 """A course starts straight if its first tip is nearer than this share of the length to the straight robot's."""
-COURSE_OPTIONS = DynamicsOptions(time_step=5e-3)
-"""Options of predicted courses: the error of a fall with steps of 5 ms is a tenth of a millimetre."""
+_STEPS = 55.0  # of time in the robot's first period: the error of a fall is then a thousandth of the robot's length
 
 
-def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> tuple[np.ndarray, np.ndarray]:
+def course_options(robot: Robot) -> DynamicsOptions:
+    """Return the options of predicted courses of a robot. Raises MeshError for a body that cannot be meshed."""
+    return DynamicsOptions(time_step=first_period(robot) / _STEPS)
+
+
+def predict_course(robot: Robot, course: Measured, options: DynamicsOptions | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return tip positions (t, 3) in m and directions (t, 3) at the course's times.
 
-    Raises RuntimeError if a time step does not converge.
+    options: default `course_options`. Raises RuntimeError if a time step does not converge.
     """
     straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
     rows = [
@@ -28,9 +33,9 @@ def predict_course(robot: Robot, course: Measured, options: DynamicsOptions = CO
     return np.array(tips), np.array(directions)
 
 
-def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions = COURSE_OPTIONS) -> Iterator[Shape | None]:
-    """Yield the shapes at the course's times, None for the start at the straight robot; raises as `predict_course`."""
-    simulator = DynamicSimulator(robot, options)
+def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions | None = None) -> Iterator[Shape | None]:
+    """Yield the shapes at the course's times, None for the start at the straight robot; as `predict_course`."""
+    simulator = DynamicSimulator(robot, options or course_options(robot))
     if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT * robot.length:
         yield simulator.settle(course.gravity[0], course.displacement[0])
     else:

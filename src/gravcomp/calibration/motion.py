@@ -15,15 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.course import predict_course
+from gravcomp.calibration.course import course_options, predict_course
 from gravcomp.calibration.measured import Measured, rms_distance
 from gravcomp.description import Robot
+from gravcomp.full_model.generalized_alpha import DynamicsOptions
 from gravcomp.full_model.modes import first_period
 
 _MODULUS_RANGE, _DAMPING_RANGE = (0.05, 20.0), (0.02, 50.0)  # times the values at the start
-# Of rho, and of T in s: in these courses slower creep does not show, and faster creep acts like damping.
-_CREEP_RANGES = ((0.002, 2.0), (0.03, 5.0))
-_CREEP_START = 0.08, 0.4
+# Of rho, and of T in first periods: in these courses slower creep does not show, and faster creep acts like damping.
+_CREEP_RANGES = ((0.002, 2.0), (0.1, 18.0))
+_CREEP_START = 0.08, 1.4
 # Length of the beginnings that are fitted first, in first periods. If the model swings out of phase, the fit ends in a wrong
 # minimum with too much damping; such a short beginning contains no full swing.
 _BEGINNING = 1.08
@@ -77,15 +78,17 @@ def fit_motion(
     if modulus:
         starts["youngs_modulus"] = material.youngs_modulus
         ranges["youngs_modulus"] = material.youngs_modulus * np.array(_MODULUS_RANGE)
-    beginning = _Parameters(robot, starts, ranges)
+    beginning, period = _Parameters(robot, starts, ranges), first_period(robot)
     if creep:
-        starts = starts | dict(zip(("creep_ratio", "creep_time"), _CREEP_START))
-        ranges = ranges | dict(zip(("creep_ratio", "creep_time"), np.array(_CREEP_RANGES)))
+        scale = (1.0, period)
+        starts = starts | dict(zip(("creep_ratio", "creep_time"), np.multiply(_CREEP_START, scale)))
+        ranges = ranges | dict(zip(("creep_ratio", "creep_time"), np.array(_CREEP_RANGES) * np.array(scale)[:, None]))
     all_of_them = _Parameters(robot, starts, ranges)
-    first = _BEGINNING * first_period(robot)
+    first = _BEGINNING * period
     beginnings = [course.rows(course.time <= course.time[0] + first) for course in courses]
-    short = _Courses(beginnings, beginning.robot_at, mapper, progress)
-    whole = _Courses(courses, all_of_them.robot_at, mapper, progress)
+    steps = course_options(robot)  # the same for all values, so that they do not change the derivatives
+    short = _Courses(beginnings, beginning.robot_at, steps, mapper, progress)
+    whole = _Courses(courses, all_of_them.robot_at, steps, mapper, progress)
     options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}
     x = least_squares(short.residuals, beginning.start, jac=short.jacobian, bounds=beginning.bounds, **options).x
     # In the beginning, the stiffness of the creep branch adds to the lasting one.
@@ -103,7 +106,7 @@ def fit_motion(
     fitted = all_of_them.robot_at(x)
     final = fitted.materials[0]
     half = {name: getattr(final, name) * float(width) for name, width in zip(all_of_them.names, deviation)}
-    before = np.concatenate(mapper(_tip_course, [(robot, course) for course in courses])) - whole.measured
+    before = np.concatenate(mapper(_tip_course, [(robot, course, steps) for course in courses])) - whole.measured
     return MotionFit(
         robot=fitted,
         youngs_modulus=final.youngs_modulus,
@@ -138,8 +141,8 @@ class _Parameters:
 class _Courses:
     """Residuals of the courses as functions of x, with a cache of predictions. count: number of predictions."""
 
-    def __init__(self, courses: list[Measured], robot_at: Callable, mapper: Callable, progress: Callable):
-        self.courses, self.count = courses, 0
+    def __init__(self, courses: list[Measured], robot_at: Callable, steps: DynamicsOptions, mapper: Callable, progress: Callable):
+        self.courses, self.count, self._steps = courses, 0, steps
         self._robot_at, self._mapper, self._progress = robot_at, mapper, progress
         self.measured = np.concatenate([course.tip_position for course in courses])
         self._tips: dict[tuple, list[np.ndarray]] = {}
@@ -169,12 +172,16 @@ class _Courses:
     def _predict(self, points: list[np.ndarray]) -> None:
         """Predict the courses at those points that are not in the cache."""
         new = [x for x in points if tuple(x) not in self._tips]
-        tips = self._mapper(_tip_course, [(self._robot_at(x), course) for x in new for course in self.courses]) if new else []
+        tips = (
+            self._mapper(_tip_course, [(self._robot_at(x), course, self._steps) for x in new for course in self.courses])
+            if new
+            else []
+        )
         for index, x in enumerate(new):
             self._tips[tuple(x)] = tips[index * len(self.courses) : (index + 1) * len(self.courses)]
         self.count += len(new)
 
 
-def _tip_course(job: tuple[Robot, Measured]) -> np.ndarray:
+def _tip_course(job: tuple[Robot, Measured, DynamicsOptions]) -> np.ndarray:
     """Return the predicted tips (t, 3) of a course. A function of the module, so that it can be sent to another process."""
     return predict_course(*job)[0]

@@ -1,12 +1,14 @@
 """Parameters of the static fit, and robots with them."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gravcomp.description import Robot
+from gravcomp.materials.material_classes import class_of
 
 
 @dataclass(frozen=True)
@@ -93,13 +95,33 @@ def with_cable_places(robot: Robot, radius: np.ndarray, angle: np.ndarray) -> Ro
     return dataclasses.replace(robot, cables=tuple(cables))
 
 
-def starting_parameters(robot: Robot, creep_times: tuple[float, ...]) -> StaticParameters:
-    """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times."""
+def starting_parameters(robot: Robot, creep_times: tuple[float, ...], *, usual_creep: bool = False) -> StaticParameters:
+    """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times in s.
+
+    usual_creep: a body whose creep is not described creeps as its class of materials usually does.
+    """
+    material = robot.materials[0]
     creep = np.zeros(len(creep_times))
-    for ratio, time in robot.materials[0].branches if creep_times else ():
+    for ratio, time in material.branches if creep_times else ():
         creep[int(np.argmin(np.abs(np.log(np.array(creep_times) / time))))] += ratio
+    if usual_creep and not material.branches:
+        usual = class_of(material.youngs_modulus)
+        creep = creep_in_branches(usual.creep_ratio, usual.creep_time, creep_times)
     moduli = np.array([material.youngs_modulus for material in robot.materials])
     return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep)
+
+
+def creep_in_branches(ratio: Sequence[float], time: Sequence[float], times: tuple[float, ...]) -> np.ndarray:
+    """Return what creep of these ratios and times in s is in branches of other `times` (b,) in s, the shortest first.
+
+    Each counts for the nearest in the logarithm of its time; one that is nearer to a tenth of the shortest time has ended before
+    the first window, and counts for none.
+    """
+    if not times:
+        return np.zeros(0)
+    branches = np.array([0.1 * min(times), *times])
+    nearest = np.abs(np.log(np.asarray(time)[:, None] / branches)).argmin(axis=1)
+    return np.bincount(nearest, np.asarray(ratio, dtype=float), len(branches))[1:]
 
 
 def cable_compliance(robot: Robot) -> np.ndarray:

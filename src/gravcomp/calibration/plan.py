@@ -163,11 +163,11 @@ def make_plan(
     rest = max(wanted - pull, _LEAST_REST * longest)
     held = rest + pull
     chosen = _chosen(candidates, rows, prior, held, options)
-    poses = _ordered([candidates[k] for k in chosen])
-    if not poses:
+    if not chosen:
         raise ConfigError(
             f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
         )
+    poses = _ordered([candidates[k] for k in chosen])
     free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
     poses.append(free)  # let go at the end, it swings: the damping
     return Plan(tuple(poses), (held,) * len(poses), rest, options.rate)

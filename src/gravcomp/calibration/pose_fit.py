@@ -14,11 +14,26 @@ import numpy as np
 from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import PoseParameters, Poses
+from gravcomp.config import parameter
 from gravcomp.description import Robot
 
-NOISE = 3e-3  # m: expected error of model and markers; weighs the data against the priors
 _DIFFERENCE = 1e-2  # step of difference quotients, in x
 _FARTHEST = 5.0  # bound of unknowns with a prior
+
+
+@dataclasses.dataclass(frozen=True)
+class PosePriors:
+    """What is assumed before the measurement: standard deviations without a unit, so that they suit a robot of any size."""
+
+    noise_share: float = parameter(
+        8e-3, minimum=1e-6, maximum=0.1, description="error of model and markers, over the robot's length"
+    )
+    base_share: float = parameter(0.014, minimum=1e-6, maximum=1.0, description="offset of the base, over the robot's length")
+    base_turn: float = parameter(3.0, edge="deg", minimum=1e-4, maximum=90.0, description="rotation of the base about each axis")
+    zero_share: float = parameter(3e-3, minimum=1e-6, maximum=1.0, description="zero of a cable, over the robot's length")
+    radius: float = parameter(0.045, minimum=1e-6, maximum=1.0, description="distance of a cable's end from the axis, relative")
+    angle: float = parameter(4.0, edge="deg", minimum=1e-4, maximum=90.0, description="angle of a cable about the axis")
+    gain: float = parameter(0.1, minimum=1e-6, maximum=10.0, description="gain of a measured tension, relative")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,17 +65,23 @@ class PoseUnknown:
 
 
 MODULUS = PoseUnknown("Young's modulus", "kPa", "youngs_modulus", None, 1.0, 1e-3)
-BASE = tuple(
-    PoseUnknown(f"base {field[5:]} {axis}", unit, field, index, scale, factor)
-    for field, unit, scale, factor in (("base_position", "mm", 5e-3, 1e3), ("base_rotation", "deg", 0.05, 180 / np.pi))
-    for index, axis in enumerate("xyz")
-)
-"""The rigid offset of the base: 5 mm and 0.05 rad."""
 
 
-def tension_gain(cable: int | None = None, name: str = "tension gain") -> PoseUnknown:
-    """Return the gain of one cable, or of all alike: 10 %."""
-    return PoseUnknown(name, "", "gain", cable, 0.1)
+def base_unknowns(robot: Robot, priors: PosePriors) -> tuple[PoseUnknown, ...]:
+    """Return the rigid offset of the base: its position along, and its rotation about, each axis."""
+    return tuple(
+        PoseUnknown(f"base {field[5:]} {axis}", unit, field, index, scale, factor)
+        for field, unit, scale, factor in (
+            ("base_position", "mm", priors.base_share * robot.length, 1e3),
+            ("base_rotation", "deg", priors.base_turn, 180 / np.pi),
+        )
+        for index, axis in enumerate("xyz")
+    )
+
+
+def tension_gain(priors: PosePriors, cable: int | None = None, name: str = "tension gain") -> PoseUnknown:
+    """Return the gain of one cable, or of all alike."""
+    return PoseUnknown(name, "", "gain", cable, priors.gain)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,7 +113,7 @@ def fit_poses(
     poses: Poses,
     unknowns: Sequence[PoseUnknown],
     *,
-    noise: float = NOISE,
+    priors: PosePriors | None = None,
     start: np.ndarray | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> PoseFit:
@@ -100,6 +121,7 @@ def fit_poses(
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
+    noise = (priors or PosePriors()).noise_share * robot.length
     predictor = PosePredictor(robot, poses)
     initial = predictor.initial()
     prior = np.array([not unknown.free for unknown in unknowns])

@@ -5,12 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.calibration.measured import MeasurementError
-from gravcomp.calibration.pose_fit import BASE, MODULUS, PoseUnknown, tension_gain
+from gravcomp.calibration.pose_fit import MODULUS, PosePriors, PoseUnknown, base_unknowns, tension_gain
 from gravcomp.description import Robot
-
-ZERO_PRIOR = 1e-3  # m
-RADIUS_PRIOR = 0.5e-3  # m
-ANGLE_PRIOR = np.radians(4.0)
 
 
 def unknowns_of(fit: Sequence[str], robot: Robot) -> tuple[PoseUnknown, ...]:
@@ -18,7 +14,7 @@ def unknowns_of(fit: Sequence[str], robot: Robot) -> tuple[PoseUnknown, ...]:
 
     Raises MeasurementError for cables that a fit cannot move.
     """
-    names = robot.cable_names
+    names, priors = robot.cable_names, PosePriors()
     for cable in robot.cables:
         if cable.via_points is not None and ("angles" in fit or "tip_radius" in fit):
             raise MeasurementError(
@@ -30,17 +26,21 @@ def unknowns_of(fit: Sequence[str], robot: Robot) -> tuple[PoseUnknown, ...]:
     if "modulus" in fit:
         found.append(MODULUS)
     if "gain" in fit:
-        found.append(tension_gain())
+        found.append(tension_gain(priors))
     if "gain_per_cable" in fit:
-        found += [tension_gain(index, f"gain of {name}") for index, name in enumerate(names)]
+        found += [tension_gain(priors, index, f"gain of {name}") for index, name in enumerate(names)]
     if "zeros" in fit:
-        found += [PoseUnknown(f"zero of {name}", "mm", "zero", index, ZERO_PRIOR, 1e3) for index, name in enumerate(names)]
+        found += [
+            PoseUnknown(f"zero of {name}", "mm", "zero", index, priors.zero_share * robot.length, 1e3)
+            for index, name in enumerate(names)
+        ]
     if "angles" in fit:
         found += [
-            PoseUnknown(f"angle of {name}", "deg", "angle", index, ANGLE_PRIOR, 180 / np.pi) for index, name in enumerate(names)
+            PoseUnknown(f"angle of {name}", "deg", "angle", index, priors.angle, 180 / np.pi) for index, name in enumerate(names)
         ]
     if "tip_radius" in fit:
-        found.append(PoseUnknown("pitch radius at the cables' ends", "mm", "tip_radius", None, RADIUS_PRIOR, 1e3))
+        scale = priors.radius * max(cable.radius or 0.0 for cable in robot.cables)
+        found.append(PoseUnknown("pitch radius at the cables' ends", "mm", "tip_radius", None, scale, 1e3))
     if "base" in fit:
-        found += BASE
+        found += base_unknowns(robot, priors)
     return tuple(found)

@@ -8,6 +8,7 @@ from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.calibration.statics import StaticPrediction
 from gravcomp.config import parameter
 from gravcomp.description import Cable, Robot
+from gravcomp.materials.material_classes import class_of
 
 MODULUS_RANGE = (0.02, 50.0)  # times the modulus at the start
 _FARTHEST = 20.0  # bound of the other unknowns, in their scales
@@ -45,7 +46,9 @@ class Priors:
     density: float = parameter(0.012, minimum=1e-6, maximum=1.0, description="error of the density, relative")
     payload: float = parameter(0.02, minimum=1e-6, maximum=1.0, description="error of the payload's mass, relative")
     mount: float = parameter(0.5, edge="deg", minimum=1e-4, maximum=90.0, description="error of the IMU's mount about each axis")
-    creep: float = parameter(0.05, minimum=1e-6, maximum=10.0, description="ratio of a branch of creep")
+    creep: float = parameter(
+        0.6, minimum=1e-6, maximum=100.0, description="error of a branch of creep, over the largest of the material's class"
+    )
     friction: float = parameter(0.05, minimum=1e-6, maximum=1.0, description="error of the cables' coefficient of friction")
 
 
@@ -109,7 +112,8 @@ def unknowns_of(
     if "mount" in wanted:
         unknowns += [Unknown("mount", (axis,), priors.mount) for axis in range(3)]
     if "creep" in wanted:
-        unknowns += [Unknown("creep", (b,), priors.creep) for b in range(len(initial.creep))]
+        scale = priors.creep * max(class_of(robot.materials[0].youngs_modulus).creep_ratio)
+        unknowns += [Unknown("creep", (b,), scale) for b in range(len(initial.creep))]
     if "friction" in wanted and taut:
         unknowns.append(Unknown("friction", (0,), priors.friction))
     return unknowns

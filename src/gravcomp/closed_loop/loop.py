@@ -25,6 +25,7 @@ from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware import requests
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
@@ -101,12 +102,16 @@ class ClosedLoop:
         joints = setup.hardware.joints is not None
         self._bridge = BridgedJoints(setup.hardware) if joints else Bridge(setup.hardware, require_imu=False)
         self._stream = ImuStream()
+        self._mount = setup.robot.imu_mount.rotation
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
         # The first reading of a board that starts warm is not the ambient temperature.
         ambient = _thermal(setup).ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot, scene=setup.modelled_scene)
+        # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
+        around = setup.modelled_scene or setup.zones
+        self._turn = None if around else BaseTurn(self._simulator.model, setup.simulator.turn)
         self._problem = InverseController(
             setup.robot, setup.controller.inverse, setup.hardware.transmission, setup.modelled_scene, setup.zones
         )
@@ -228,8 +233,14 @@ class ClosedLoop:
         estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
         if not isinstance(estimate, Problem):
             self._gravity = np.array(estimate.gravity)
+            if self._turn is not None:
+                self._turn.add(sample.stamp, self._mount @ np.array(estimate.imu.angular_velocity))
         released = self._target is None
-        gravity = np.zeros(3) if self._weightless and not released else self._gravity
+        gravity = np.zeros(3)
+        if released or not self._weightless:
+            gravity = self._gravity
+            if self._turn is not None:
+                gravity = gravity + self._turn.acceleration(sample.stamp)
         # The model starts at rest and relaxed, and creeps from then on.
         elapsed = None if self.shape is None else SAMPLE_PERIOD
         carried = None if self._load is None else self._load.wrench(gravity, self.time)

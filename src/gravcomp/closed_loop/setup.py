@@ -10,6 +10,7 @@ from gravcomp.config import from_mapping
 from gravcomp.description import Robot, RobotFile
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.pairs import check_pairs
+from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
@@ -36,6 +37,7 @@ class Setup:
     truth: VirtualRobotParameters
     hardware: Hardware
     estimator: ImuEstimatorParameters
+    simulator: FemSimulatorParameters
     controller: InverseControllerParameters
     seed: int
     nominal_hardware: Hardware | None = None
@@ -60,6 +62,7 @@ class Setup:
             truth=virtual.given,
             hardware=hardware,
             estimator=section(ImuEstimatorParameters, "imu_estimator"),
+            simulator=section(FemSimulatorParameters, "fem_simulator"),
             controller=section(InverseControllerParameters, "inverse_controller"),
             seed=virtual.seed,
             nominal_hardware=None if virtual.robot is file.robot else virtual.hardware,

@@ -110,6 +110,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
     alone = args.board == "standalone"
+    if args.board != "virtual":
+        output.note(f"The board is on the bus `--interface udp_multicast --channel {channels.split(',')[0]}`")
     parameters: dict[str, dict] = {"virtual_robot": motion}
     if alone:
         _prepare_alone(args.robot)
@@ -131,12 +133,13 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             if not args.headless:
                 processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port, **pictured))
             processes.start()
+            # It becomes active as the last one, because its motion begins then.
+            virtual_robot = processes.start_one(graph.node("gravcomp_hw", "virtual_robot"), gated=True)
             if not args.headless:
                 address = show_page(processes, args.no_open)
             output.note(f"Nodes started (ROS_DOMAIN_ID={domain['ROS_DOMAIN_ID']}), their output: {logs}")
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of all nodes")
-            # The last one, because its motion begins with its activation.
-            processes.start_one(graph.node("gravcomp_hw", "virtual_robot"))
+            virtual_robot.open_gate()
             processes.wait(processes.were_active, _START_TIMEOUT, "the activation of the virtual robot")
             builder.start()
             state = _follow(processes, result_file, args, pictures)

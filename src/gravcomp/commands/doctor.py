@@ -5,6 +5,7 @@ On request it also checks a robot file, a CAN bus and the running graph.
 
 import argparse
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
@@ -24,6 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--board", action="store_true", help="also run the bench test of the board on that bus, 15 s; motors without power"
     )
+    parser.add_argument(
+        "--motor", type=int, metavar="N", help="with --board: also a current step of the motor with this CAN id; unhook its cable"
+    )
+    parser.add_argument("--current", type=float, default=0.2, metavar="A", help="current of that step (default: 0.2)")
+    parser.add_argument("--out", metavar="DIR", help="with --board: write the report page board.html into this folder")
     parser.add_argument("--graph", action="store_true", help="also check the running graph: rates, latencies, matching QoS")
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of the running graph, e.g. /left")
 
@@ -32,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the checks. Returns 0: nothing required is missing, 1: something is. Raises ConfigError."""
     from gravcomp import __version__
     from gravcomp.config import ConfigError
-    from gravcomp.doctor import board, bus, machine, robot_file, running_graph
+    from gravcomp.doctor import board, board_page, bus, machine, robot_file, running_graph
 
     findings = machine.examine()
     if args.robot:
@@ -40,10 +46,17 @@ def run(args: argparse.Namespace) -> int:
     if args.interface:
         for channel in args.channel.split(","):
             findings += bus.examine(args.interface, channel.strip())
+    if (args.motor is not None or args.out) and not args.board:
+        raise ConfigError("--motor and --out belong to the bench test of a board: --board")
     if args.board and not args.interface:
         raise ConfigError("--board needs the bus of the board: --interface and --channel")
     if args.board:
-        findings += board.examine(args.interface, args.channel.split(",")[0].strip())
+        channel = args.channel.split(",")[0].strip()
+        found = board.examine(args.interface, channel, motor=args.motor, current=args.current)
+        findings += found
+        if args.out:
+            page = board_page.write_page(found, args.interface, channel, Path(args.out))
+            output.note(f"The page of the bench test is {page}")
     if args.graph:
         findings += running_graph.examine(args.namespace)
     healthy = not any(finding.level == "missing" for finding in findings)

@@ -7,7 +7,10 @@ from pathlib import Path
 from gravcomp.commands import output
 from gravcomp.commands.parsers import add_subcommand
 
-_TESTS = tuple(f"src/test/test_{name}.py" for name in ("firmware", "virtual_board", "standalone", "model_transfer"))
+_TESTS = tuple(
+    f"src/test/test_{name}.py"
+    for name in ("firmware", "virtual_board", "standalone", "standalone_board", "model_transfer", "board_laws", "board_heater")
+)
 _FOLDER = "build/firmware"
 
 
@@ -47,6 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     settings.add_argument("--number", type=int, default=255, metavar="N", help="number of the board (default: the only one)")
     settings.add_argument("--interface", default="", help="python-can interface, e.g. socketcan (default: the robot file's)")
     settings.add_argument("--channel", default="", help="channel of the bus, e.g. can0 (default: the robot file's)")
+    settings.add_argument(
+        "--standalone",
+        action="store_true",
+        help="for a robot without a host: the board homes, runs its loop and heats the IMU by itself when its motors answer",
+    )
     settings.add_argument(
         "--one-bus", action="store_true", help="the board is on the bus of the motors, not between host and motors"
     )
@@ -214,13 +222,19 @@ def _parameters(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.description.hardware import parse_hardware
     from gravcomp.firmware.client import BoardClient
-    from gravcomp.firmware.settings import settings_of
+    from gravcomp.firmware.model_settings import LoopParameters
+    from gravcomp.firmware.settings import settings_alone, settings_of
 
     file = load_robot_file(args.robot)
     hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
     if len(hardware.all_buses) == 1:
         hardware = hardware.on(args.interface, args.channel)
+    settings = settings_of(hardware, between=not args.one_bus)
+    if args.standalone:
+        settings |= settings_alone(LoopParameters.of(file).estimator.heater)
     with BoardClient(hardware.board_bus, args.number) as client:
-        client.configure(settings_of(hardware, between=not args.one_bus))
-    output.result({"board": args.number, "robot": file.source}, "The parameters are in the board, and stored")
+        client.configure(settings)
+    output.result(
+        {"board": args.number, "robot": file.source, "parameters": settings}, "The parameters are in the board, and stored"
+    )
     return 0

@@ -19,7 +19,8 @@ def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
     summary = check_robot_file(robot, seed)
     if virtual:
         output.note(summary)
-    _compile(virtual)
+    parts = compilation.LOOP + (compilation.VIRTUAL if virtual else ())
+    compile_parts(parts + (compilation.SURROUNDED if _is_surrounded(robot) else ()))
     _choose_mesh(robot)
     return ModelBuilder(robot)
 
@@ -39,19 +40,31 @@ def _choose_mesh(robot: str) -> None:
         with_chosen_elements(described)
 
 
-def _compile(virtual: bool) -> None:
-    """Wait until all parts are compiled. A part that fails is left to the nodes, which report the error."""
-    missing = compilation.missing(compilation.LOOP + (compilation.VIRTUAL if virtual else ()))
+def _is_surrounded(robot: str) -> bool:
+    """Return whether the robot's file has obstacles or forbidden zones."""
+    from gravcomp.description import load_robot_file
+
+    file = load_robot_file(robot)
+    return bool(file.scene or file.zones)
+
+
+def compile_parts(parts: tuple[str, ...]) -> None:
+    """Wait until these parts are compiled, with a note. A part that fails is left to the nodes, which report the error."""
+    missing = compilation.missing(parts)
     if not missing:
         return
     processes = compilation.start(missing)
     try:
-        with output.console().status("compiling, once for this machine (about a minute)"):
+        what = ", ".join(part.replace("_", " ") for part in missing)
+        text = f"compiling, once for this machine (about a minute): {what}"
+        if not output.console().is_terminal:
+            output.note(text)  # there a status is not shown
+        with output.console().status(text):
             for part, process in zip(missing, processes):
                 _, errors = process.communicate()
                 if process.returncode:
                     last = (errors.strip().splitlines() or [""])[-1]
-                    output.note(f"compiling the {part} failed ({last}); the nodes compile it")
+                    output.note(f"compiling the {part} failed ({last}); it is compiled where it is needed")
     finally:
         for process in processes:
             _end(process)

@@ -9,7 +9,9 @@ field with `edge="mm"` has the key `NAME_mm`, and its value and range are in tha
 """
 
 import dataclasses
+import functools
 import math
+import typing
 from typing import Any
 
 from gravcomp import __version__
@@ -144,6 +146,12 @@ def _release(version: str) -> tuple[int, ...]:
 def parameter_of(field: dataclasses.Field) -> Parameter | None:
     """Return the declaration of the field, or None for a field that was made without `parameter`."""
     return field.metadata.get("parameter")
+
+
+@functools.cache
+def type_hints(cls: type) -> dict[str, Any]:
+    """Return the types of a data class's fields; a node reads its parameters again at every change."""
+    return typing.get_type_hints(cls)
 
 
 def key_of(field: dataclasses.Field) -> str:

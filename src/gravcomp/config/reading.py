@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of
+from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of, type_hints
 from gravcomp.config.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T
     if not isinstance(mapping, dict):
         raise ConfigError(f"{source}: {key or 'the document'} is {_show(mapping)}; a mapping of keys is needed")
     mapping = _with_present_names(cls, mapping, source, key)
-    hints = typing.get_type_hints(cls)
+    hints = type_hints(cls)
     fields = {key_of(f): f for f in dataclasses.fields(cls) if f.init}
     for name in mapping:
         if name not in fields:

@@ -1,10 +1,10 @@
 """From a declared data class to edge keys and edge units: as a mapping for YAML, or as a list of its parameters."""
 
 import dataclasses
-import typing
+import functools
 from typing import TYPE_CHECKING, Any
 
-from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of
+from gravcomp.config.declaration import Parameter, joined, key_of, parameter_of, type_hints
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -39,8 +39,13 @@ def to_mapping(value: "DataclassInstance") -> dict:
 
 def declared_parameters(cls: "type[DataclassInstance]", prefix: str = "") -> list[DeclaredParameter]:
     """Return every parameter of a data class; those of nested data classes have dotted keys."""
-    hints = typing.get_type_hints(cls)
-    leaves = []
+    return list(_declared(cls, prefix))
+
+
+@functools.cache
+def _declared(cls: "type[DataclassInstance]", prefix: str) -> tuple[DeclaredParameter, ...]:
+    hints = type_hints(cls)
+    leaves: list[DeclaredParameter] = []
     for field in dataclasses.fields(cls):
         if not field.init:
             continue
@@ -48,14 +53,14 @@ def declared_parameters(cls: "type[DataclassInstance]", prefix: str = "") -> lis
         kind = hints[field.name]
         declared = parameter_of(field) or Parameter("")
         if isinstance(kind, type) and dataclasses.is_dataclass(kind):
-            leaves += declared_parameters(kind, here)
+            leaves += _declared(kind, here)
             continue
         default = field.default
         if field.default_factory is not dataclasses.MISSING:
             default = field.default_factory()
         default = None if default is dataclasses.MISSING else _plain(default, declared.factor)
         leaves.append(DeclaredParameter(here, kind, default, declared))
-    return leaves
+    return tuple(leaves)
 
 
 def _plain(value: Any, factor: float) -> Any:

@@ -23,10 +23,11 @@ from gravcomp.description.robot_file import RobotFile, load_robot_file, shipped_
 from gravcomp.description.section import Lumen, Section, Station
 from gravcomp.description.section_moments import SectionMoments, section_moments
 from gravcomp.description.segment import Segment
+from gravcomp.description.spring import Spring
 
 __all__ = [
     "BlendedOutline", "Cable", "CableLine", "Cap", "Disks", "Effectors", "Elements", "Fibres", "ImuMount", "Limits", "Lumen",
     "Material", "MaxWrench", "MeshBody", "Outline", "Payload", "Piece", "PointLoad", "PronyTerm", "RestShape", "Robot",
-    "RobotFile", "Section", "SectionMoments", "Segment", "Station", "Transform", "load_robot_file", "section_moments",
+    "RobotFile", "Section", "SectionMoments", "Segment", "Spring", "Station", "Transform", "load_robot_file", "section_moments",
     "shipped_robots",
 ]  # fmt: skip

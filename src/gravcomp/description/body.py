@@ -1,8 +1,12 @@
 """What the robot's body is made of: materials, caps, and how tubes are divided into elements."""
 
 import dataclasses
+import math
 
 from gravcomp.config import parameter
+
+# Below it (kg/m^3) there are no solids but aerogels: the number is in another unit.
+_LIGHTEST = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +61,11 @@ class Material:
     fibres: Fibres | None = parameter(None, description="fibres that make the material stiffer along themselves")
 
     def __post_init__(self) -> None:
+        if 0.0 < self.density < _LIGHTEST:
+            raise ValueError(
+                f"density is {self.density:g} kg/m^3; allowed: 0 (weightless) or {_LIGHTEST:g} to 30000"
+                f" ({self.density:g} g/cm^3 would be {1e3 * self.density:g} kg/m^3)"
+            )
         if not self.prony:
             return
         if self.creep_ratio:
@@ -68,6 +77,12 @@ class Material:
         for time in times:
             if times.count(time) > 1:
                 raise ValueError(f"prony has the time {time:g} s {times.count(time)} times; the terms' times must differ")
+
+    @property
+    def axial_modulus(self) -> float:
+        """Young's modulus along the axis (Pa), with the part of the fibres' stiffness that lies along it."""
+        along = 0.0 if self.fibres is None else self.fibres.ratio * math.cos(self.fibres.angle) ** 4
+        return self.youngs_modulus * (1.0 + along)
 
     @property
     def branches(self) -> tuple[tuple[float, float], ...]:
@@ -97,4 +112,17 @@ class Elements:
     equal_stiffness: bool = parameter(
         False,
         description="let the facets of round walls stand out a little, so that the section bends as stiffly as the round one",
+    )
+    first_layer: float | None = parameter(
+        None,
+        edge="mm",
+        minimum=1e-3,
+        maximum=1000.0,
+        description="thickness of the layer at the clamp, from where layers grow up to an even thickness, instead of grading",
+    )
+    softness: float = parameter(
+        0.0,
+        minimum=0.0,
+        maximum=1.0,
+        description="power with which layers are denser where the body is softer in bending than at its stiffest; 0: not denser",
     )

@@ -113,7 +113,7 @@ def _piece(segment: Segment, start: float, low: float, high: float) -> Piece:
     outer = segment.outline(low), segment.outline(high)
     lumens = tuple(zip(segment.lumen_outlines(low), segment.lumen_outlines(high)))
     start, length = start + low * segment.length, (high - low) * segment.length
-    return Piece(segment.name, "", start, length, outer, lumens, segment.material, _marks(segment, low, high))
+    return Piece(segment.name, "", start, length, outer, lumens, segment.body_material, _marks(segment, low, high))
 
 
 def _marks(segment: Segment, low: float, high: float) -> tuple[float, ...]:
@@ -177,7 +177,7 @@ def _transition(before: Piece, segment: Segment, start: float) -> Piece:
     layers = math.ceil(change / math.log(_AREA_IN_LAYER))
     marks = {*_marks(segment, 0.0, part), *(length * k / layers for k in range(1, layers))}
     piece = Piece(
-        segment.name, "transition", start, length, outer, lumens, segment.material, tuple(sorted(marks))
+        segment.name, "transition", start, length, outer, lumens, segment.body_material, tuple(sorted(marks))
     )  # fmt: skip
     for share in np.linspace(0.0, 1.0, 9):
         try:

@@ -13,6 +13,7 @@ from gravcomp.description.outline import Outline, encloses
 from gravcomp.description.profile import check_stations, size_at
 from gravcomp.description.rest_shape import RestShape
 from gravcomp.description.section import Lumen, Section, Station
+from gravcomp.description.spring import Spring
 
 # A wall thinner than this part of the section's half width cannot be meshed.
 _THINNEST = 0.02
@@ -51,9 +52,14 @@ class Segment:
         " twice as long as the outline moves when not given",
     )  # fmt: skip
     stations: tuple[Station, ...] = parameter((), description="sizes at places along the segment; linear between")
+    spring: Spring | None = parameter(
+        None, description="the segment is a helical spring of this wire, with outer_diameter; its material is the wire's"
+    )
 
     def __post_init__(self) -> None:
         self._check_outline()
+        if self.spring is not None:
+            self._check_spring(self.spring)
         parts = (0.0, *self.breaks, 1.0)
         for part in parts:
             self._check_lumen(part)
@@ -69,7 +75,7 @@ class Segment:
                     f" allowed: more than half the width of the section, {half * 1e3:g} mm"
                 )
         if self.disks is not None:
-            self.disks.check(self.length, 2 * half)
+            self.disks.check(self.length, self.outer_diameter if self.spring else 2 * half)
 
     @property
     def full_length(self) -> float:
@@ -81,16 +87,32 @@ class Segment:
         """Parts of its length, its ends not among them, between which the section changes linearly."""
         return tuple(s.z / self.length for s in self.stations if 1e-9 < s.z / self.length < 1.0 - 1e-9)
 
+    @property
+    def body_material(self) -> Material:
+        """The material of its sections: that of the tube in place of a spring."""
+        return self.material if self.spring is None else self.spring.tube_material(self.material, self.outer_diameter)
+
     def outline(self, part: float) -> Outline:
-        """Return the outline of the section at `part` of the segment's length, 0 at its base to 1 at its tip."""
+        """Return the outline of the section at `part` of the segment's length, 0 at its base to 1 at its tip.
+
+        That of a spring is the outline of the tube in its place.
+        """
+        if self.spring is not None:
+            return Outline.circle(self.spring.diameters(self.outer_diameter, self.material.poissons_ratio)[0])
         if self.section is None:
             return Outline.circle(self._size("outer_diameter", self.outer_diameter, self.tip_outer_diameter, part))
         s = self.section
         width, height = self._size("width", s.width, s.tip_width, part), self._size("height", s.height, s.tip_height, part)
         return Outline(s.shape, width / 2, height / 2)
 
+    def hole_of_disks(self, part: float) -> Outline:
+        """Return the outline of the backbone where a disk holds it."""
+        return Outline.circle(self.outer_diameter) if self.spring is not None else self.outline(part)
+
     def lumen_outlines(self, part: float) -> tuple[Outline, ...]:
         """Return the outlines of the lumens there, the one on the axis first; none in a solid segment."""
+        if self.spring is not None:
+            return (Outline.circle(self.spring.diameters(self.outer_diameter, self.material.poissons_ratio)[1]),)
         found = []
         diameter = self._size("lumen_diameter", self.lumen_diameter, self.tip_lumen_diameter, part)
         if diameter:
@@ -130,9 +152,24 @@ class Segment:
         }
         check_stations(self.stations, self.length, s is None, ends)
 
+    def _check_spring(self, spring: Spring) -> None:
+        """Raise ValueError for what a spring does not have, and for a spring that cannot be wound."""
+        refused = {
+            "section": self.section is not None,
+            "lumen_diameter_mm": self.lumen_diameter > 0.0,
+            "tip_outer_diameter_mm": self.tip_outer_diameter is not None,
+            "lumens": bool(self.lumens),
+            "stations": bool(self.stations),
+            "material.fibres": self.material.fibres is not None,
+        }
+        for key, given in refused.items():
+            if given:
+                raise ValueError(f"segment '{self.name}' has spring and also {key}; give one of them")
+        spring.check(self.outer_diameter)
+
     def _check_lumen(self, part: float) -> None:
         """Raise ValueError where the channel on the axis leaves no wall, naming the keys that say so."""
-        if self.section is not None:
+        if self.section is not None or self.spring is not None:
             return
         inner = self._size("lumen_diameter", self.lumen_diameter, self.tip_lumen_diameter, part)
         outer = 2 * self.outline(part).half_width

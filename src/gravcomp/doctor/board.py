@@ -10,6 +10,7 @@ import can
 from gravcomp.canbus.codec import FrameError, decode, encode
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import CanInterface
+from gravcomp.doctor import board_motor
 from gravcomp.doctor.finding import Finding
 from gravcomp.firmware import requests
 from gravcomp.firmware.client import BoardClient
@@ -23,11 +24,19 @@ _JITTER = 0.5  # ms of the board's stamps
 _DELAY = 5.0  # ms: a tick, two frames and a host that is not a real-time one
 
 
-def examine(interface: str, channel: str, seconds: float = 5.0) -> list[Finding]:
-    """Return the findings of the bench test; `seconds` for the samples and for the heater. What does not answer is a finding."""
+def examine(
+    interface: str, channel: str, seconds: float = 5.0, *, motor: int | None = None, current: float = 0.2
+) -> list[Finding]:
+    """Return the findings of the bench test; `seconds` for the samples and for the heater. What does not answer is a finding.
+
+    motor: CAN id of a motor that is under power, of which a step to `current` (A) is measured.
+    """
     try:
         with BoardClient(CanInterface(interface, channel)) as client:
-            return _version(client) + _samples(client, seconds) + _answers(client) + _heater(client, seconds) + _state(client)
+            found = _version(client) + _samples(client, seconds) + _answers(client) + _heater(client, seconds)
+            if motor is not None:
+                found += board_motor.examine(client, motor, current)
+            return found + _state(client)
     except ConfigError as error:
         return [Finding("missing", "board", str(error), "see src/doc/firmware.md")]
 

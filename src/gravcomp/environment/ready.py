@@ -55,6 +55,9 @@ def environment(root: Path, paths: "dict[str, str]") -> "dict[str, str]":
     result.update(middleware(os.environ))
     if paths.get("bootstrapped"):
         result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
+    # Who wants no bytecode next to the sources gets it elsewhere: without any, every process compiles for one to two seconds.
+    if result.pop("PYTHONDONTWRITEBYTECODE", ""):
+        result.setdefault("PYTHONPYCACHEPREFIX", str(root / ".workspace" / "bytecode"))
     # One thread for matrices of this size.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         result.setdefault(name, "1")

@@ -6,11 +6,13 @@ kernel of the listener.
 """
 
 import threading
+import time
 
 import can
 
 from gravcomp.canbus import c610, codec
 from gravcomp.canbus.bus import BusError, open_bus
+from gravcomp.canbus.link import CanLink
 from gravcomp.description.hardware import CanInterface
 
 # Listening takes part of a core at full bus load, so it is done in short intervals.
@@ -52,6 +54,17 @@ class DelayListener:
                         break
                     frames.append(frame)
             self.delays += delays_of(frames)
+
+
+def delays_during(settings: CanInterface, duration: float) -> list[float]:
+    """Listen to a bus for `duration` (s) and return the latencies (s). Raises BusError when it cannot be opened."""
+    ids = [codec.layout(name).frame_id for name in ("ImuTime", "CommandTrace", *c610.COMMANDS)]
+    link, frames, end = CanLink(settings, ids), [], time.monotonic() + duration
+    link.open()
+    while time.monotonic() < end:
+        frames += link.receive(0.05)
+    link.close()
+    return delays_of(frames)
 
 
 def delays_of(frames: list[can.Message]) -> list[float]:

@@ -13,15 +13,16 @@ from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import Case, errors_to, target_of
+from gravcomp.trials.holding import Case, errors_to, lasting, target_of
 from gravcomp.virtual.motion import SyntheticMotion, base_orientation, turned
 
 TITLE = "Latency, and prediction of gravity"
 
 DELAYS = (0, 1, 3, 10, 30, 300)  # samples of 10 ms; the last is the article's
 _BRIEF_DELAYS = (0, 10)
-_START, _DURATION = 3.0, 12.0  # s
+_START, _DURATION = 3.0, 12.0  # s, at least, before the base swings; s, two of its periods
 _BRIEF_START, _BRIEF_DURATION = 1.5, 2.0  # s
+_PERIODS = 11.0  # first periods of the robot that the start lasts at least
 _WARM_UP, _LISTEN = 5.0, 15.0  # s
 _BRIEF_WARM_UP, _BRIEF_LISTEN = 0.5, 1.5  # s
 _LONGEST_HORIZON = 0.5  # s, limit of the estimator
@@ -160,7 +161,7 @@ class _Run:
 def _swing(job: tuple[Setup, int, bool, bool]) -> _Run:
     """Run one case. job: (setup, delay in samples, whether gravity is predicted, whether the run is brief)."""
     setup, delay, predicted, brief = job
-    start, duration = (_BRIEF_START, _BRIEF_DURATION) if brief else (_START, _DURATION)
+    start, duration = (_BRIEF_START, _BRIEF_DURATION) if brief else (lasting(setup, _START, _PERIODS), _DURATION)
     if predicted:
         horizon = min(delay * SAMPLE_PERIOD, _LONGEST_HORIZON)
         prediction = dataclasses.replace(setup.estimator.prediction, horizon=horizon)

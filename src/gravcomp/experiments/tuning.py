@@ -7,9 +7,10 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.calibration.course import COURSE_OPTIONS, predict_course
+from gravcomp.calibration.course import course_options, predict_course
 from gravcomp.calibration.measured import Measured
 from gravcomp.calibration.motion import fit_motion
+from gravcomp.calibration.parameters import with_moduli
 from gravcomp.description import Robot
 from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
@@ -19,21 +20,26 @@ from gravcomp.trials.known_robot import Recovered, recover
 
 TITLE = "Tuning: grid against calibration"
 
-MODULI = (0.50, 0.65, 0.80, 1.00, 1.20)  # MPa
+MODULI = (0.50, 0.65, 0.80, 1.00, 1.20)  # MPa, of the article's robot; that of another is varied by the same ratios
+_MODULUS = 0.80  # MPa, described for the article's robot
 RAYLEIGH = (0.10, 0.30, 0.50, 0.70, 1.00)  # C: alpha in 1/s and beta in s have the same value, as in the article
+_PERIOD = 0.28  # s, first period of the article's robot; another robot's alpha and beta are as large for its own period
 POSES = ((0.0, 0.0), (45.0, 0.0), (-45.0, 90.0))  # inclination, roll in deg
-_DURATION, _BRIEF_DURATION = 1.5, 0.35  # s
+_FALL, _BRIEF_FALL = 5.4, 1.3  # first periods of the robot
 
 
 def run(context: Context) -> Result:
     """Run the experiment."""
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
+    factor = 1e-6 * setup.robot.materials[0].youngs_modulus / _MODULUS
     moduli, dampings = (MODULI[1:3], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
-    duration = _BRIEF_DURATION if context.brief else _DURATION
+    moduli = tuple(factor * modulus for modulus in moduli)
+    slower = setup.first_period / _PERIOD
+    duration = (_BRIEF_FALL if context.brief else _FALL) * setup.first_period
     falls = context.map(free_fall, [(setup, *pose, duration, trial) for trial, pose in enumerate(poses)], "free falls for tuning")
     pairs = [(m, c) for m in moduli for c in dampings]
-    errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c) for m, c in pairs], "grid")))
+    errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c, slower) for m, c in pairs], "grid")))
     best = min(pairs, key=lambda pair: total(errors[pair]))
     # Only modulus and damping, as in the grid: two parameters against two.
     fit = fit_motion(
@@ -74,7 +80,7 @@ def run(context: Context) -> Result:
             ),
             Plot(
                 "Fall in the first pose",
-                _fall(setup.robot, falls[0], best, fit.predicted[0]),
+                _fall(setup.robot, falls[0], best, slower, fit.predicted[0]),
                 "Lateral tip position. With the Rayleigh damping of the grid, whose stiffness part is 0.1 s and more, the"
                 " robot is overdamped: it sinks slowly and does not swing as the virtual robot does.",
             ),
@@ -106,17 +112,22 @@ def total(error: np.ndarray) -> float:
     return float((1e3 * error).sum() * np.var(1e3 * error))
 
 
-def _pair(job: tuple[Robot, list[Measured], float, float]) -> np.ndarray:
+def _pair(job: tuple[Robot, list[Measured], float, float, float]) -> np.ndarray:
     """Return the errors (t,) in m of all falls with one pair of modulus and damping."""
-    robot, falls, modulus, damping = job
-    return np.concatenate(
-        [np.linalg.norm(_rayleigh_fall(robot, fall, modulus, damping) - fall.tip_position, axis=1) for fall in falls]
+    robot, falls, *pair = job
+    return np.concatenate([np.linalg.norm(_rayleigh_fall(robot, fall, *pair) - fall.tip_position, axis=1) for fall in falls])
+
+
+def _rayleigh_fall(robot: Robot, fall: Measured, modulus: float, damping: float, slower: float) -> np.ndarray:
+    """Return the tip's course (t, 3) in m; modulus in MPa of the first segment, the others by the same ratio.
+
+    damping: C of the article's robot; slower: first period over that robot's.
+    """
+    options = dataclasses.replace(
+        course_options(robot), damping="rayleigh", rayleigh_mass=damping / slower, rayleigh_stiffness=damping * slower
     )
-
-
-def _rayleigh_fall(robot: Robot, fall: Measured, modulus: float, damping: float) -> np.ndarray:
-    options = dataclasses.replace(COURSE_OPTIONS, damping="rayleigh", rayleigh_mass=damping, rayleigh_stiffness=damping)
-    return predict_course(robot.with_material(youngs_modulus=modulus * 1e6), fall, options)[0]
+    moduli = np.array([material.youngs_modulus for material in robot.materials])
+    return predict_course(with_moduli(robot, moduli * modulus * 1e6 / moduli[0]), fall, options)[0]
 
 
 def _rms(error: np.ndarray) -> float:
@@ -158,11 +169,11 @@ def _heat_map(moduli: tuple, dampings: tuple, errors: dict, best: tuple, calibra
     return drawing.svg
 
 
-def _fall(robot: Robot, fall: Measured, best: tuple, calibrated: np.ndarray) -> str:
+def _fall(robot: Robot, fall: Measured, best: tuple, slower: float, calibrated: np.ndarray) -> str:
     with Drawing(width=9.0, height=3.2) as drawing:
         axes = drawing.axes
         axes.plot(fall.time, 1e3 * fall.tip_position[:, 0], color=REAL, label="virtual robot")
-        axes.plot(fall.time, 1e3 * _rayleigh_fall(robot, fall, *best)[:, 0], color=WITHOUT, label="best pair of the grid")
+        axes.plot(fall.time, 1e3 * _rayleigh_fall(robot, fall, *best, slower)[:, 0], color=WITHOUT, label="best pair of the grid")
         axes.plot(fall.time, 1e3 * calibrated[:, 0], color=MODEL, label="calibration")
         axes.set_xlabel("time in s")
         axes.set_ylabel("lateral tip position in mm")

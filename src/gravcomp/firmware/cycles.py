@@ -16,6 +16,7 @@ from typing import Any
 
 from gravcomp.firmware.emulator.core import CCM, CCM_SIZE, FLASH, FLASH_SIZE, RAM, RAM_SIZE, RETURN, Core
 from gravcomp.firmware.image import Image
+from gravcomp.firmware.model_settings import CABLES_MAX
 
 CLOCK_HZ = 168e6
 MODEL_AT = 0x08040000
@@ -204,11 +205,14 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
 def table_waits(blob: bytes) -> int:
     """Return the cycles for which a step waits for the model's tables, read line by line of 16 bytes, with nothing in the cache.
 
-    The step reads B and the pieces of the cables twice, the cables' stiffness once, and the tip's section for each cable.
+    The step reads B, the pieces of the cables and the points of the law twice, the cables' stiffness once, and the tip's section
+    for each cable; of some points of the law it computes the stiffness.
     """
-    modes, strains, cables, pieces = struct.unpack_from("<4I", blob, 32)
+    modes, strains, cables, pieces, _, _, points, _ = struct.unpack_from("<8I", blob, 32)
+    share = int(struct.unpack_from("<f", blob, len(blob) - 4 * (CABLES_MAX + 1) - -(-pieces // 4) * 4)[0])
     pairs = modes * (modes + 1) // 2
     floats = pairs * (2 * strains + cables) + 6 * pieces * modes + 3 * modes + 9 * modes * (cables + 1)
+    floats += 18 * modes * points + min(points, share) * (81 * modes + 9 * pairs // 4)
     return _WAIT * (4 * floats >> _LINE)
 
 

@@ -28,10 +28,10 @@ class HostRun:
     command: np.ndarray
 
 
-def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.ndarray) -> HostRun:
+def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.ndarray, *, rise: bool = False) -> HostRun:
     """Return the loop's run over gravities (n, 3) from the straight robot with its cables at 0.
 
-    Before that the first one rises from zero over LOADING_STEPS, and the command with it.
+    Before that the first one rises from zero over LOADING_STEPS, and the command with it. rise: these steps are rows, too.
     """
     simulator, target = Simulator(model), parameters.straight
     controller = InverseController(model.robot, parameters.controller.inverse)
@@ -40,7 +40,7 @@ def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.nda
     rising = np.arange(1, LOADING_STEPS)[:, None] / LOADING_STEPS * gravities[0]
     rows = []
     for gravity in (*rising, *gravities):
-        shape = simulator.step(gravity, wound)
+        shape = simulator.step(gravity, wound, duration=SAMPLE_PERIOD)
         command = controller.step(
             shape.response,
             target,
@@ -51,7 +51,7 @@ def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.nda
         )
         rows.append((gravity, wound, shape.tip_position, command.displacement))
         wound = command.displacement
-    return HostRun(*(np.array(column) for column in zip(*rows[len(rising) :])))
+    return HostRun(*(np.array(column) for column in zip(*rows[0 if rise else len(rising) :])))
 
 
 def turning_gravity(rate: float, seed: int, steps: int, gravity: float = 9.81) -> np.ndarray:

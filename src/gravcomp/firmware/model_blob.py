@@ -3,18 +3,24 @@
 import dataclasses
 import struct
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
 
 from gravcomp.cache import content_key
 from gravcomp.description import Robot
+from gravcomp.firmware.model_settings import SAMPLE_PERIOD
+from gravcomp.full_model.viscosity import branch
+from gravcomp.materials.laws import LAWS
+from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
-MAGIC, VERSION = b"GCMB", 1
+MAGIC, VERSION = b"GCMB", 2
 TILE = 4
-SETTINGS = 74  # floats of gc_settings
-MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX = 48, 96, 192, 64
+SETTINGS = 75  # floats of gc_settings
+MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX, BRANCHES_MAX = 48, 96, 192, 64, 128, 4
+LAW_FLOATS, BRANCH_FLOATS = 6, 3
 _HEADER = struct.Struct("<4sIII16s8I")
 _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis
 
@@ -46,11 +52,19 @@ def truncated(model: ReducedModel, modes: int, extra: int) -> ReducedModel:
     )
 
 
-def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension: np.ndarray) -> bytes:
+def pack(
+    model: ReducedModel,
+    robot: Robot,
+    settings: np.ndarray,
+    least_tension: np.ndarray,
+    branches: Sequence[tuple[float, float]] = (),
+    period: float = SAMPLE_PERIOD,
+) -> bytes:
     """Return the blob.
 
-    model: with a multiple of four modes; settings (n,): of `model_settings.settings`; least_tension (m,) in N. Raises
-    ValueError for a model that the blob cannot hold; `model_fit` finds that out before.
+    model: with a multiple of four modes; settings (n,): of `model_settings.settings`; least_tension (m,) in N; branches: of
+    `description.Material`, the same in the whole robot; period: s between two steps. Raises ValueError for a model that the blob
+    cannot hold; `model_fit` finds that out before.
     """
     modes, cables = model.size, model.cables
     linear, quadratic = model.elasticity.linear, model.elasticity.quadratic
@@ -73,15 +87,42 @@ def pack(model: ReducedModel, robot: Robot, settings: np.ndarray, least_tension:
         cables.sheath_angle,
         cables.free_length,
         least_tension,
+        model.deviation.gradient.reshape(modes, 9, -1).transpose(2, 0, 1),
+        law_constants(model.deviation),
+        _branch_table(branches, period),
         settings,
     )
     count = len(cables.cable)
     body = b"".join(np.ascontiguousarray(table, dtype="<f4").tobytes() for table in tables)
     body += cables.cable.astype("u1").tobytes() + bytes(-count % 4)
     points = len(model.section_rest) - 1
-    counts = (modes, linear.shape[1] + missing, len(cables.rest_length), count, len(settings), points, 0, 0)
+    counts = (
+        modes,
+        linear.shape[1] + missing,
+        len(cables.rest_length),
+        count,
+        len(settings),
+        points,
+        len(model.deviation.weight),
+        len(branches),
+    )
     header = _HEADER.pack(MAGIC, VERSION, _HEADER.size + len(body), 0, robot_digest(robot), *counts)
     return with_crc(header + body)
+
+
+def law_constants(deviation: LawDeviation) -> np.ndarray:
+    """Return the constants (p, 6) of gc_law: weight times lambda, mu, c10, c20, c30 and c01 in Pa."""
+    rows = np.zeros((len(deviation.weight), LAW_FLOATS))
+    for row, weight, law, constants in zip(rows, deviation.weight, deviation.law, deviation.constants):
+        c10 = 0.5 * constants[1]
+        if law == LAWS["mooney_rivlin"].code:
+            c10 /= 1.0 + constants[2]
+            row[5] = constants[2] * c10
+        elif law == LAWS["yeoh"].code:
+            row[3:5] = c10 * constants[2:4]
+        row[:3] = constants[0], constants[1], c10
+        row *= weight
+    return rows
 
 
 def with_crc(blob: bytes) -> bytes:
@@ -89,11 +130,18 @@ def with_crc(blob: bytes) -> bytes:
     return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
 
 
-def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int) -> int:
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int, law_points: int = 0, branches: int = 0) -> int:
     """Return the number of bytes of a blob with these counts."""
     floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
     floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
+    floats += law_points * (9 * modes + LAW_FLOATS) + branches * BRANCH_FLOATS
     return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
+
+
+def _branch_table(branches: Sequence[tuple[float, float]], period: float) -> np.ndarray:
+    """Return ratio, decay and gain (b, 3) of the branches over a period in s."""
+    ratio, time = np.array(branches, dtype=float).reshape(-1, 2).T
+    return np.column_stack([ratio, *branch(period, time)])
 
 
 def _cable_stiffness(model: ReducedModel) -> np.ndarray:

@@ -10,12 +10,13 @@ import struct
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import Hardware
 from gravcomp.firmware.sources import CORE, firmware_folder
+from gravcomp.thermal import HeaterOptions
 
 REAL = frozenset(
     {
         "travel_per_count", "displacement_min", "displacement_max", "velocity_limit", "acceleration_limit", "position_gain",
         "velocity_gain", "velocity_integral", "newton_per_ampere", "tension_limit", "pretension", "homing_velocity",
-        "homing_travel", "homing_slack", "following_error", "overspeed",
+        "homing_travel", "homing_slack", "following_error", "overspeed", "heater_gain", "heater_integral_time",
     }
 )  # fmt: skip
 """Parameters that are float32."""
@@ -120,4 +121,17 @@ def settings_of(hardware: Hardware, *, between: bool) -> dict[str, float]:
         "following_error": watchdog.following_error,
         "overspeed": watchdog.overspeed,
         "stall_time": round(1000.0 * watchdog.stall_time),
+    }
+
+
+def settings_alone(heater: HeaterOptions) -> dict[str, float]:
+    """Return the parameters of a board whose robot has no host: it homes, runs its loop, and heats the IMU as the options say."""
+    return {
+        "at_start": 1,
+        "heater_own": int(heater.enabled),
+        "heater_target": 0 if heater.target is None else round(min(heater.target, heater.highest_target)),
+        "heater_rise": round(heater.rise),
+        "heater_limit": round(1e4 * heater.pid.highest),
+        "heater_gain": heater.pid.gain,
+        "heater_integral_time": heater.pid.integral_time,
     }

@@ -10,29 +10,42 @@ import dataclasses
 import math
 
 from gravcomp.description import Elements, Robot
+from gravcomp.mesh.layers import layers_of
 
 _STRONGEST = 8.0
 _FLATTEST = 0.45
 _DEEPEST = 1.4
+# A body is slender if the first of so many layers is thicker with the strongest grading than it has to be for a coarse section.
+_SLENDER, _COARSE = 24, Elements(around=6, along=10, radial=1)
 
 
 def with_grading(robot: Robot, elements: Elements) -> Elements:
-    """Return the elements with the strongest grading up to 8 whose first layer is at least 0.45 x as thick as it is wide."""
-    outline = robot.segments[0].outline(0.0)
-    lumens = robot.segments[0].lumen_outlines(0.0)
-    half = min(outline.half_width, outline.half_height)
-    inner = min(lumens[0].half_width, lumens[0].half_height) if lumens else 0.0
-    if lumens:
-        width = min((half - inner) / elements.radial, math.pi * (half + inner) / elements.around)
-    else:
-        width = 2.0 * half / (elements.around / 4 + 2 * elements.radial)
+    """Return the elements with the strongest grading up to 8 whose first layer is at least 0.45 x as thick as it is wide.
+
+    A slender body gets a first layer as thick as that, as its layers stay thicker whatever their grading.
+    """
+    if _first(robot, dataclasses.replace(elements, along=_SLENDER), _STRONGEST) > _FLATTEST * _width(robot, _COARSE):
+        thickness = float(f"{_FLATTEST * _width(robot, elements):.3g}")
+        return dataclasses.replace(elements, grading=1.0, first_layer=thickness)
+    thinnest = _FLATTEST * _width(robot, elements)
     low, high = 1.0, _STRONGEST
-    if _first(robot.length, elements.along, high) >= _FLATTEST * width:
+    if _first(robot, elements, high) >= thinnest:
         return dataclasses.replace(elements, grading=high)
     for _ in range(20):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _first(robot.length, elements.along, middle) >= _FLATTEST * width else (low, middle)
+        low, high = (middle, high) if _first(robot, elements, middle) >= thinnest else (low, middle)
     return dataclasses.replace(elements, grading=round(low, 2))
+
+
+def _width(robot: Robot, elements: Elements) -> float:
+    """Smallest width (m) of the elements across the base's section."""
+    outline = robot.segments[0].outline(0.0)
+    lumens = robot.segments[0].lumen_outlines(0.0)
+    half = min(outline.half_width, outline.half_height)
+    if not lumens:
+        return 2.0 * half / (elements.around / 4 + 2 * elements.radial)
+    inner = min(lumens[0].half_width, lumens[0].half_height)
+    return min((half - inner) / elements.radial, math.pi * (half + inner) / elements.around)
 
 
 def deep_cells(robot: Robot, elements: Elements) -> bool:
@@ -47,7 +60,6 @@ def deep_cells(robot: Robot, elements: Elements) -> bool:
     return False
 
 
-def _first(length: float, along: int, grading: float) -> float:
-    """Thickness (m) of the first of the layers in geometric progression."""
-    ratio = grading ** (1.0 / max(along - 1, 1))
-    return length / along if ratio == 1.0 else length * (ratio - 1.0) / (ratio**along - 1.0)
+def _first(robot: Robot, elements: Elements, grading: float) -> float:
+    """Thickness (m) of the first of the layers."""
+    return float(layers_of(robot.pieces, elements.along, grading, softness=elements.softness)[0][1])

@@ -24,16 +24,17 @@ from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
 from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, mesh_loads, shapes_under
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.mesh.layers import least_layers
+from gravcomp.mesh.layers import least_layers, softest
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.refusal import well_shaped
+from gravcomp.mesh.quality import mesh_quality
+from gravcomp.mesh.refusal import LEAST_JACOBIAN_RATIO, well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
 from gravcomp.whole_file import write_whole
 
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 4  # part of the key; to be raised when the choice changes
+_FORMAT = 5  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -41,6 +42,8 @@ _ORDER = {"along": 1.0, "around": 1.5, "radial": 1.0}
 # The sections are measured only where the change along the robot is within this part of `ACCURACY`.
 _ALONG_FIRST = 1.0
 _START_ALONG = 8
+# The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
+_SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
 
 
@@ -113,19 +116,23 @@ def _choose(robot: Robot) -> MeshChoice:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
         gains: dict[str, float] = {}
+        meshes: dict[str, Elements] = {}
         for direction in _ORDER:
-            finer = _finer(robot, here, direction)
-            if finer == here or tips.unknowns(finer) > _MOST_UNKNOWNS:
+            finer = tips.finer(here, direction)
+            if finer is None:
                 continue
             twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
             changes[direction] = twice * tips.change(here, finer)
+            if tips.unknowns(finer) > _MOST_UNKNOWNS:  # too many to be used, but the error has to be known
+                continue
+            meshes[direction] = finer
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
         error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
-        here = _not_deep(robot, _finer(robot, here, max(gains, key=lambda direction: gains[direction])))
+        here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
 
 
 def _to_twice(number: int, finer: int, direction: str) -> float:
@@ -161,6 +168,15 @@ class _Tips:
             self._unknowns[elements] = 3 * len(tube_mesh(dataclasses.replace(self._robot, elements=elements)).nodes)
         return self._unknowns[elements]
 
+    def finer(self, elements: Elements, direction: str) -> Elements | None:
+        """Return the next mesh in a direction that has more unknowns and a good shape; None where there is none."""
+        here = elements
+        while (finer := _finer(self._robot, here, direction)) != here:
+            if self.unknowns(finer) > self.unknowns(elements):
+                return finer if _is_well_shaped(self._robot, finer) else None
+            here = finer
+        return None
+
     def change(self, one: Elements, other: Elements) -> np.ndarray:
         """Return the change of the tips (l, 3) from one mesh to another, over the length."""
         for _ in range(TIMES):
@@ -190,13 +206,35 @@ def _start(robot: Robot) -> Elements:
     around = 4 if coarse_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
     # Between disks the layers are even; else they are graded towards the clamp, whose corner is singular.
-    start = Elements(around=around, along=along, radial=1, grading=1.0, equal_stiffness=True)
+    start = Elements(
+        around=around, along=along, radial=1, grading=1.0, equal_stiffness=True, softness=0.0 if disks else _softness(robot)
+    )
     shaped = well_shaped(robot, start)
     if shaped is None:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
-    return _not_deep(robot, shaped if disks else with_grading(robot, shaped))
+    return _not_deep(robot, shaped if disks else _graded(robot, shaped))
+
+
+def _graded(robot: Robot, elements: Elements) -> Elements:
+    """The well-shaped elements with the grading that suits them, where needed more along the robot; else without it."""
+    for more in (1.0, 1.5, 2.0, 3.0):
+        graded = with_grading(robot, dataclasses.replace(elements, along=min(round(more * elements.along), 500)))
+        if _is_well_shaped(robot, graded):
+            return graded
+    return elements
+
+
+def _is_well_shaped(robot: Robot, elements: Elements) -> bool:
+    """Whether a mesh with these elements would not be refused."""
+    mesh = tube_mesh(dataclasses.replace(robot, elements=elements))
+    return mesh_quality(mesh).jacobian_ratio >= LEAST_JACOBIAN_RATIO
+
+
+def _softness(robot: Robot) -> float:
+    """The power with which layers are denser where the body is soft: none where the layers would hardly move."""
+    return _SOFTNESS if softest(robot.pieces) < _ALIKE else 0.0
 
 
 def _not_deep(robot: Robot, elements: Elements) -> Elements:

@@ -40,7 +40,13 @@ def _twice_as_fine(model: RobotModel) -> RobotModel:
     """Return the model on a mesh that is twice as fine each way. Raises MeshError."""
     elements = model.robot.elements
     if elements is not None:
-        twice = dataclasses.replace(elements, around=2 * elements.around, along=2 * elements.along, radial=2 * elements.radial)
+        twice = dataclasses.replace(
+            elements,
+            around=2 * elements.around,
+            along=2 * elements.along,
+            radial=2 * elements.radial,
+            first_layer=elements.first_layer and elements.first_layer / 2,
+        )
         return RobotModel(dataclasses.replace(model.robot, elements=twice))
     if model.mesh.kind != "tet10":
         raise MeshError(f"the mesh of the file is of kind {model.mesh.kind}, and is not refined: compare with a finer file")

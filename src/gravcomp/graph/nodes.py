@@ -106,6 +106,7 @@ NODES = (
         f"{_PARAMETERS}.fem_simulator:FemSimulatorParameters",
         subscribes=(
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2, in soft_base"),
+            Port("imu/data", "sensor_msgs/msg/Imu", "rate of the base in rad/s (turn.enabled)", optional=True),
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "cable displacements in m (cables_from: command)"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "cable displacements in m (cables_from: state)", optional=True),
             Port("external/wrench", "geometry_msgs/msg/WrenchStamped", "known force (N) and moment (N m); the frame says where"),
@@ -148,11 +149,14 @@ NODES = (
         subscribes=(
             Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "rotation from soft_base to world"),
             Port("virtual/fault", "std_msgs/msg/String", "fault as YAML, {kind: stall, cable: s1c2, duration: 1.0}, or 'clear'"),
+            Port("virtual/hand", "std_msgs/msg/String", "spring that pulls the tip to {place_mm: [9, 0, 95]}, or 'release'"),
+            Port("virtual/wall", "std_msgs/msg/String", "wall in the keys of scene.planes, {normal: [1, 0, 0], ...}, or 'clear'"),
         ),
         publishes=(
             Port("truth/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; only for evaluation"),
             Port("truth/backbone", "geometry_msgs/msg/PoseArray", "backbone in soft_base, m; only for evaluation"),
             Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in soft_base, m/s^2; only for evaluation"),
+            Port("truth/forces", "gravcomp_msgs/msg/VirtualForces", "forces of walls and of a hand, N; only for evaluation"),
             Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip as a tracker measures it, m", optional=True),
             Port("measured/tension", "sensor_msgs/msg/JointState", "tensions as load cells measure them, N", optional=True),
             _DIAGNOSTICS,
@@ -215,11 +219,15 @@ NODES = (
             Port("target", "geometry_msgs/msg/PoseStamped", "current target"),
             Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "current target"),
             Port("truth/backbone", "geometry_msgs/msg/PoseArray", "shape of the virtual robot, where there is one"),
+            Port("truth/forces", "gravcomp_msgs/msg/VirtualForces", "forces on the virtual robot, where there is one"),
+            Port("estimated/wrench", "gravcomp_msgs/msg/WrenchEstimate", "unknown load at the tip"),
         ),
         publishes=(
             Port("target/shape", "gravcomp_msgs/msg/ShapeTarget", "target set on the page"),
             Port("virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", "tilt of the base set on the page"),
             Port("virtual/fault", "std_msgs/msg/String", "fault set on the page"),
+            Port("virtual/hand", "std_msgs/msg/String", "place to which the user drags the tip of the virtual robot"),
+            Port("virtual/wall", "std_msgs/msg/String", "wall that the user puts next to the virtual robot"),
             _DIAGNOSTICS,
         ),
     ),

@@ -12,15 +12,29 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.compiled_functions import compiled_folder, configure_numba
 from gravcomp.environment.end_with_parent import end_with_parent
+
+if TYPE_CHECKING:
+    from gravcomp.full_model.robot_model import RobotModel
+    from gravcomp.reduction.reduced_model import ReducedModel
 
 LOOP = ("model", "controller")
 """Parts of the nodes of the loop."""
 
 VIRTUAL = ("virtual_robot",)
 """Parts of the virtual robot."""
+
+SURROUNDED = ("contact", "surroundings")
+"""Parts of a robot with obstacles or zones around it, of the model and of the controller; the set-up does not compile them."""
+
+REDUCED = ("reduced",)
+"""Part of the reduced model, at rest and in motion, which is otherwise compiled when one is built."""
+
+PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED
+"""All parts."""
 
 
 def missing(parts: Iterable[str]) -> list[str]:
@@ -47,8 +61,13 @@ def compile_part(part: str) -> None:
     with open(folder / f"{part}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not mark.exists():
-            _WORK[part]()
+            run_part(part)
             mark.touch()
+
+
+def run_part(part: str) -> None:
+    """Call all functions of a part, which compiles them or loads them from the cache."""
+    _WORK[part]()
 
 
 def _mark(folder: Path, part: str) -> Path:
@@ -65,6 +84,58 @@ def _model() -> None:
     simulator, released = Simulator(robot, reduced=False), np.zeros(len(robot.cables))
     for gravity, cables in ((np.zeros(3), None), (np.zeros(3), released), (np.array([0.0, 0.0, -9.81]), released)):
         simulator.step(gravity, cables)
+
+
+def _contact() -> None:
+    """Let the article's robot lie on a floor that rubs, with the full model and with a reduced one of a few shapes."""
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.reduction.serving import ReducedServing
+    from gravcomp.scene import PlaneWall, SceneSection
+    from gravcomp.scene.scene import Scene
+    from gravcomp.simulation import Simulator
+
+    robot = load_robot_file("article").robot
+    floor = PlaneWall(name="floor", normal=(1.0, 0.0, 0.0), point=(-0.1 * robot.length, 0.0, 0.0), friction=0.2)
+    simulator = Simulator(robot, reduced=False, scene=Scene(SceneSection(planes=(floor,))))
+    for cables in (None, np.zeros(len(robot.cables))):
+        simulator.step(np.array([-9.81, 0.0, 0.0]), cables)
+    ReducedServing(simulator.model, _small_reduced_model(simulator.model), simulator.solver).warm_up()
+
+
+def _reduced() -> None:
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.full_model.cable_input import CableInput
+    from gravcomp.full_model.robot_model import RobotModel
+    from gravcomp.full_model.statics import StaticSolver
+    from gravcomp.reduction.motion import ReducedDynamicSolver
+    from gravcomp.reduction.serving import ReducedServing
+
+    model = RobotModel(load_robot_file("article").robot)
+    reduced, gravity = _small_reduced_model(model), np.array([-9.81, 0.0, 0.0])
+    ReducedServing(model, reduced, StaticSolver(model)).warm_up()
+    mass = reduced.basis.T @ model.mass_matrix().multiply(reduced.basis)
+    solver = ReducedDynamicSolver(reduced, mass, model.mesh.materials[0].damping_time, model.length)
+    solver.place(np.zeros(reduced.size), np.zeros(model.tendons.count), gravity)
+    solver.step(gravity, CableInput(), 5e-3)
+
+
+def _small_reduced_model(model: "RobotModel") -> "ReducedModel":
+    """Return a reduced model from a few shapes, which is not stored: it has the types of every other one."""
+    from gravcomp.training import BuildOptions, TrainingOptions
+    from gravcomp.training.build import trained
+
+    return trained(model, BuildOptions(modes=8, strains=4, training=TrainingOptions(paths=2, steps=8))).reduced_model(model)
+
+
+def _surroundings() -> None:
+    from gravcomp.description import load_robot_file
+    from gravcomp.inverse import warm_up
+
+    warm_up(load_robot_file("article").robot, surrounded=True)
 
 
 def _controller() -> None:
@@ -86,7 +157,14 @@ def _virtual_robot() -> None:
     warm_up()
 
 
-_WORK = {"model": _model, "controller": _controller, "virtual_robot": _virtual_robot}
+_WORK = {
+    "model": _model,
+    "controller": _controller,
+    "virtual_robot": _virtual_robot,
+    "reduced": _reduced,
+    "contact": _contact,
+    "surroundings": _surroundings,
+}
 
 
 def main(parts: list[str]) -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 from gravcomp.launcher.host_client import MARK, NodeHost
 from gravcomp.launcher.node_process import NodeProcess, NodeSpec, stop_together
 
+_POLL = 0.02  # s
 _LEFTOVER_PATIENCE = 2.0  # s between SIGTERM and SIGKILL
 
 
@@ -56,10 +57,10 @@ class Graph:
             self.stop()
             raise
 
-    def start_one(self, spec: NodeSpec) -> NodeProcess:
-        """Start one node, or start it again."""
+    def start_one(self, spec: NodeSpec, *, gated: bool = False) -> NodeProcess:
+        """Start one node, or start it again; gated: it becomes active when its gate is opened."""
         log = self.logs / (spec.name.strip("/").replace("/", "_") + ".log")
-        process = NodeProcess(spec, log, self._environment, self._host)
+        process = NodeProcess(spec, log, self._environment, self._host, gated=gated)
         self.processes[spec.name] = process
         return process
 
@@ -74,8 +75,8 @@ class Graph:
             raise NodeDied("; ".join(f"{name} {why}" for name, why in dead.items()))
 
     def were_active(self) -> bool:
-        """Whether every node has become active since it was started."""
-        return all(process.was_active for process in self.processes.values())
+        """Whether every node has become active since it was started, apart from those whose gate is closed."""
+        return all(process.was_active for process in self.processes.values() if not process.gated)
 
     def states(self) -> dict[str, str]:
         """Return 'running' or the reason of its end for each node."""
@@ -88,7 +89,7 @@ class Graph:
             self.check()
             if time.monotonic() > end:
                 raise TimeoutError(f"{what} did not happen within {timeout:.0f} s; the nodes' output is in {self.logs}")
-            time.sleep(0.05)
+            time.sleep(_POLL)
 
     def stop_except(self, executable: str) -> None:
         """End all nodes in parallel, but not those of this executable."""

@@ -40,6 +40,7 @@ SHARED_MODULES = (
     "gravcomp_estimation.imu_estimator",
     "gravcomp_fem.composed_loop",
     "gravcomp_hw.virtual_robot",
+    "gravcomp.launcher.preload:load_type_supports",
     "gravcomp.launcher.preload:call_compiled",
 )
 """Modules that a host imports for the nodes of a graph. The viewer's are not among them: no other node needs them."""

@@ -24,6 +24,9 @@ _PATIENCE = (5.0, 3.0)
 ACTIVE_FILE = "GRAVCOMP_ACTIVE_FILE"
 """Environment variable with the path of a file that a node creates when it becomes active at its start."""
 
+GATE_FILE = "GRAVCOMP_GATE_FILE"
+"""Environment variable with the path of a file: a node that has configured itself at its start waits for it to become active."""
+
 
 class LaunchError(RuntimeError):
     """A node cannot be started; the text tells the user why."""
@@ -86,21 +89,39 @@ def find_executable(package: str, executable: str) -> str:
 class NodeProcess:
     """A running node. Raises LaunchError when it cannot be started.
 
-    log: file of its output; environment: added to that of this process; host: starts it when it can.
+    log: file of its output; environment: added to that of this process; host: starts it when it can; gated: it does not become
+    active before `open_gate`.
     """
 
-    def __init__(self, spec: NodeSpec, log: Path, environment: dict[str, str] | None = None, host: NodeHost | None = None):
+    def __init__(
+        self,
+        spec: NodeSpec,
+        log: Path,
+        environment: dict[str, str] | None = None,
+        host: NodeHost | None = None,
+        *,
+        gated: bool = False,
+    ):
         self.spec = spec
         self.log = log
         self._active = log.with_name(log.name + ".active")
         self._active.unlink(missing_ok=True)
-        command, own = spec.command(), {ACTIVE_FILE: str(self._active), **(environment or {})}
+        self.gated = gated
+        self._gate = log.with_name(log.name + ".gate")
+        self._gate.unlink(missing_ok=True)
+        gate = {GATE_FILE: str(self._gate)} if gated else {}
+        command, own = spec.command(), {ACTIVE_FILE: str(self._active), **gate, **(environment or {})}
         self._way: _Hosted | _Executed
         if host is not None and runs_in_host(command[0]):
             self._way = _Hosted(host, command, log, own)
         else:
             self._way = _Executed(command, log, own)
         self.pid = self._way.pid
+
+    def open_gate(self) -> None:
+        """Let the node become active."""
+        self._gate.touch()
+        self.gated = False
 
     @property
     def was_active(self) -> bool:

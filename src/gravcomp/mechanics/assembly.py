@@ -18,6 +18,7 @@ from gravcomp.mechanics.kinematics import deformation_gradient, green_strain, st
 from gravcomp.mechanics.viscous_strain import add_viscous_stress
 from gravcomp.rounding import REORDERED
 
+_OF_CREEP = 1.0  # of the stiffness: branches of creep stiffen a body by less, damping over a short step by more
 _LARGEST_FIRST = 9.0  # lambda / mu of damping and creep: that of Poisson's ratio 0.45
 
 
@@ -146,6 +147,10 @@ def add_force_and_stiffness(
                     pressure = bulk_modulus(solid.constants[k]) * mean_step
                     for m in range(6):
                         s[m] += pressure * slope[m]
+                if moving and factor[k] < _OF_CREEP:
+                    for m in range(6):
+                        e[m] += step[m]
+                    add_viscous_stress(factor[k], past[k, p], first, shear, e, s)
             for a in range(c):
                 g0, g1, g2 = w * gradient[0, a], w * gradient[1, a], w * gradient[2, a]
                 sg[0, a] = s[0] * g0 + s[3] * g1 + s[5] * g2

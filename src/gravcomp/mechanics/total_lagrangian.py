@@ -72,8 +72,9 @@ class SolidElements:
 
         With `origin` (n, 3), the displacements of the last iterate, the stress in grad N . S grad N is the one that the last
         Newton step predicted, S + D B du with S and D at its origin. Then the spurious stretch of a straight step along a curved
-        path does not stiffen the next step (Magisano, Leonetti, Garcea 2017, mixed integration points). The stress of damping is
-        then left out of that term: along the axis it is an artefact of the iteration and can make the tangent indefinite.
+        path does not stiffen the next step (Magisano, Leonetti, Garcea 2017, mixed integration points). The stress of creep is
+        predicted alike. That of damping is then left out of that term: along the axis it is an artefact of the iteration and can
+        make the tangent indefinite.
         """
         force = np.zeros_like(u)
         strain = viscous or self._elastic

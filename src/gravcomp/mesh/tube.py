@@ -28,7 +28,9 @@ def tube_mesh(
     elements = robot.elements or coarse_elements(robot)
     pieces = robot.pieces
     grid = divided_sections(pieces, around or elements.around, radial or elements.radial, elements.equal_stiffness)
-    heights, piece_of_layer = layers_of(pieces, along or elements.along, elements.grading)
+    heights, piece_of_layer = layers_of(
+        pieces, along or elements.along, elements.grading, elements.first_layer, elements.softness
+    )
 
     numbers, region = [], []
     # Nodes of an element in (radial, around, along) half steps of its cell.

@@ -10,6 +10,7 @@ velocity is about zero', because the sensor moves but stays near one place; at r
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,9 +18,11 @@ import numpy as np
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
+from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.guard import REJECTED, RESTARTED, Problem, SampleGuard, Verdict
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector, agrees
+from gravcomp.orientation.spike_review import AHEAD, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate
 
 START_TILT_STD = math.radians(5.0)  # of one accelerometer sample taken for gravity; larger where |a| differs from g
@@ -33,6 +36,8 @@ CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those
 CONTRADICTED_TILT = math.radians(2.0)
 # Of the threshold of a spike: an angle lacks for good what a wrong spike removes, a velocity is corrected all the time.
 SURE_GYRO, SURE_ACCEL = 1.5, 1.0
+PATIENCE_GYRO = 2.0  # its review finds what the gate overlooks; a wrong suspicion costs samples in fast motion
+_RATE, _FORCE = 2, 3  # places in a step
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -48,17 +53,21 @@ class OrientationFilter:
         self.temperature_stable = False  # set by the caller; while True the bias hardly walks
         self.rejected = 0  # samples not used, since construction
         self._guard = SampleGuard(self.options.sensor)
+        self._even = EvenSteps()
         self._rest = RestDetector(self.options.rest)
         spikes = self.options.spikes
-        self._gyro_gate, self._accel_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO), SpikeGate(spikes.accel, spikes, SURE_ACCEL)
-        self._before_suspects: tuple | None = None  # state before the first sample that is not decided
-        self._undecided: list[list] = []  # arguments of the steps since then
+        self._gyro_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO, PATIENCE_GYRO)
+        self._accel_gate = SpikeGate(spikes.accel, spikes, SURE_ACCEL)
+        self._review = SpikeReview(spikes.gyro, spikes)
+        # The last steps, which a decision about a spike may change: state before the step, and its arguments.
+        self._steps: deque[list] = deque(maxlen=max(AHEAD, spikes.longest))
         self._errors = ErrorCovariance()
         self.reset()
 
     def reset(self) -> None:
         """Reset all state: the next sample starts with yaw 0 and no bias."""
         self._guard.reset()
+        self._even.reset()
         self._started = False
         self._orientation = quat.IDENTITY
         self._velocity = (0.0, 0.0, 0.0)
@@ -78,12 +87,14 @@ class OrientationFilter:
         """
         self._bias = (float(bias[0]), float(bias[1]), float(bias[2]))
         self._bias_given = std is not None
+        self._steps.clear()
         self._rest.reset()
         self._errors.set_bias_std(self.options.bias_initial if std is None else std)
 
     def set_bias_estimation(self, on: bool) -> None:
         """Switch the estimation of the bias on or off while running; off, the bias keeps its value and its uncertainty."""
         self.bias_estimation = on
+        self._steps.clear()
         self._errors.decouple_bias()
 
     def update(self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float]) -> Estimate | Problem:
@@ -99,18 +110,18 @@ class OrientationFilter:
             return verdict.problem
         if not self._started or verdict.problem in RESTARTED:
             self._start(rate, force, verdict.dt)
+            self._even.reset()
             self._forget_suspects()
             return self._estimate(stamp_ns, rate, False, verdict.problem)
 
-        dt = verdict.dt
+        dt = self._even.take(verdict.dt)
         gyro_usable, accel_usable = self._usable(verdict)
         rate, force = self._without_spikes(dt, rate, force, gyro_usable, accel_usable)
+        self._steps.append([self._saved(), dt, rate, force, gyro_usable, accel_usable])
         resting = self._advance(dt, rate, force, gyro_usable, accel_usable)
         if resting is None:
             self._forget_suspects()
             return self._estimate(stamp_ns, rate, False, Problem.CONTRADICTED)
-        if self._before_suspects is not None:
-            self._undecided.append([dt, rate, force, gyro_usable, accel_usable])
         return self._estimate(stamp_ns, rate if gyro_usable else self._bias, resting, verdict.problem)
 
     def _advance(self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool) -> bool | None:
@@ -140,40 +151,47 @@ class OrientationFilter:
     def _without_spikes(
         self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool
     ) -> tuple[quat.Vector, quat.Vector]:
-        """Return rate and specific force without spikes; repeat the steps of the suspects that this sample decides."""
-        before = max(self._gyro_gate.suspects, self._accel_gate.suspects)
-        decided = False
-        used = [rate, force]
-        for i, (gate, usable) in enumerate(((self._gyro_gate, gyro_usable), (self._accel_gate, accel_usable))):
-            if not usable:
-                gate.reset()
-                continue
-            used[i], counted = gate.take(dt, used[i])
-            if counted:
-                decided = True
-                for step, value in zip(self._undecided[-len(counted) :], counted):
-                    step[1 + i] = value
-        open_steps = max(0, max(self._gyro_gate.suspects, self._accel_gate.suspects) - 1)
-        if decided and self._before_suspects is not None:
-            self._restore(self._before_suspects)
-            last = len(self._undecided) - min(open_steps, before)
-            for step in self._undecided[:last]:
-                self._advance(*step)
-            self._before_suspects, self._undecided = self._saved(), self._undecided[last:]
-            for step in self._undecided:
-                self._advance(*step)
-        if not self._gyro_gate.suspects and not self._accel_gate.suspects:
-            self._before_suspects = None
-            self._undecided.clear()
-        elif self._before_suspects is None:
-            self._before_suspects = self._saved()
-        return used[0], used[1]
+        """Return rate and specific force without spikes; repeat the steps since the first one for which another value counts."""
+        changed = 0  # number of the steps to repeat
+        used_rate, used_force = rate, force
+        if gyro_usable:
+            used_rate, counted = self._gyro_gate.take(dt, rate)
+            for age in range(1, min(len(counted), AHEAD - 1) + 1):  # older ones are decided by the review
+                changed = max(changed, self._count(age, _RATE, counted[-age]))
+            if self._period and dt > MISSED_PERIODS * self._period:
+                self._review.reset()
+            decided = self._review.take(dt, rate)
+            if decided is not None:
+                changed = max(changed, self._count(AHEAD, _RATE, decided))
+        else:
+            self._gyro_gate.reset()
+            self._review.reset()
+        if accel_usable:
+            used_force, counted = self._accel_gate.take(dt, force)
+            for age, value in enumerate(reversed(counted), 1):
+                changed = max(changed, self._count(age, _FORCE, value))
+        else:
+            self._accel_gate.reset()
+        if changed:
+            steps = [self._steps.pop() for _ in range(changed)]
+            self._restore(steps[-1][0])
+            for _, *arguments in reversed(steps):
+                self._steps.append([self._saved(), *arguments])
+                self._advance(*arguments)
+        return used_rate, used_force
+
+    def _count(self, age: int, place: int, value: quat.Vector) -> int:
+        """Let the value count in the step `age` samples ago. Return how many steps have to be repeated."""
+        if age > len(self._steps) or self._steps[-age][place] == value:
+            return 0
+        self._steps[-age][place] = value
+        return age
 
     def _forget_suspects(self) -> None:
         self._gyro_gate.reset()
         self._accel_gate.reset()
-        self._before_suspects = None
-        self._undecided = []
+        self._review.reset()
+        self._steps.clear()
 
     def _saved(self) -> tuple:
         """Return the state that steps change, for `_restore`."""

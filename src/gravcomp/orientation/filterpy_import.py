@@ -1,7 +1,7 @@
-"""Import of filterpy's Kalman filter without scipy.stats, which takes half a second of CPU time at the start of each node.
+"""Import of filterpy's Kalman filter without scipy.stats and scipy.ndimage, which takes most of its CPU time at a node's start.
 
-filterpy imports scipy.stats for the densities in `filterpy.stats`, which the filter's equations do not use. During the import a
-stand-in takes its place; the densities load scipy.stats at their first use.
+filterpy imports them for the densities in `filterpy.stats` and for the grids in `filterpy.discrete_bayes`, which the filter's
+equations do not use. During the import stand-ins take their places; what needs them loads them at its first use.
 """
 
 import importlib
@@ -9,27 +9,25 @@ import sys
 import types
 from typing import Any
 
-_NAME = "scipy.stats"
+_NAMES = ("scipy.stats", "scipy.ndimage")
 
 
 def kalman_filter_class() -> type:
     """Return `filterpy.kalman.KalmanFilter`."""
-    if _NAME in sys.modules or "filterpy.stats" in sys.modules:
-        from filterpy.kalman import KalmanFilter
-
-        return KalmanFilter
-    stand_in = _StandIn(_NAME)
-    sys.modules[_NAME] = stand_in
+    missing = [] if "filterpy" in sys.modules else [name for name in _NAMES if name not in sys.modules]
+    stand_ins = {name: _StandIn(name) for name in missing}
+    sys.modules.update(stand_ins)
     try:
         from filterpy.kalman import KalmanFilter
     finally:
-        del sys.modules[_NAME]
-        stand_in.is_importing = False
+        for name, stand_in in stand_ins.items():
+            del sys.modules[name]
+            stand_in.is_importing = False
     return KalmanFilter
 
 
 class _StandIn(types.ModuleType):
-    """Stands for scipy.stats: each name in it is a `_Later`."""
+    """Stands for a module of SciPy: each name in it is a `_Later`."""
 
     is_importing = True
 
@@ -40,7 +38,7 @@ class _StandIn(types.ModuleType):
 
 
 class _Later:
-    """An object of scipy.stats that is loaded at its first use after the import."""
+    """An object of that module, loaded at its first use after the import."""
 
     def __init__(self, stand_in: _StandIn, name: str):
         self._stand_in, self._name = stand_in, name
@@ -53,7 +51,7 @@ class _Later:
         return self._loaded()(*args, **options)
 
     def _loaded(self) -> Any:
-        return getattr(importlib.import_module(_NAME), self._name)
+        return getattr(importlib.import_module(self._stand_in.__name__), self._name)
 
 
 def _nothing(*_: Any, **__: Any) -> None:

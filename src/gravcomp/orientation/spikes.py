@@ -39,6 +39,7 @@ class SpikeGate:
     floor: float  # a smaller jump is no spike
     options: SpikeOptions
     sure: float  # of the threshold: what is nearer to the straight line counts as it is
+    patience: float = 1.0  # factor of `options.ratio`: more where a later look finds what is overlooked here
     count: int = 0
     _last: Vector | None = None
     _slope: Vector = (0.0, 0.0, 0.0)  # change per sample
@@ -73,9 +74,9 @@ class SpikeGate:
             off, ahead = abs(difference), abs(difference - steps * slope[i])
             off = ahead if ahead < off else off
             jump = off if off > jump else jump
-        threshold = self.options.ratio * self._mean
+        threshold = self.patience * self.options.ratio * self._mean
         threshold = self.floor if self.floor > threshold else threshold
-        self._mean += dt / (self.options.time_constant + dt) * (min(jump, BOUND * threshold) - self._mean)
+        self._mean += dt / (self.options.time_constant + dt) * (min(jump, BOUND / self.patience * threshold) - self._mean)
         if not pending:
             if jump <= threshold:
                 self._slope = (value[0] - last[0], value[1] - last[1], value[2] - last[2])

@@ -86,7 +86,7 @@ class Scene:
 
     def _made(self, number: int, wall: Wall) -> "list[_Row]":
         if isinstance(wall, PlaneWall):
-            return [_Row(number, PLANE, _turn_to(wall.normal), np.array(wall.point))]
+            return [_Row(number, PLANE, turn_to(wall.normal), np.array(wall.point))]
         if isinstance(wall, SphereWall):
             return [_Row(number, SPHERE, np.eye(3), np.array(wall.centre), (wall.radius, 0.0, 0.0), _sign(wall.side))]
         if isinstance(wall, BoxWall):
@@ -187,8 +187,8 @@ def _rotation(angles: tuple[float, float, float]) -> np.ndarray:
     return Rotation.from_euler("xyz", angles).as_matrix()
 
 
-def _turn_to(normal: tuple[float, float, float]) -> np.ndarray:
-    """A rotation (3, 3) whose third column is along the normal."""
+def turn_to(normal: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return a rotation (3, 3) whose third column is along the normal (3,), of any length but 0."""
     z = np.array(normal) / np.linalg.norm(normal)
     x = np.eye(3)[np.argmin(np.abs(z))]
     x = x - (x @ z) * z
@@ -204,7 +204,7 @@ def _box_rows(number: int, wall: BoxWall) -> list[_Row]:
     for i in range(3):
         for sign in (1.0, -1.0):
             out = sign * rotation[:, i]
-            rows.append(_Row(number, PLANE, _turn_to(tuple(-out)), centre + half[i] * out))
+            rows.append(_Row(number, PLANE, turn_to(tuple(-out)), centre + half[i] * out))
     return rows
 
 

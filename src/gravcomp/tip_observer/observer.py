@@ -34,7 +34,6 @@ _LEAST = 8  # of them
 _REFUSED = 3  # refusals in a row after which the status says so
 _SHIFTED = 6  # outliers in a row that agree with each other: the tracker or the load has changed
 _FROZEN = 3  # equal positions in a row: a tracker that repeats its last pose
-_FORGET = 600.0  # s in which the relative error of weight over stiffness becomes as uncertain as at the start
 # The model's error may change by this share of a change of the load: hysteresis, cable friction.
 _HYSTERESIS = 0.03
 
@@ -247,7 +246,7 @@ class TipObserver:
             change += float(np.linalg.norm(cables - self._before.cable_part()))
             self._filter.diffuse(
                 (self.options.drift * self._largest_sag) ** 2 * elapsed + _HYSTERESIS**2 * change * self._largest_sag,
-                self.options.model_error**2 * elapsed / _FORGET,
+                self.options.model_error**2 * elapsed / self.options.forget,
             )
         self._before = then
 

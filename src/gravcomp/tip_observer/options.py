@@ -50,6 +50,13 @@ class TipObserverOptions:
     drift: float = parameter(
         0.0015, minimum=1e-5, maximum=0.1, description="growth of the model's error at rest in 1 s, share of the released sag"
     )
+    forget: float = parameter(
+        600.0,
+        unit="s",
+        minimum=1.0,
+        maximum=1e6,
+        description="time in which the model's relative error becomes as uncertain as at the start: as the material ages",
+    )
     response: float = parameter(
         100.0, edge="ms", minimum=0.0, maximum=2000.0, description="by how much the robot may follow the model late"
     )

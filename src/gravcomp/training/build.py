@@ -6,6 +6,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -61,43 +62,9 @@ def build(
     """
     options = options or BuildOptions()
     started = time.perf_counter()
-    reason = why_not(model)
-    if reason:
-        raise MeshError(reason)
+    _require_reducible(model)
     kept = path_of(model).with_suffix(".training") / content_key(options.training)
-    trained = samples(model, options.training, lambda share: progress("training", share), kept)
-    modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
-    if len(trained) < modes:
-        raise MeshError(
-            f"only {len(trained)} equilibria were found for the training, at least {modes} are needed;"
-            " the robot may be too soft for its weight"
-        )
-    progress("decomposing", 0.0)
-    shapes = evenly(np.array([sample.unknowns for sample in trained]), options.decomposed)
-    matrix = model.new_matrix()
-    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
-    basis = energy_basis(shapes, matrix.multiply, modes)
-    progress("integrating", 0.0)
-    elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
-    low, high = options.training.modulus_range
-    modulus = first_modulus(model)
-    coordinates = np.array([sample.unknowns for sample in trained]) @ matrix.multiply(basis)
-    cubature = Cubature.none()
-    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
-        sections = section_changes(model, basis)[:, 0] / model.length
-        cubature = choose(model.elements, basis, evenly(coordinates, options.integrated), sections, options.cubature)
-    reduction = Reduction(
-        basis=basis,
-        elasticity=elasticity,
-        cubature=cubature,
-        reach=_MARGIN * float(np.linalg.norm(coordinates, axis=1).max()),
-        modulus=modulus,
-        modulus_low=low * modulus,
-        modulus_high=high * modulus,
-        samples=len(trained),
-        error_median=np.nan,
-        error_worst=np.nan,
-    )
+    reduction = trained(model, options, progress, kept)
     unseen = samples(model, options.test, lambda share: progress("testing", share))
     errors = tip_errors(model, reduction, unseen)
     if not errors.size:
@@ -108,6 +75,58 @@ def build(
     save(reduction, path_of(model))
     shutil.rmtree(kept.parent, ignore_errors=True)
     return reduction, time.perf_counter() - started
+
+
+def trained(
+    model: RobotModel,
+    options: BuildOptions,
+    progress: Callable[[str, float], None] = lambda stage, share: None,
+    kept: Path | None = None,
+) -> Reduction:
+    """Return the model's reduction from shapes of the full model, without its errors; nothing is stored.
+
+    kept: folder in which the samples of each path are stored until the end. Raises MeshError as `build` does.
+    """
+    _require_reducible(model)
+    found = samples(model, options.training, lambda share: progress("training", share), kept)
+    modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
+    if len(found) < modes:
+        raise MeshError(
+            f"only {len(found)} equilibria were found for the training, at least {modes} are needed;"
+            " the robot may be too soft for its weight"
+        )
+    progress("decomposing", 0.0)
+    shapes = evenly(np.array([sample.unknowns for sample in found]), options.decomposed)
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    basis = energy_basis(shapes, matrix.multiply, modes)
+    progress("integrating", 0.0)
+    elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
+    low, high = options.training.modulus_range
+    modulus = first_modulus(model)
+    coordinates = np.array([sample.unknowns for sample in found]) @ matrix.multiply(basis)
+    cubature = Cubature.none()
+    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
+        sections = section_changes(model, basis)[:, 0] / model.length
+        cubature = choose(model.elements, basis, evenly(coordinates, options.integrated), sections, options.cubature)
+    return Reduction(
+        basis=basis,
+        elasticity=elasticity,
+        cubature=cubature,
+        reach=_MARGIN * float(np.linalg.norm(coordinates, axis=1).max()),
+        modulus=modulus,
+        modulus_low=low * modulus,
+        modulus_high=high * modulus,
+        samples=len(found),
+        error_median=np.nan,
+        error_worst=np.nan,
+    )
+
+
+def _require_reducible(model: RobotModel) -> None:
+    reason = why_not(model)
+    if reason:
+        raise MeshError(reason)
 
 
 def evenly(rows: np.ndarray, count: int) -> np.ndarray:

@@ -18,15 +18,15 @@ import numpy as np
 from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
 from gravcomp.calibration.measured import History, Start, StillWindows
-from gravcomp.calibration.parameters import StaticParameters, starting_parameters
+from gravcomp.calibration.parameters import StaticParameters, creep_in_branches, starting_parameters
 from gravcomp.calibration.plan import Plan, creep_times, make_plan
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import GROUPS
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.full_model.modes import first_period
+from gravcomp.materials.material_classes import class_of
 from gravcomp.mesh.tube import with_coarse_elements
-from gravcomp.virtual.material_classes import class_of
 
 _KINDS = {"modulus"} | {kind for kinds in GROUPS.values() for kind in kinds}
 _EVEN = {"modulus": 0.08, "density": 0.02, "radius": 0.01, "angle": np.radians(1.0), "winding": 0.003, "mount": np.radians(0.5)}
@@ -167,13 +167,8 @@ class _Linear:
         return self.predict(parameters).tip + self._slopes["creep"][:, :, len(self.times) :] @ branches
 
     def told(self, branches: np.ndarray) -> np.ndarray:
-        """Return what true branches (b,) are in those of the fit: each counts for the nearest in the logarithm of its time.
-
-        One that is nearer to a tenth of the shortest time has ended before the first window, and counts for none.
-        """
-        times = np.array([0.1 * min(self.times), *self.times])
-        nearest = np.abs(np.log(self._true_times[:, None] / times)).argmin(axis=1)
-        return np.bincount(nearest, branches, len(times))[1:]
+        """Return what true branches (b,) are in those of the fit."""
+        return creep_in_branches(branches.tolist(), self._true_times.tolist(), self.times)
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the tips at the parameters, to first order; of their creep by the branches that are fitted."""

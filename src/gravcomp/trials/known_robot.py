@@ -19,12 +19,13 @@ from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.motion import base_orientation
 
 MODULI = (0.69, 0.94, 1.31)  # of the described modulus
-DAMPING_TIME = 25e-3  # s
+_DAMPING = 0.09  # damping time over the robot's first period: a damping ratio of 0.28
 _OFFSETS = (3e-3, -2e-3, 1e-3, -1.5e-3, 2.5e-3, 0.5e-3)  # of the robot's length, one cable after another
 # Of the length: each cable in turn is pulled in by these; two tensions are needed to distinguish an offset from an elongation.
 _PULLS = (6e-3, 18e-3)
 _RELEASED = -0.3  # of the length
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
+_FALL, _BRIEF_FALL = 5.4, 1.3  # first periods of a free fall
 _FITTED = {"offsets", "compliance", "winding"}
 _IMAGES = 100  # that are averaged, as of a camera in some seconds: the direction is then known to 0.05 degrees
 
@@ -66,7 +67,8 @@ def recover(context: Context) -> list[Recovered]:
                 Recovered(estimate.name, "mm", 1e3 * offsets(context.setup.robot)[cable], estimate.value, estimate.interval)
             )
     setup = known_setup(context.setup, moduli[0])
-    inclinations, duration = ((0.0,), 0.35) if context.brief else ((0.0, 30.0), 1.5)
+    inclinations, periods = ((0.0,), _BRIEF_FALL) if context.brief else ((0.0, 30.0), _FALL)
+    duration = periods * context.setup.first_period
     falls = context.map(
         free_fall, [(setup, i, 0.0, duration, trial) for trial, i in enumerate(inclinations)], "free falls of the known robot"
     )
@@ -82,8 +84,14 @@ def recover(context: Context) -> list[Recovered]:
             "Young's modulus, in motion", "MPa", moduli[0] * 1e-6, motion.youngs_modulus * 1e-6, motion.modulus_interval * 1e-6
         )
     )
-    found.append(Recovered("damping time", "ms", 1e3 * DAMPING_TIME, 1e3 * motion.damping_time, 1e3 * motion.damping_interval))
+    true = 1e3 * damping_time(context.setup)
+    found.append(Recovered("damping time", "ms", true, 1e3 * motion.damping_time, 1e3 * motion.damping_interval))
     return found
+
+
+def damping_time(setup: Setup) -> float:
+    """Return the damping time in s of the known robot."""
+    return _DAMPING * setup.first_period
 
 
 def offsets(robot: Robot) -> np.ndarray:
@@ -96,7 +104,7 @@ def known_setup(setup: Setup, modulus: float) -> Setup:
     material, truth = setup.robot.materials[0], setup.truth
     body = dataclasses.replace(
         truth.body, youngs_modulus=modulus, poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(0.0,),
-        creep_time=(1.0,), damping_time=DAMPING_TIME, slip_ratio=0.0,
+        creep_time=(1.0,), damping_time=damping_time(setup), slip_ratio=0.0,
     )  # fmt: skip
     tendons = dataclasses.replace(truth.tendons, radius_offset=0.0, angle_offset=0.0, friction=0.0)
     return dataclasses.replace(setup, truth=dataclasses.replace(truth, body=body, tendons=tendons))

@@ -10,10 +10,10 @@ from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParamete
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import straight_target
 from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions
-from gravcomp.trials.holding import errors_to
+from gravcomp.trials.holding import errors_to, lasting
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
-_SETTLING, _LEARNT, _FINDING, _MEASURED = 4.0, 0.5, 6.0, 1.0  # s
+_SETTLING, _LEARNT, _FINDING, _MEASURED = (4.0, 14.0), (0.5, 1.8), (6.0, 21.0), (1.0, 3.6)  # s at least, first periods
 _BRIEF = 0.25  # of these, but the errors of model and sensors take their time to be learnt
 
 
@@ -52,12 +52,13 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
     loop.hold(target)
-    loop.run(share * _SETTLING)
+    settling, learnt, finding, measured = (share * lasting(setup, *one) for one in (_SETTLING, _LEARNT, _FINDING, _MEASURED))
+    loop.run(settling)
     loop.zero_load()
-    loop.run(options.zero_time + share * _LEARNT)
+    loop.run(options.zero_time + learnt)
 
     def lateral() -> float:
-        trace = loop.trace.between(loop.time - share * _MEASURED)
+        trace = loop.trace.between(loop.time - measured)
         return float(np.sqrt(np.mean(errors_to(trace, target).lateral ** 2)))
 
     before = lateral()
@@ -65,10 +66,10 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
         loop.virtual.attach(case.payload)
     else:
         loop.virtual.push(np.array(case.force))
-    loop.run(share * _FINDING)
+    loop.run(finding)
     estimates = []
     for _ in range(10):
-        loop.run(share * _MEASURED / 10.0)
+        loop.run(measured / 10.0)
         estimates.append(loop.load)
     mean = dataclasses.replace(
         estimates[-1],

@@ -14,6 +14,11 @@ GRAVITY: Rgb = (30, 84, 225)
 METAL: Rgb = (86, 94, 106)
 BOARD: Rgb = (28, 120, 82)
 BRAND: Rgb = (47, 111, 237)
+WALL: Rgb = (138, 160, 190)
+ZONE: Rgb = (239, 68, 68)
+PLACED: Rgb = (245, 158, 11)
+TISSUE: Rgb = (226, 150, 136)
+LOAD: Rgb = (168, 85, 247)
 
 # Full scale of the colours; compensation of the robot's own weight needs less.
 TENSION_SCALE = 1.0  # N

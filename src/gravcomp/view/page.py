@@ -1,6 +1,8 @@
 """The page of one robot, served to browsers: scene, plots, controls and figures."""
 
 import socket
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import viser
 
@@ -9,13 +11,18 @@ from gravcomp.description import Robot
 from gravcomp.view import colours
 from gravcomp.view.controls import Controls
 from gravcomp.view.graphics import chosen
+from gravcomp.view.inset import Inset
 from gravcomp.view.options import PageOptions
 from gravcomp.view.plots import Plots
 from gravcomp.view.requests import Request
 from gravcomp.view.scene import Scene
+from gravcomp.view.skin import half_width
 from gravcomp.view.snapshot import Snapshot
-from gravcomp.view.status import cables_html, legend_html, status_html
+from gravcomp.view.status import cables_html, legend_html, status_html, touches_html
 from gravcomp.view.timeline import Timeline
+
+if TYPE_CHECKING:
+    from gravcomp.view.obstacle_shapes import ObstacleShape
 
 PORTS_TRIED = 50
 _PANEL_WIDTH = 320  # px
@@ -24,17 +31,19 @@ _PANEL_WIDTH = 320  # px
 class Page:
     """A live page. Raises ConfigError when no port is free or the host is not an address of this machine."""
 
-    def __init__(self, robot: Robot, options: PageOptions) -> None:
+    def __init__(self, robot: Robot, options: PageOptions, shapes: "Sequence[ObstacleShape]" = ()) -> None:
+        """shapes: of the obstacles around the robot."""
         port = free_port(options.host, options.port)
         self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
         shown = "localhost" if options.host in ("127.0.0.1", "0.0.0.0", "::") else options.host
         self.address = f"http://{shown}:{self._server.get_port()}"
         self._names = robot.cable_names
         self._frame, self._idle_frames = 0, max(1, round(options.rate))
+        self._has_model = False  # whether the last snapshot had one
         self._shown: Snapshot | None = None  # while the page shows an earlier state
         gui = self._server.gui
         gui.configure_theme(dark_mode=options.dark, show_logo=False, show_share_button=False, brand_color=colours.BRAND)
-        self._scene = Scene(self._server, robot, options)
+        self._scene = Scene(self._server, robot, options, shapes)
         graphics = chosen(options.graphics)
         self._scene.set_graphics(graphics)
         gui.main_panel.dock_right()
@@ -42,7 +51,9 @@ class Page:
         self._status = gui.add_html("")
         with gui.add_folder("Cables"):
             self._cables = gui.add_html("")
-        self._controls = Controls(self._server, self._scene, robot.length, self._names, graphics)
+        self._touches = gui.add_html("", visible=False)
+        self._inset = Inset(gui, shapes, robot.length, half_width(robot))
+        self._controls = Controls(self._server, self._scene, self._inset, robot.length, self._names, graphics)
         self._legend = gui.add_html(legend_html(False))
         panel = gui.add_panel()
         with panel.add_tab(f"The last {options.window:g} s"):
@@ -60,8 +71,8 @@ class Page:
     def show(self, snapshot: Snapshot) -> None:
         """Draw a snapshot: the scene at each call, plots at every second, texts and figures at every fourth.
 
-        Without a browser the page is updated once per second, so that a new browser shows the current state. While the user looks
-        back, the page does not change.
+        Without a browser the page is updated once per second and when the model begins, so that a new browser shows the current
+        state. While the user looks back, the page does not change.
         """
         self._plots.add(snapshot)
         self._timeline.add(snapshot)
@@ -76,15 +87,19 @@ class Page:
             self._controls.show_virtual(snapshot.virtual)
             self._controls.show_recording(bool(snapshot.recording))
 
-    def _on_disconnect(self, _: viser.ClientHandle) -> None:
-        """Return to the live state when the last browser has left."""
+    def _on_disconnect(self, client: viser.ClientHandle) -> None:
+        """Let go of what a browser held that has left; after the last one return to the live state."""
+        self._scene.hand.let_go(client.client_id)
+        self._scene.wall.let_go(client.client_id)
         if not self.clients:
             self._timeline.return_to_live()
 
     def _draw(self, snapshot: Snapshot) -> None:
         """Draw the live state."""
         alone = not self.clients
-        if alone and self._frame % self._idle_frames != 1 % self._idle_frames:
+        begins = snapshot.tension is not None and not self._has_model
+        self._has_model = snapshot.tension is not None
+        if alone and not begins and self._frame % self._idle_frames != 1 % self._idle_frames:
             return
         with self._server.atomic():
             self._scene.show(snapshot)
@@ -99,7 +114,7 @@ class Page:
             return
         self._shown = snapshot
         with self._server.atomic():
-            self._scene.show(snapshot)
+            self._scene.show(snapshot, live=False)
         self._plots.draw(snapshot.time)
         self._write(snapshot, held_at)
 
@@ -107,11 +122,17 @@ class Page:
         """Update texts and figures."""
         self._status.content = status_html(snapshot, held_at)
         self._cables.content = cables_html(snapshot, self._names)
+        touches = touches_html(snapshot)
+        self._inset.show(snapshot)
+        self._touches.content, self._touches.visible = touches, bool(touches)
         self._legend.content = legend_html(snapshot.truth is not None)
 
     def requests(self) -> list[Request]:
-        """Return the user's requests since the last call."""
-        return self._controls.requests()
+        """Return the user's requests since the last call; the page says why it refuses others."""
+        accepted, refused = self._controls.requests()
+        for sentence in refused:
+            self.notify("Refused", sentence)
+        return accepted
 
     def notify(self, title: str, sentence: str, *, good: bool = False) -> None:
         """Show a notification in every browser."""

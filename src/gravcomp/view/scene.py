@@ -1,4 +1,7 @@
-"""The 3D scene: body with cables and rest shape, gravity, markers, mount and surroundings."""
+"""The 3D scene: body with cables and rest shape, gravity, markers, obstacles, forces, handles, mount and surroundings."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import viser
@@ -7,15 +10,24 @@ from gravcomp.description import Robot
 from gravcomp.view import colours
 from gravcomp.view.backbone import Backbone, arc_backbone, rest_backbone
 from gravcomp.view.drawn_skin import add_skin
+from gravcomp.view.forces import Forces
+from gravcomp.view.in_base import BaseFrame
 from gravcomp.view.markers import TargetMarker, TruthMarker
 from gravcomp.view.mount import Mount
+from gravcomp.view.obstacles import Obstacles
 from gravcomp.view.options import LumenOptions, PageOptions
+from gravcomp.view.placed_wall import WallHandle
 from gravcomp.view.scale import SCALE, scaled
 from gravcomp.view.skin import cable_skin, half_width, joined, revolved
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.surroundings import Surroundings
+from gravcomp.view.tip_handle import TipHandle
+from gravcomp.view.touches import HAND
 from gravcomp.view.wall import lumen_skin, wall_skins
 from gravcomp.view.world import BaseInWorld, quaternion_wxyz
+
+if TYPE_CHECKING:
+    from gravcomp.view.obstacle_shapes import ObstacleShape
 
 GRAVITY_LENGTH = 0.045  # m, of the arrow for 9.81 m/s^2
 WORLD, BASE = "world: gravity points down", "robot base: gravity turns"
@@ -23,9 +35,16 @@ _BASE_WXYZ = (0.5, 0.5, -0.5, 0.5)  # z of the base along x of the scene
 
 
 class Scene:
-    """Draws snapshots of one robot. Attributes: body (the meshes that follow the backbone), target, surroundings."""
+    """Draws snapshots of one robot.
 
-    def __init__(self, server: viser.ViserServer, robot: Robot, options: PageOptions) -> None:
+    Attributes: body (the meshes that follow the backbone), target, surroundings, hand and wall (what the user does to a virtual
+    robot).
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, options: PageOptions, shapes: "Sequence[ObstacleShape]" = ()
+    ) -> None:
+        """shapes: of the obstacles around the robot."""
         self._scene, self._robot = server.scene, robot
         self._world = BaseInWorld()
         self._view = WORLD
@@ -41,6 +60,11 @@ class Scene:
         self._gravity = self._scene.add_arrows(
             "/robot/gravity", np.zeros((1, 2, 3)), colours.GRAVITY,
             shaft_radius=SCALE * 0.0009, head_radius=SCALE * 0.0026, head_length=SCALE * 0.007)  # fmt: skip
+        self._obstacles = Obstacles(self._scene, shapes)
+        self._forces = Forces(self._scene, robot.length, 0.5 * diameter, robot.limits.tension_max)
+        frame = BaseFrame(self._root)
+        self.hand = TipHandle(self._scene, frame, 0.5 * diameter)
+        self.wall = WallHandle(self._scene, frame, robot.length, 0.5 * diameter)
         if options.lumen.diameter > 0.0:
             self._add_lumen(options.lumen)
 
@@ -56,13 +80,14 @@ class Scene:
         self._view = view
 
     def set_visible(self, what: str, visible: bool) -> None:
-        """Show or hide 'rest', 'truth' or 'target'."""
+        """Show or hide 'rest', 'truth', 'target', 'obstacles' or 'forces'."""
         self._hidden = (self._hidden - {what}) | (set() if visible else {what})
+        self._obstacles.visible = "obstacles" not in self._hidden
         for ghost in self._ghosts:
             ghost.visible = "rest" not in self._hidden
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Draw a snapshot."""
+    def show(self, snapshot: Snapshot, live: bool = True) -> None:
+        """Draw a snapshot; live: it is the present state, in which the user can touch a virtual robot."""
         if snapshot.backbone is not None:
             vertices = scaled(self._body_skin.on(snapshot.backbone))
             for handle, part in zip(self.body, self._body_parts):
@@ -73,6 +98,16 @@ class Scene:
         self._show_gravity(snapshot)
         self._truth.show(None if "truth" in self._hidden else snapshot.truth)
         self.target.show(None if "target" in self._hidden else snapshot.target)
+        self._show_forces(snapshot)
+        self.wall.show(snapshot, live)
+        self.hand.show(snapshot.truth.tip if live and snapshot.virtual and snapshot.truth is not None else None)
+
+    def _show_forces(self, snapshot: Snapshot) -> None:
+        load = () if snapshot.load is None else (snapshot.load,)
+        pushes = [touch for touch in snapshot.virtual_touches if touch.source != HAND]
+        pulls = [touch for touch in snapshot.virtual_touches if touch.source == HAND]
+        shown = {"model": snapshot.model_touches, "virtual": pushes, "hand": pulls, "load": load}
+        self._forces.show(snapshot.time, {} if "forces" in self._hidden else shown)
 
     def _show_gravity(self, snapshot: Snapshot) -> None:
         self._gravity.visible = snapshot.gravity is not None
@@ -82,6 +117,10 @@ class Scene:
         if snapshot.backbone is not None:
             middle = snapshot.backbone.at(np.array([0.5]))[0][0]
         self._gravity.points = scaled(np.array([[middle, middle + snapshot.gravity / 9.81 * GRAVITY_LENGTH]]))
+        if self._obstacles.in_world:
+            from gravcomp.scene.scene import world_rotation  # imports Numba
+
+            self._obstacles.turn(quaternion_wxyz(world_rotation(snapshot.gravity).T))
         rotation = self._world.follow(snapshot.gravity)
         self._root.wxyz = quaternion_wxyz(rotation) if self._view == WORLD else _BASE_WXYZ
 

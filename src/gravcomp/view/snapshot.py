@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.view.backbone import Backbone
+from gravcomp.view.touches import Touch
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,6 +38,11 @@ class Snapshot:
     delays: dict[str, float] = dataclasses.field(default_factory=dict)  # s since the IMU sample, by stage
     recording: str = ""  # path of the bag that is being recorded
     virtual: bool = False  # a virtual robot runs
+    model_touches: tuple[Touch, ...] = ()  # forces of walls on the model
+    virtual_touches: tuple[Touch, ...] = ()  # forces of walls and of a hand on the virtual robot
+    load: Touch | None = None  # the estimated load at the tip
+    load_deviation: float = 0.0  # N, standard deviation of the estimated force
+    wall: tuple[np.ndarray, np.ndarray] | None = None  # point (3,) m and normal (3,) of the wall that the user has placed
 
     @property
     def tip_error(self) -> float:

@@ -5,6 +5,7 @@ import math
 
 from gravcomp.view import colours
 from gravcomp.view.snapshot import Snapshot
+from gravcomp.view.touches import force_text, resultants
 
 _DOTS = {"ok": "#22c55e", "warn": "#f59e0b", "error": "#ef4444", "off": "#94a3b8"}
 _MOTORS = {"active": "ok", "inactive": "off", "unconfigured": "off", "stopped": "error", "fault": "error"}  # other states: warn
@@ -81,6 +82,31 @@ def cables_html(snapshot: Snapshot, names: tuple[str, ...]) -> str:
         '<div style="display:flex;align-items:center;gap:.5em;margin-top:.4em;font-size:.92em"><span>slack</span>'
         f'<div style="{scale}"></div><span>{colours.TENSION_SCALE:g} N</span></div></div>'
     )
+
+
+def touches_html(snapshot: Snapshot) -> str:
+    """Return a table of the forces from outside, on the model and on the virtual robot; empty where nothing touches."""
+    model = {touch.source: touch.size for touch in snapshot.model_touches}
+    true = {touch.source: touch.size for touch in resultants(snapshot.virtual_touches)}
+    rows = [
+        f"<tr><td>{html.escape(name)}</td>{_force(model.get(name))}{_force(true.get(name)) if snapshot.virtual else ''}</tr>"
+        for name in dict.fromkeys([*model, *true])
+    ]
+    if snapshot.load is not None:
+        text = f"{force_text(snapshot.load.size)} ± {force_text(2.0 * snapshot.load_deviation)}"
+        rows.append(f'<tr><td>estimated load at the tip</td><td colspan="2" style="text-align:right">{text}</td></tr>')
+    if not rows:
+        return ""
+    virtual = '<th style="text-align:right;font-weight:400">virtual robot</th>' if snapshot.virtual else ""
+    return (
+        '<div data-gravcomp="touches" style="padding:.3em .9em .5em;font-size:.8em;font-variant-numeric:tabular-nums">'
+        '<table style="width:100%"><tr style="opacity:.68"><th style="text-align:left;font-weight:400">forces from outside</th>'
+        f'<th style="text-align:right;font-weight:400">model</th>{virtual}</tr>{"".join(rows)}</table></div>'
+    )
+
+
+def _force(size: float | None) -> str:
+    return f'<td style="text-align:right">{"–" if size is None else force_text(size)}</td>'
 
 
 def legend_html(virtual: bool) -> str:

@@ -1,13 +1,18 @@
-"""Controls of the virtual robot: tilt of its base, and faults."""
+"""Controls of the virtual robot: tilt of its base, a wall next to it, and faults."""
 
 import math
 from collections.abc import Callable
 
 import viser
 
-from gravcomp.view.handles import set_value
+from gravcomp.view.handles import number, set_value
+from gravcomp.view.placed_wall import SIDES, WallHandle
 from gravcomp.view.requests import InjectFault, Request, TiltBase
 
+_HINT = (
+    '<div style="padding:.1em .9em .5em;font-size:.82em;line-height:1.45;opacity:.8">Drag the orange ball at the tip: a spring'
+    " pulls the tip to the cursor. Put a wall up and drag it. The model knows neither.</div>"
+)
 _TILTS = ("0°", "45°", "90°", "135°", "-45°")
 _FAULTS = {
     "IMU frames lost": "{{kind: drop, frames: imu, duration: {0:g}}}",
@@ -22,10 +27,11 @@ _FAULTS = {
 
 
 class VirtualControls:
-    """Tilts the base and injects faults; `put` receives the requests."""
+    """Tilts the base, puts walls up and injects faults; `put` receives the requests."""
 
-    def __init__(self, gui: viser.GuiApi, cables: tuple[str, ...], put: Callable[[Request], None]) -> None:
+    def __init__(self, gui: viser.GuiApi, cables: tuple[str, ...], wall: WallHandle, put: Callable[[Request], None]) -> None:
         self._put = put
+        self._touch = self._add_touch(gui, wall)
         self._base = self._add_base(gui)
         self._faults = self._add_faults(gui, cables)
 
@@ -37,7 +43,19 @@ class VirtualControls:
     @visible.setter
     def visible(self, visible: bool) -> None:
         if self._base.visible != visible:
-            self._base.visible = self._faults.visible = visible
+            self._touch.visible = self._base.visible = self._faults.visible = visible
+
+    def _add_touch(self, gui: viser.GuiApi, wall: WallHandle) -> viser.GuiFolderHandle:
+        folder = gui.add_folder("Touch the virtual robot")
+        with folder:
+            gui.add_html(_HINT)
+            sides = gui.add_button_group("wall", SIDES)
+            turn = gui.add_checkbox("turn the wall", False, hint="rings that turn it")
+            away = gui.add_button("Take the wall away")
+        sides.on_click(lambda e: wall.put_up(e.target.value))
+        turn.on_update(lambda _: wall.show_rings(turn.value))
+        away.on_click(lambda _: wall.take_away())
+        return folder
 
     def _add_base(self, gui: viser.GuiApi) -> viser.GuiFolderHandle:
         folder = gui.add_folder("Base of the virtual robot")
@@ -53,15 +71,16 @@ class VirtualControls:
         return folder
 
     def _on_preset(self, event: viser.GuiEvent) -> None:
-        set_value(self._inclination, float(event.target.value.rstrip("°")))
-        self._put_tilt()
+        if event.target.value in _TILTS:
+            set_value(self._inclination, float(event.target.value.rstrip("°")))
+            self._put_tilt()
 
     def _on_tilt(self, event: viser.GuiEvent) -> None:
         if event.client is not None:  # set by the user, not by the program
             self._put_tilt()
 
     def _put_tilt(self) -> None:
-        self._put(TiltBase(math.radians(self._inclination.value), math.radians(self._roll.value)))
+        self._put(TiltBase(math.radians(number(self._inclination)), math.radians(number(self._roll))))
 
     def _add_faults(self, gui: viser.GuiApi, cables: tuple[str, ...]) -> viser.GuiFolderHandle:
         texts = {text.replace("{1}", "the cable"): fault for text, fault in _FAULTS.items()}
@@ -72,6 +91,11 @@ class VirtualControls:
             duration = gui.add_slider("duration s", min=0.5, max=20.0, step=0.5, initial_value=2.0)
             inject = gui.add_button("Inject", color="red")
             clear = gui.add_button("Clear all")
-        inject.on_click(lambda _: self._put(InjectFault(texts[kind.value].format(duration.value, cable.value if cable else ""))))
+        inject.on_click(lambda _: self._put(_fault(texts.get(str(kind.value), ""), number(duration), cable and cable.value)))
         clear.on_click(lambda _: self._put(InjectFault("clear")))
         return folder
+
+
+def _fault(text: str, duration: float, cable: object) -> InjectFault:
+    """The request for a fault of `duration` s; the virtual robot refuses what is none."""
+    return InjectFault(text.format(duration, "" if cable is None else cable))

@@ -26,8 +26,8 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Material, Robot
 from gravcomp.description.cable_line import ASSUMED_FREE_LENGTH, ASSUMED_STRETCH
 from gravcomp.description.hardware import Hardware
+from gravcomp.materials.material_classes import class_of
 from gravcomp.thermal.plant import ThermalPlantOptions
-from gravcomp.virtual.material_classes import class_of
 from gravcomp.virtual.parameters import Board, Body, Tendons, VirtualRobotParameters
 from gravcomp.virtual.true_robot import TrueCables, TrueMaterial, TrueMotors, TrueRobot
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gravcomp.scene.scene import turn_to
 from gravcomp.virtual.backbone import backbone_poses
 from gravcomp.virtual.contact import find_contacts, slots
 from gravcomp.virtual.contact_force import touching_of
@@ -26,10 +27,8 @@ class MovingRod:
     ):
         """Start unloaded and at rest, the base at the origin, the tendons slack. Without `surroundings` nothing is around it."""
         self.model, self.material, self.friction = model, material, friction
-        self._around = around = surroundings or RodSurroundings.none()
-        self._held = np.zeros((slots(model.elements), len(around.walls.moving), 3))
-        self._rim = np.zeros((len(around.walls.moving), 3))
-        self._touching, self._checked = (touching_of(self._held.shape[0] * self._held.shape[1]) for _ in range(2))
+        self._held, self._rim = np.zeros((slots(model.elements), 0, 3)), np.zeros((0, 3))
+        self.surround(surroundings or RodSurroundings.none())
         n, m, k = model.elements, model.tendons, material.branch_time.shape[1]
         self.orientation, self.position = model.unloaded()
         self.mass, self.centre = model.mass, model.centre  # with what is attached
@@ -73,7 +72,21 @@ class MovingRod:
     @property
     def touches(self) -> Touches:
         """The places where the rod touches walls at present."""
-        return touches_of(self._touching)
+        return touches_of(self._touching, self.orientation, self.position)
+
+    def surround(self, around: RodSurroundings) -> None:
+        """Put other obstacles around the rod; the rows that they and the present ones begin with are the same."""
+        rows, points = len(around.walls.moving), len(self._held)
+        kept = min(rows, len(self._rim))
+        held, rim = np.zeros((points, rows, 3)), np.zeros((rows, 3))
+        held[:, :kept], rim[:kept] = self._held[:, :kept], self._rim[:kept]
+        self._around, self._held, self._rim = around, held, rim
+        self._touching, self._checked = (touching_of(points * rows) for _ in range(2))
+
+    def move_plane(self, row: int, point: np.ndarray, normal: np.ndarray) -> None:
+        """Move the plane of a row of the scene to a point (3,) m and a normal (3,), in the frame of the row."""
+        scene = self._around.walls.scene
+        scene.origin[row], scene.rotation[row] = point, turn_to(normal)
 
     def place_free_of_walls(self, shape: RodShape, base_orientation: np.ndarray, base_position: np.ndarray) -> tuple[float, int]:
         """Set the rod to `shape` as `rest` does; return by how much (m) it is then in a wall, and that obstacle's number."""

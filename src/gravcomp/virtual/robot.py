@@ -26,6 +26,7 @@ from gravcomp.virtual.active_faults import ActiveFaults
 from gravcomp.virtual.base import MovingBase
 from gravcomp.virtual.board import STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.body import build_friction, build_material, build_rod
+from gravcomp.virtual.bystander import Bystander
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.dynamics import MovingRod
 from gravcomp.virtual.emulated_board import LOOP_FRAMES, EmulatedBoard
@@ -47,7 +48,7 @@ _GRAVITY = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
 
 class VirtualRobot:
-    """The virtual robot: rod, motors, board and base, stepped together."""
+    """The virtual robot: rod, motors, board and base, stepped together. Attribute bystander: a user's hand and wall."""
 
     def __init__(
         self,
@@ -77,8 +78,9 @@ class VirtualRobot:
         motors, imu, faults = (np.random.default_rng(stream) for stream in streams[1:])
         self._robot, self._hardware = robot, hardware
         self._model = build_rod(true)
-        around = None if scene is None or not scene else RodSurroundings.of(self._model, true, scene)
+        around = RodSurroundings.of(self._model, true, scene) if scene else None
         self._rod = MovingRod(self._model, build_material(self._model, true), build_friction(true), around)
+        self.bystander = Bystander(self._rod, true, around, scene.names if scene else ())
         self._motors = MotorBank(true.motors, hardware, true.cables.slack, motors)
         self._board: VirtualBoard | EmulatedBoard = (
             VirtualBoard(true.board, imu) if board == "virtual" else EmulatedBoard(true.board, imu, hardware, model)
@@ -226,6 +228,10 @@ class VirtualRobot:
             base_position=self._rod.position[0].copy(),
             contact_force=touches.force @ base,
             contact_depth=touches.depth,
+            contact_place=(touches.place - self._rod.position[0]) @ base,
+            contact_obstacle=self.bystander.names(touches.row),
+            hand_force=self.bystander.hand.force,
+            wall=self.bystander.plane,
         )
 
     def _receive(self, frame: can.Message) -> None:
@@ -257,7 +263,7 @@ class VirtualRobot:
         sent: list[can.Message] = []
         if self._tick % _ROD_TICKS == 0:
             orientation, position = self._base.advance(self.time)
-            self._rod.load[-1] = orientation @ self._push
+            self._rod.load[-1] = orientation @ (self._push + self.bystander.step(_ROD_TICKS * TICK, self.time))
             self.unresolved += not self._rod.step(_ROD_TICKS * TICK, orientation, position, _GRAVITY, self._motors.wound)
         behind: list[can.Message] = []  # frames of motors that the board passes on
         if self._tick % self._feedback_ticks == 0:

@@ -4,7 +4,6 @@ Segments, transitions and caps give their sections from outline and lumens. A bo
 constants are those of its surface there.
 """
 
-import math
 from dataclasses import dataclass
 
 from gravcomp.description import Material, MeshBody, Piece, Robot
@@ -33,10 +32,8 @@ class Stretch:
 
     @property
     def axial_modulus(self) -> float:
-        """Young's modulus (Pa) along the axis. Fibres at an angle add the part of their stiffness that lies along it."""
-        fibres = self.material.fibres
-        along = 0.0 if fibres is None else fibres.ratio * math.cos(fibres.angle) ** 4
-        return self.material.youngs_modulus * (1.0 + along)
+        """Young's modulus along the axis (Pa)."""
+        return self.material.axial_modulus
 
 
 def stretch_at(stretches: list[Stretch], s: float) -> Stretch:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gravcomp.description import Robot
-from gravcomp.virtual.material_classes import MaterialClass
+from gravcomp.materials.material_classes import MaterialClass
 from gravcomp.virtual.parameters import Board, Motors
 
 

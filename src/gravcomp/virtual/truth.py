@@ -25,6 +25,10 @@ class Truth:
     base_position: np.ndarray  # (3,) m in the world
     contact_force: np.ndarray  # (t, 3) N, of the walls on the robot
     contact_depth: np.ndarray  # (t,) m, in the wall
+    contact_place: np.ndarray  # (t, 3) m
+    contact_obstacle: tuple[str, ...]  # t names
+    hand_force: np.ndarray  # (3,) N, of a hand on the tip
+    wall: tuple[np.ndarray, np.ndarray] | None  # point (3,) m and normal (3,) of the wall that a user has put there
 
     @property
     def wall_force(self) -> float:

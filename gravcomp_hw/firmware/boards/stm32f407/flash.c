@@ -29,6 +29,25 @@ __attribute__((section(".in_ram"), noinline)) static void write_word(volatile ui
   FLASH->cr = FLASH_CR_WORDS;
 }
 
+__attribute__((section(".in_ram"), noinline)) static void write_options(uint32_t options) {
+  FLASH->optkeyr = FLASH_OPTION_KEY1;
+  FLASH->optkeyr = FLASH_OPTION_KEY2;
+  FLASH->optcr = options;
+  FLASH->optcr = options | FLASH_OPTCR_START;
+  wait();
+  FLASH->optcr = options | FLASH_OPTCR_LOCK;
+}
+
+void gc_flash_guard_supply(void) {
+  const uint32_t options = FLASH->optcr & ~(FLASH_OPTCR_LOCK | FLASH_OPTCR_START);
+  if ((options & FLASH_OPTCR_BROWN_OUT) == 0u || (PWR->csr & PWR_CSR_PVDO) != 0u) {
+    return;
+  }
+  __asm__ volatile("cpsid i" ::: "memory");
+  write_options(options & ~FLASH_OPTCR_BROWN_OUT);
+  __asm__ volatile("cpsie i" ::: "memory");
+}
+
 static void unlock(void) {
   __asm__ volatile("cpsid i" ::: "memory");
   if ((FLASH->cr & FLASH_CR_LOCK) != 0u) {
@@ -36,6 +55,7 @@ static void unlock(void) {
     FLASH->keyr = FLASH_KEY2;
   }
   FLASH->sr = FLASH_SR_ERRORS;
+  gc_heater_pwm_set(0u);  // after interrupts are off: for up to two seconds nobody watches it; the next tick sets it again
 }
 
 static bool lock(void) {
@@ -85,7 +105,6 @@ extern const uint8_t gc_model_a[], gc_model_b[];
 static bool erase_model(void *context, uint32_t slot, uint32_t sector) {
   (void)context;
   unlock();
-  gc_heater_pwm_set(0u);  // after interrupts are off: for up to two seconds nobody watches it; the next tick sets it again
   erase_sector(FIRST_MODEL_SECTOR + MODEL_SECTORS * slot + sector);
   return lock();
 }

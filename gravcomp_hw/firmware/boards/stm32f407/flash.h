@@ -6,6 +6,10 @@
 
 gc_storage gc_flash_storage(void);
 
+// Let the chip's brown-out reset act below 2.7 to 2.9 V (RM0090 section 3.6): shipped chips have it off. It is written once, where the
+// supply is good, and acts from the next power-on.
+void gc_flash_guard_supply(void);
+
 #ifdef GC_WITH_STANDALONE
 #include "../../standalone/model_store.h"
 

@@ -183,6 +183,7 @@ int main(void) {
     board.unique_id[i] = UNIQUE_ID[i];
   }
   PWR->cr |= PWR_CR_PVD_2V9 | PWR_CR_PVDE;
+  gc_flash_guard_supply();
   gc_pins_start();
   gc_heater_pwm_start();
   gc_bmi088_start(&imu);

@@ -71,6 +71,11 @@ typedef struct {
 #define FLASH_CR_WORDS (2u << 8)
 #define FLASH_CR_STRT (1u << 16)
 #define FLASH_CR_LOCK (1u << 31)
+#define FLASH_OPTION_KEY1 0x08192A3Bu
+#define FLASH_OPTION_KEY2 0x4C5D6E7Fu
+#define FLASH_OPTCR_LOCK (1u << 0)
+#define FLASH_OPTCR_START (1u << 1)
+#define FLASH_OPTCR_BROWN_OUT (3u << 2)  // 3: off, 0: reset below 2.7 to 2.9 V
 
 // RM0090 section 8.4, pins.
 typedef struct {

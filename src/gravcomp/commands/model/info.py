@@ -110,6 +110,7 @@ def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, A
     """
     import numpy as np
 
+    from gravcomp.config import to_mapping
     from gravcomp.full_model.mesh_choice import ACCURACY, chosen_mesh
     from gravcomp.simulation import Simulator
 
@@ -120,7 +121,7 @@ def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, A
     if described.elements is None:
         error = chosen_mesh(described).error
         return {
-            "chosen_elements": dataclasses.asdict(elements),
+            "chosen_elements": {key: value for key, value in to_mapping(elements).items() if value is not None},
             "estimated_error_pct": 100 * error,
             "refinement": "fine enough" if error <= ACCURACY else f"the error is above {100 * ACCURACY:g} % of the length",
         }

@@ -47,13 +47,17 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     """
     import numpy as np
 
+    from gravcomp.commands.preparation import compile_parts
     from gravcomp.description import load_robot_file
+    from gravcomp.launcher import compilation
     from gravcomp.simulation import Simulator
 
     if args.direction is not None and args.target is None:
         raise ValueError("--direction needs --target, which is not given")
     wrenches = wrenches_of(args)
     file = load_robot_file(args.robot)
+    if file.scene or file.zones:
+        compile_parts(("model", "contact") if args.target is None else compilation.LOOP + compilation.SURROUNDED)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
     if args.target is not None:

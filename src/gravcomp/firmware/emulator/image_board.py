@@ -82,12 +82,14 @@ class ImageBoard:
 
     def sent(self, bus: int = HOST_BUS) -> list[can.Message]:
         """Return the frames that have left on a bus, in order."""
+        if self.machine.is_busy(self._now):
+            return []
         frames, self.machine.cans[bus].sent = self.machine.cans[bus].sent, []
         return [can.Message(arbitration_id=f.identifier >> 21, is_extended_id=False, data=f.data[: f.length]) for f in frames]
 
     def bus_off(self, bus: int, off: bool) -> None:
         """Let a bus be off, or on again."""
-        self.machine.cans[bus].off = off
+        self.machine.cans[bus].short = off
 
     @property
     def duty(self) -> float:

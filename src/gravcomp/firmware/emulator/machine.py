@@ -2,7 +2,8 @@
 
 Interrupts come while the image waits for them, or where main's loop enters the function `preempted_in`; a handler runs to its
 end. That is what the image's priorities give it, except for the interrupt of reception, which shares with the others nothing but
-rings with one writer and one reader.
+rings with one writer and one reader. While a sector of the flash is erased no interrupt comes: the image masks them, and the
+processor could not read their code. What has happened meanwhile comes after that.
 """
 
 import struct
@@ -10,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gravcomp.firmware.emulator.can_controller import CanController, WireFrame
-from gravcomp.firmware.emulator.core import CCM, RETURN, Core
+from gravcomp.firmware.emulator.core import CCM, RAM, RETURN, Core
 from gravcomp.firmware.emulator.flash_memory import MODELS, MODELS_END, FlashMemory, SupplyLost
 from gravcomp.firmware.emulator.imu_device import ImuDevice
 from gravcomp.firmware.image import BOOT_START, CODE_START, Image
@@ -42,7 +43,7 @@ class Machine(Core):
 
     Attributes: now (us), cans, imu, flash, supply_low, main_stands (main's loop does not run), preempted_in (name of a function
     in which main's loop is left until the next tick has interrupted it; empty: none), preemptions (number of these), duty,
-    resets (their causes), dead (nothing runs).
+    busy_duty (largest duty while the flash was erased), resets (their causes), dead (nothing runs).
     """
 
     def __init__(self, image: Image, unique_id: tuple[int, int, int] = (1, 2, 3)):
@@ -75,6 +76,8 @@ class Machine(Core):
         self.cans = (CanController(), CanController())
         self.imu = ImuDevice()
         self.dead = True
+        self._busy_until = 0  # us; until then the flash is erased, and no interrupt comes
+        self._edge_waits = False
         self.reset("power")
 
     def load(self, boot: bytes, code: bytes) -> None:
@@ -92,16 +95,16 @@ class Machine(Core):
     def reset(self, cause: str) -> None:
         """Start the image as after a reset, and run it until it waits. `dead` where it does not come so far."""
         self.now = 0
-        self.duty = 0
+        self.duty = self.busy_duty = 0
         self._fed = 0
         self._registers: dict[int, int] = {_RCC + 0x74: RESET_FLAGS[cause]}
         self._spi = 0xFF
         self._restart = False
         self.flash.reset()
         for can in self.cans:
-            can.received.clear()
-            can.sent.clear()
+            can.clear()
         self.resets.append(cause)
+        self._busy_until, self._edge_waits = 0, False
         self._unsettled = None
         self._left = 0
         self._uc.mem_write(CCM, bytes([_PAINT]) * STACK_SIZE)
@@ -115,9 +118,11 @@ class Machine(Core):
 
     def tick(self, now: int) -> None:
         """Let the time be `now` (us) and run the interrupt of the tick, then main's loop once; the watchdog may reset."""
-        self.now = now & 0xFFFFFFFF
-        if self.dead:
+        if self.dead or self.is_busy(now):
             return
+        self.now = now & 0xFFFFFFFF
+        if self._busy_until:
+            self._catch_up()
         self.interrupt("gc_on_tick")
         self._flush()
         self._run_main()
@@ -126,9 +131,28 @@ class Machine(Core):
         elif (self.now - self._fed) & 0xFFFFFFFF > WATCHDOG:
             self.reset("watchdog")
 
+    def is_busy(self, now: int) -> bool:
+        """Whether a sector of the flash is still erased at `now` (us), so that the image does nothing else."""
+        return bool(self._busy_until) and (now - self._busy_until) & 0xFFFFFFFF >= 1 << 31
+
+    def _catch_up(self) -> None:
+        """Let the interrupts come that have waited for the flash."""
+        self._busy_until = 0
+        for can, handler in zip(self.cans, ("gc_on_host_frame", "gc_on_motor_frame")):
+            can.overrun()
+            if can.received:
+                self.interrupt(handler)
+                can.received.clear()
+        if self._edge_waits:
+            self._edge_waits = False
+            self.data_ready(self.now)
+
     def data_ready(self, time: int) -> None:
         """Let the gyroscope's data-ready edge come at `time` (us)."""
         if self.dead or not self.imu.set_up or self.imu.silent:
+            return
+        if self._busy_until:
+            self._edge_waits = True
             return
         self._registers[_EXTI + 0x14] = _EDGE
         tick, self.now = self.now, time & 0xFFFFFFFF
@@ -142,7 +166,9 @@ class Machine(Core):
         """Let frames come on a bus."""
         if self.dead or not frames:
             return
-        self.cans[bus].received.extend(frames)
+        self.cans[bus].arrive(frames)
+        if self._busy_until or not self.cans[bus].received:
+            return
         self.interrupt("gc_on_host_frame" if bus == 0 else "gc_on_motor_frame")
         self.cans[bus].received.clear()
 
@@ -279,6 +305,7 @@ class Machine(Core):
             return 4 if self.supply_low else 0
         if _FLASH < offset < _FLASH + 0x20:
             self._settle()
+            self._wait_for_flash()
             return self.flash.read_register(offset - _FLASH)
         value = self._registers.get(offset, 0)
         if offset == _RCC:
@@ -286,6 +313,20 @@ class Machine(Core):
         if offset == _RCC + 0x08:
             return value | (value & 3) << 2
         return value
+
+    def _wait_for_flash(self) -> None:
+        """Let time pass while the flash is erased. Raises ProcessorFault where the image would read the flash meanwhile."""
+        passed = self.flash.elapse()
+        if not passed:
+            return
+        if (self.now - self._fed) & 0xFFFFFFFF > WATCHDOG:
+            raise ProcessorFault("the watchdog is not fed while the flash is erased")
+        at = self._uc.reg_read(self._arm.UC_ARM_REG_PC)
+        if at < RAM or not self._uc.reg_read(self._arm.UC_ARM_REG_PRIMASK) & 1:
+            raise ProcessorFault(f"at 0x{at:08X}: code of the flash runs, or an interrupt may come, while the flash is erased")
+        self.busy_duty = max(self.busy_duty, self.duty)
+        self.now = (self.now + passed) & 0xFFFFFFFF
+        self._busy_until = self.now or 1
 
     def _set_register(self, offset: int, value: int) -> None:
         for start, can in ((_CAN1, self.cans[0]), (_CAN2, self.cans[1])):

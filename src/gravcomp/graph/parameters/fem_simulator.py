@@ -3,7 +3,7 @@
 import dataclasses
 
 from gravcomp.config import parameter
-from gravcomp.external_loads.options import ExternalLoadOptions
+from gravcomp.external_loads.options import BaseTurnOptions, ExternalLoadOptions
 from gravcomp.load_estimation.options import LoadEstimationOptions
 
 
@@ -46,4 +46,7 @@ class FemSimulatorParameters:
     )
     load: LoadEstimationOptions = parameter(
         default_factory=LoadEstimationOptions, description="an unknown load that is found from measured/tip and measured/tension"
+    )
+    turn: BaseTurnOptions = parameter(
+        default_factory=BaseTurnOptions, description="what the turns of the base add to gravity while they last"
     )

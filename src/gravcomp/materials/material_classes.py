@@ -1,4 +1,6 @@
-"""How materials of a class creep, damp and rub inside: what the virtual robot draws around when its file does not say it.
+"""How materials of a class creep, damp and rub inside, where a robot file does not say it.
+
+The virtual robot is drawn around these values, and the fit of a calibration begins with them.
 
 Elastomers: silicones and PolyJet rubbers relax by 5 to 15 % within a minute. Thermoplastic elastomers (printed TPU) relax more;
 metals and fibres hardly. `damping` is the damping ratio of the first bending motion, `slip` the share of a rate-independent

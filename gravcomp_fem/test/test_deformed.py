@@ -1,0 +1,65 @@
+"""The controller takes the same from a shape of its process as from the shape's message."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from gravcomp_fem.deformed import PublishedShape, from_message, from_shape
+from std_msgs.msg import Header
+
+from gravcomp.contact.contacts import Contacts
+from gravcomp.simulation import Response, Shape, ShapeStatus
+
+
+@pytest.fixture
+def published() -> PublishedShape:
+    rng, points, cables = np.random.default_rng(3), 4, 5
+    contacts = Contacts(
+        obstacle=np.array([0, 1]), station=np.array([0.3, 0.9]), position=rng.normal(size=(2, 3)), normal=np.eye(3)[:2],
+        force=rng.normal(size=(2, 3)), gap=np.zeros(2), sliding=np.zeros(2, bool), by_tension=rng.normal(size=(2, cables)),
+        names=("table", "ball"),
+    )  # fmt: skip
+    shape = Shape(
+        tip_position=rng.normal(size=3),
+        tip_orientation=np.array([0.0, 0.6, 0.0, 0.8]),
+        backbone_station=np.linspace(0, 1, points),
+        backbone_position=rng.normal(size=(points, 3)),
+        backbone_orientation=np.tile([0.0, 0.0, 0.0, 1.0], (points, 1)),
+        cable_displacement=rng.normal(size=cables),
+        cable_tension=rng.uniform(size=cables),
+        gravity=rng.normal(size=3),
+        response=Response(
+            rng.normal(size=(cables, cables)) + 5.0 * np.eye(cables),
+            rng.normal(size=(6 + 3 * points, cables)),
+            rng.normal(size=cables),
+            rng.normal(size=6 + 3 * points),
+        ),
+        residual=0.0,
+        error_estimate=0.0,
+        solve_time=0.0,
+        model="reduced",
+        status=ShapeStatus.FALLBACK,
+        contacts=contacts,
+    )
+    return PublishedShape(shape, Header(frame_id="soft_base"))
+
+
+def test_a_shape_and_its_message_say_the_same(published):
+    here, there = from_shape(published), from_message(published.message())
+    for field in dataclasses.fields(here):
+        mine, other = getattr(here, field.name), getattr(there, field.name)
+        if dataclasses.is_dataclass(mine):
+            for part in dataclasses.fields(mine):
+                assert np.array_equal(getattr(mine, part.name), getattr(other, part.name)), part.name
+        else:
+            assert np.array_equal(mine, other), field.name
+    assert here.status == ShapeStatus.FALLBACK and len(here.contact) == 2
+
+
+def test_numbers_that_are_not_finite_are_refused_in_both_ways(published):
+    response = published.shape.response
+    broken = dataclasses.replace(response, compliance_ea=np.where(response.compliance_ea > 0.0, np.nan, 0.0))
+    published = PublishedShape(dataclasses.replace(published.shape, response=broken), published.header)
+    for read, given in ((from_shape, published), (from_message, published.message())):
+        with pytest.raises(ValueError, match="compliance_ea has numbers that are not finite"):
+            read(given)

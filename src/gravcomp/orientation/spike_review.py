@@ -1,0 +1,97 @@
+"""Second look at the samples of a sensor, some samples later: each one between its neighbours on both sides.
+
+In fast motion no rule can tell a spike from the samples before it: at 95 Hz the rate of a shaken hand changes by 60 deg/s from
+sample to sample. With the samples after it the same motion is a smooth curve, to within a few deg/s. So a polynomial is fitted by
+least squares to the sample in question and its neighbours, once with all of them and once without each one or two that may be
+spikes. The fit counts that has the smallest squared residual, where each sample that is left out costs a constant (a truncated
+quadratic: A. Blake, A. Zisserman, Visual Reconstruction, MIT Press 1987, ch. 3). Each axis has its own fit.
+"""
+
+import itertools
+from collections import deque
+
+import numpy as np
+
+from gravcomp.orientation.quaternion import Vector
+from gravcomp.orientation.spikes import BOUND, SpikeOptions
+
+BEFORE, AHEAD = 5, 4  # samples of the fit before and after the one in question
+DEGREE = 4
+SURE = 2.0  # of the threshold: an angle lacks for good what a wrong spike removes
+WITH_IT = 0.25  # of that: where one axis has a spike, the others are likely to have one
+_LEFT_OUT = 0.1  # cost of a sample that is left out, in squared thresholds times the residual's share of a single spike
+_MOST = 2  # spikes among the samples of a fit
+# Weights of six neighbours and the sample between them: its distance from the polynomial of degree five through them.
+_NEAR, _FAR, _FARTHEST = 0.75, -0.3, 0.05
+
+
+def _fits() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return for each of h choices of left out samples: residuals (h, n, n), value (h, n), number (h,), with ours or not (h,)."""
+    count = BEFORE + 1 + AHEAD
+    powers = np.vander(np.arange(-BEFORE, AHEAD + 1.0), DEGREE + 1, increasing=True)
+    choices = [left for size in range(_MOST + 1) for left in itertools.combinations(range(BEFORE, count), size)]
+    residuals, values = [], []
+    for left in choices:
+        kept = np.ones((count, 1))
+        kept[list(left)] = 0.0
+        fitted = powers @ np.linalg.pinv(powers * kept) * kept.T
+        residuals.append((np.eye(count) - fitted) * kept)
+        values.append(fitted[BEFORE])
+    sizes = np.array([len(left) for left in choices], float)
+    return np.array(residuals), np.array(values), sizes, np.array([BEFORE in left for left in choices])
+
+
+_RESIDUALS, _VALUES, _SIZES, _HAS_OURS = _fits()
+_COST = _LEFT_OUT * float(_RESIDUALS[0][BEFORE, BEFORE])
+
+
+class SpikeReview:
+    """One sensor of three axes. What it returns is final, so that the samples before one in question are without spikes."""
+
+    def __init__(self, floor: float, options: SpikeOptions):
+        """floor: a smaller distance from the curve is no spike."""
+        self._floor, self._options = floor, options
+        self._samples: deque[Vector] = deque(maxlen=BEFORE + 1 + AHEAD)
+        self._mean = 0.0
+
+    def reset(self) -> None:
+        """Forget the samples: what follows is no continuation of them."""
+        self._samples.clear()
+        self._mean = 0.0
+
+    def take(self, dt: float, value: Vector) -> Vector | None:
+        """Take the value (3,) of a sample `dt` s after the last one; return what counts for the one AHEAD samples before it.
+
+        None while there are too few samples for a decision.
+        """
+        samples = self._samples
+        samples.append(value)
+        if len(samples) <= BEFORE + AHEAD:
+            return None
+        a, b, c, ours, d, e, f = itertools.islice(samples, BEFORE - 3, BEFORE + 4)
+        distance = 0.0
+        for i in (0, 1, 2):
+            off = abs(ours[i] - _NEAR * (c[i] + d[i]) - _FAR * (b[i] + e[i]) - _FARTHEST * (a[i] + f[i]))
+            distance = off if off > distance else distance
+        threshold = self._options.ratio * self._mean
+        threshold = self._floor if self._floor > threshold else threshold
+        self._mean += dt / (self._options.time_constant + dt) * (min(distance, BOUND * threshold) - self._mean)
+        if distance <= threshold:
+            return ours
+        decided = self._decided(SURE * threshold)
+        samples[BEFORE] = decided
+        return decided
+
+    def _decided(self, threshold: float) -> Vector:
+        """Return what counts for the sample in question: on each axis itself, or the curve where it is a spike."""
+        values = np.array(self._samples)  # (n, 3)
+        costs = np.square(_RESIDUALS @ values).sum(axis=1) + (_COST * threshold**2 * _SIZES)[:, None]
+        ours, best = values[BEFORE], np.argmin(costs, axis=0)  # (3,) each
+        without = np.argmin(np.where(_HAS_OURS[:, None], costs, np.inf), axis=0)
+        curve = np.sum(_VALUES[without] * values.T, axis=1)
+        off = np.abs(ours - curve)
+        spike = _HAS_OURS[best] & (off > threshold)
+        if spike.any():
+            spike |= off > WITH_IT * threshold
+        x, y, z = np.where(spike, curve, ours).tolist()
+        return x, y, z

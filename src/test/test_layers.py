@@ -1,0 +1,57 @@
+"""Layers of elements along a body: thin at the clamp of a slender one, dense where it is soft, and how many are chosen."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gravcomp.description import Cable, Lumen, Material, Robot, Section, Segment
+from gravcomp.full_model import mesh_choice
+from gravcomp.full_model.mesh_choice import chosen_mesh
+from gravcomp.mesh import tube_mesh
+from gravcomp.mesh.layers import layers_of
+from gravcomp.mesh.quality import mesh_quality
+
+
+def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path):
+    """A catheter of a stiff shaft and a soft tip; with few unknowns allowed, its estimate must say that they are too few."""
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    monkeypatch.setattr(mesh_choice, "_MOST_UNKNOWNS", 1300)
+    stiff, soft = (Material(youngs_modulus=e, poissons_ratio=0.3, density=1000.0) for e in (100e6, 4e6))
+    segments = (Segment("shaft", 0.08, 2e-3, 1e-3, material=stiff), Segment("tip", 0.03, 2e-3, 1e-3, material=soft))
+    robot = Robot("catheter", segments=segments, cables=(Cable("c", 0.0, 0.8e-3, segment="tip"),))
+    choice = chosen_mesh(robot)
+    assert choice.elements.softness > 0.0 and choice.elements.first_layer < 0.3e-3
+    assert choice.error > mesh_choice.ACCURACY
+
+
+def test_the_mesh_of_a_section_whose_division_does_not_change_with_each_number_is_chosen(monkeypatch, tmp_path):
+    """Around two lumens in a rectangle 6 and 8 elements give the same division."""
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    monkeypatch.setattr(mesh_choice, "ACCURACY", 0.05)
+    material = Material(youngs_modulus=26e6, poissons_ratio=0.4)
+    section, lumens = Section("rectangle", 20e-3, 10e-3), (Lumen(4e-3, -5e-3), Lumen(4e-3, 5e-3))
+    robot = Robot("flat", segments=(Segment("a", 0.1, material=material, section=section, lumens=lumens),))
+    choice = chosen_mesh(robot)
+    assert 0.0 < choice.error < 0.05
+
+
+def test_the_first_mesh_of_a_tapered_body_with_lumens_is_well_shaped_with_its_thin_layers():
+    lumens = tuple(Lumen(5e-3, 7e-3 * np.cos(a), 7e-3 * np.sin(a), True) for a in (0.0, 2.1, 4.2))
+    arm = Segment("arm", 0.25, 30e-3, lumens=lumens, tip_outer_diameter=8e-3)
+    robot = Robot("octopus", segments=(arm,))
+    elements = mesh_choice._start(robot)
+    assert elements.first_layer is not None
+    assert mesh_quality(tube_mesh(dataclasses.replace(robot, elements=elements))).jacobian_ratio >= 0.2
+
+
+def test_layers_double_from_the_clamp_and_are_denser_where_the_body_is_soft():
+    materials = (Material(youngs_modulus=16e6), Material(youngs_modulus=1e6))
+    robot = Robot("two", segments=tuple(Segment(f"s{i}", 0.1, 4e-3, material=m) for i, m in enumerate(materials)))
+    heights, piece = layers_of(robot.pieces, 24, 1.0, first=0.5e-3)
+    thickness = np.diff(heights)
+    assert thickness[:3] == pytest.approx([0.5e-3, 1e-3, 2e-3], rel=0.2)
+    assert thickness[10:] == pytest.approx(thickness[-1], rel=0.2) and heights[-1] == pytest.approx(0.2)
+    assert pytest.approx(heights[piece.count(0)]) == 0.1
+    heights, piece = layers_of(robot.pieces, 30, 1.0, softness=0.5)
+    assert piece.count(1) == 4 * piece.count(0)

@@ -1,0 +1,48 @@
+"""A sample is read from a serialised Imu as from the message, for every length of the frame's name."""
+
+import struct
+
+import numpy as np
+import pytest
+from gravcomp_node.serialised_imu import read_sample
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu
+
+
+def message(rng: np.random.Generator, frame: str) -> Imu:
+    filled = Imu()
+    filled.header.frame_id = frame
+    filled.header.stamp.sec, filled.header.stamp.nanosec = int(rng.integers(2**31)), int(rng.integers(10**9))
+    for vector in (filled.angular_velocity, filled.linear_acceleration, filled.orientation):
+        vector.x, vector.y, vector.z = rng.normal(size=3)
+    for name in ("orientation", "angular_velocity", "linear_acceleration"):
+        setattr(filled, f"{name}_covariance", rng.normal(size=9))
+    return filled
+
+
+@pytest.mark.parametrize("length", range(18))
+def test_a_sample_is_the_one_in_the_message(length):
+    filled = message(np.random.default_rng(length), "x" * length)
+    stamp, rate, force = read_sample(serialize_message(filled))
+    assert stamp == filled.header.stamp.sec * 10**9 + filled.header.stamp.nanosec
+    w, a = filled.angular_velocity, filled.linear_acceleration
+    assert (rate, force) == ((w.x, w.y, w.z), (a.x, a.y, a.z))
+
+
+def test_another_encoding_is_left_to_rclpy():
+    filled = message(np.random.default_rng(1), "")
+    little = serialize_message(filled)
+    body = struct.unpack("<iI", little[4:12]), struct.unpack("<37d", little[20:])
+    big = b"\x00\x00\x00\x00" + struct.pack(">iI", *body[0]) + struct.pack(">I", 1) + bytes(4) + struct.pack(">37d", *body[1])
+    assert read_sample(big) == read_sample(little)
+
+
+@pytest.mark.parametrize("kept", [0, 3, 11, 40, 100, 300])
+def test_a_cut_message_is_refused(kept):
+    cut = (serialize_message(message(np.random.default_rng(2), "imu"))[:kept]).ljust(2, b"\x01")
+    cut = b"\x00\x01" + cut[2:]
+    if kept < 240:
+        with pytest.raises(ValueError, match="is cut"):
+            read_sample(cut)
+    else:  # the last numbers, which are not read, are missing
+        read_sample(cut)
