@@ -24,8 +24,27 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _COMMANDS = Path(__file__).parent / "test"
 _SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
-# Modules that take half a minute and more.
-_LONG = ("test_documented_", "test_demo", "test_arm_command", "test_docs", "test_colcon_workspace", "test_contact", "test_cal")
+# Modules that begin first among their kind, in this order: those that take longest. pytest-xdist gives a process that has at most
+# two tests left its next module at once, so a short one comes behind each that has a single long test.
+FIRST = (
+    "test_documented_firmware",
+    "test_documented_experiments",
+    "test_bad_input",
+    "test_documented_benchmarks",
+    "test_docs",
+    "test_documents",
+    "test_arm_command",
+    "test_demo",
+    "test_documented_nodes",
+    "test_documented_lines",
+    "test_colcon_workspace",
+    "test_record_replay",
+    "test_targets",
+    "test_check",
+    "test_contact",
+    "test_reduction",
+    "test_calibrate_command",
+)
 _LOCK = "GRAVCOMP_TEST_LOCK"  # environment variable with the file that the processes of a run lock
 
 
@@ -77,9 +96,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Rates; commands without a graph, which run next to them; other graphs; unit tests. Of each kind the long modules come first.
     """
 
-    def rank(item: pytest.Item) -> tuple[int, bool]:
+    def rank(item: pytest.Item) -> tuple[int, int]:
         kind = {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2}[_mark(item)]
-        return kind, not item.path.stem.startswith(_LONG)
+        return kind, FIRST.index(item.path.stem) if item.path.stem in FIRST else len(FIRST)
 
     items.sort(key=rank)
 

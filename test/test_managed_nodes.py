@@ -7,6 +7,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy", reason="it starts nodes: ./gravcomp test")
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import ReliabilityPolicy
 from ros2_line import Ros2
 from std_srvs.srv import SetBool, Trigger
@@ -113,6 +114,23 @@ def test_a_dump_with_unset_parameters_can_be_loaded(start, observer):
     start("gravcomp_estimation", "imu_estimator", **{"heater.target": None, "heater.ambient": 21.0})
     assert observer.state_of("/imu_estimator") == "active"
     assert "successful" in observer.run("ros2 param set /imu_estimator heater.ambient None")
+
+
+def test_a_change_of_a_parameter_is_an_event_and_a_refused_one_is_not(start, observer):
+    start("gravcomp_estimation", "imu_estimator")
+    events = observer.listen(ParameterEvent, "/parameter_events")
+    line, values = "ros2 param set /imu_estimator prediction.horizon_ms", iter(range(1, 100))
+
+    def is_heard() -> bool:  # the event of an earlier change may have come before the node knew of the subscription
+        with pytest.raises(AssertionError, match="out of range Min: 0.0, Max: 500.0, value: 501.0"):
+            observer.run(f"{line} 501.0")
+        observer.run(f"{line} {next(values)}.0")
+        return any(event.changed_parameters for event in events if event.node == "/imu_estimator")
+
+    observer.until(is_heard, "no event comes")
+    changes = [change for event in events if event.node == "/imu_estimator" for change in event.changed_parameters]
+    assert {change.name for change in changes} == {"prediction.horizon_ms"}
+    assert all(change.value.double_value < 500.0 for change in changes)
 
 
 def test_a_node_ends_without_error_messages(start, observer, tmp_path):

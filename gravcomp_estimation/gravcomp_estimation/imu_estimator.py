@@ -141,11 +141,11 @@ class ImuEstimator(ManagedNode):
         known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
         continued = self._counter.continued(stamp)
         estimate = self._estimator.update(continued, gyro, accel, known)
-        self._monitor.add(continued, gyro, accel if isinstance(estimate, Problem) else estimate.accel)
         problem = estimate if isinstance(estimate, Problem) else estimate.imu.problem
         if problem is not Problem.NONE:
             self._problem, self._problem_time = problem, now
         if isinstance(estimate, Problem):
+            self._monitor.add(continued, gyro, accel)
             return
         step = (stamp - self._stamp_ns) * 1e-9
         if 0.0 < step < self.parameters.filter.sensor.largest_gap:
@@ -153,6 +153,7 @@ class ImuEstimator(ManagedNode):
         self._stamp_ns, self._estimate = stamp, estimate
         parameters = self.parameters
         self._gravity.publish(messages.vector(stamp, parameters.base_frame, estimate.gravity))
+        self._monitor.add(continued, gyro, estimate.accel)  # the loop waits for gravity, not for the checks of the stream
         if self._imu.get_subscription_count():
             self._imu.publish(messages.imu_data(estimate, parameters.imu_frame, self._period, parameters.filter))
         if not 0 <= stamp - self._bias_stamp_ns < BIAS_PERIOD_NS:

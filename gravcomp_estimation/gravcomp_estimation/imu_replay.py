@@ -6,6 +6,7 @@ every sample; a slow one delays the replay.
 
 import time
 
+import numpy as np
 from gravcomp_node.managed_node import OK
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
@@ -48,13 +49,16 @@ class ImuReplay(ManagedNode):
         for note in recording.notes:
             self.get_logger().warning(f"{parameters.file}: {note}")
         shift = max(0, EARLIEST_NS - int(recording.stamp_ns[0]))
-        # In the order of the stamps; a temperature precedes the sample with the same stamp.
-        self._events = [(s + shift, 1, i) for i, s in enumerate(recording.stamp_ns.tolist())]
+        self._recording = recording
+        # Places of the events: a temperature by -1 - its index, a sample by its index. In the order of the stamps, where a
+        # temperature precedes the sample with the same stamp; samples whose stamps are out of order stay as they are without it.
+        self._places, self._stamps = np.arange(len(recording)), recording.stamp_ns + shift
         if recording.temperature is not None:
-            self._events += [(s + shift, 0, i) for i, s in enumerate(recording.temperature_stamp_ns.tolist())]
-            self._temperatures = recording.temperature.tolist()
-            self._events.sort(key=lambda event: event[:2])
-        self._gyro, self._accel = recording.gyro.tolist(), recording.accel.tolist()
+            readings = len(recording.temperature)
+            self._places = np.concatenate([-1 - np.arange(readings), self._places])
+            self._stamps = np.concatenate([recording.temperature_stamp_ns + shift, self._stamps])
+            order = np.argsort(self._stamps, kind="stable")
+            self._places, self._stamps = self._places[order], self._stamps[order]
         self._round_ns = int(recording.duration * 1e9 + 1e9 / recording.rate)
         self._imu = self.create_publisher(Imu, "imu/data_raw", LOSSLESS)
         self._temperature = self.create_publisher(Temperature, "imu/temperature", LOSSLESS)
@@ -97,18 +101,18 @@ class ImuReplay(ManagedNode):
             if not settled and now - self._waiting_since < self.parameters.wait_for_subscribers:
                 return
             self._begin = now
-            self.get_logger().info(f"playing {len(self._gyro)} samples of {self.parameters.file}")
+            self.get_logger().info(f"playing {len(self._recording)} samples of {self.parameters.file}")
             self.report(OK, f"playing {self.parameters.file}")
-        first_ns = self._events[0][0]
-        while self._next < len(self._events):
-            stamp = self._events[self._next][0]
+        first_ns = int(self._stamps[0])
+        while self._next < len(self._stamps):
+            stamp = int(self._stamps[self._next])
             due = self._begin + (stamp + self._shift_ns - first_ns) * 1e-9 / self.parameters.rate if self.parameters.rate else 0.0
             if due > time.monotonic() or time.monotonic() - now > LONGEST_TICK:
                 return
-            if not self._publish(*self._events[self._next]):
+            if not self._publish(stamp, int(self._places[self._next])):
                 return
             self._next += 1
-            if self._next == len(self._events) and self.parameters.loop:
+            if self._next == len(self._stamps) and self.parameters.loop:
                 self._next = 0
                 self._shift_ns += self._round_ns
         self._imu.wait_for_all_acked(Duration(seconds=5.0))
@@ -130,15 +134,17 @@ class ImuReplay(ManagedNode):
             return False
         return any(topic not in ("/clock", "/parameter_events") for topic, _ in subscribed)
 
-    def _publish(self, stamp: int, kind: int, index: int) -> bool:
+    def _publish(self, stamp: int, place: int) -> bool:
         """Publish one event; return False when the subscriber is too slow and the event must be repeated."""
         stamp += self._shift_ns
         frame = self.parameters.imu_frame
         try:
-            if kind == 1:
-                self._imu.publish(messages.raw_imu(stamp, frame, self._gyro[index], self._accel[index]))
+            if place >= 0:
+                gyro, accel = self._recording.gyro[place].tolist(), self._recording.accel[place].tolist()
+                self._imu.publish(messages.raw_imu(stamp, frame, gyro, accel))
             else:
-                reading = Temperature(header=messages.header(stamp, frame), temperature=self._temperatures[index])
+                temperature = float(self._recording.temperature[-1 - place])
+                reading = Temperature(header=messages.header(stamp, frame), temperature=temperature)
                 self._temperature.publish(reading)
         except RCLError:
             return False

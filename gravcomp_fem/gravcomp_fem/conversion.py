@@ -4,7 +4,6 @@ from array import array
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray
-from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
@@ -17,7 +16,7 @@ from gravcomp_msgs.msg import Deformation, ShapeTarget
 
 def seconds(header: Header) -> float:
     """Return the stamp of a header in s."""
-    return Time.from_msg(header.stamp).nanoseconds * 1e-9
+    return (header.stamp.sec * 1_000_000_000 + header.stamp.nanosec) * 1e-9
 
 
 def deformation_message(shape: Shape, header: Header) -> Deformation:

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 import rclpy
 import yaml
-from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
+from geometry_msgs.msg import Point, QuaternionStamped, Vector3, Vector3Stamped
 from gravcomp_fem.viewer import Viewer
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.commands.record import describe
-from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Record, SetTarget, TiltBase
+from gravcomp.view.requests import BridgeService, Compensate, InjectFault, PlaceWall, Push, Record, SetTarget, TiltBase
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion
-from gravcomp_msgs.msg import ShapeTarget
-from gravcomp_node import COMMAND
+from gravcomp.virtual.placed_wall import parse_wall
+from gravcomp_msgs.msg import ShapeTarget, VirtualForces
+from gravcomp_node import COMMAND, SENSOR
 
 
 class Stand:
@@ -38,6 +39,8 @@ class Stand:
                 (ShapeTarget, "target/shape"),
                 (QuaternionStamped, "virtual/base_orientation"),
                 (String, "virtual/fault"),
+                (String, "virtual/hand"),
+                (String, "virtual/wall"),
             ):
                 self.other.create_subscription(kind, topic, lambda m, t=topic: self.heard.setdefault(t, []).append(m), COMMAND)
             for name in ("inverse_controller/relax", "can_bridge/home", "can_bridge/stop"):
@@ -138,6 +141,35 @@ def test_a_fault_is_published_as_yaml_of_the_virtual_robot(stand):
     stand.until(lambda: "virtual/fault" in stand.heard, "no fault")
     fault = Fault.parse(yaml.safe_load(stand.heard["virtual/fault"][0].data), "page")
     assert (fault.kind, fault.cable, fault.duration) == ("stall", "s1c2", 2.0)
+
+
+def test_hand_and_wall_are_published_as_yaml_of_the_virtual_robot(stand):
+    stand.ask(Push((0.02, 0.0, 0.095)))
+    stand.ask(PlaceWall(((-0.03, 0.0, 0.0), (1.0, 0.0, 0.0))))
+    stand.until(lambda: {"virtual/hand", "virtual/wall"} <= set(stand.heard), "no hand, or no wall")
+    assert yaml.safe_load(stand.heard["virtual/hand"][0].data) == {"place_mm": [20.0, 0.0, 95.0]}
+    wall = parse_wall(yaml.safe_load(stand.heard["virtual/wall"][0].data), "page", 0.1, 0.0045)
+    assert (wall.name, wall.point, wall.normal) == ("unknown wall", (-0.03, 0.0, 0.0), (1.0, 0.0, 0.0))
+    stand.ask(Push(None))
+    stand.ask(PlaceWall(None))
+    stand.until(lambda: len(stand.heard["virtual/hand"]) == len(stand.heard["virtual/wall"]) == 2, "not let go")
+    assert (stand.heard["virtual/hand"][1].data, stand.heard["virtual/wall"][1].data) == ("release", "clear")
+
+
+def test_forces_on_the_virtual_robot_are_shown(stand):
+    forces = stand.other.create_publisher(VirtualForces, "truth/forces", SENSOR)
+    message = VirtualForces(source=["slab"], position=[Point(z=0.1)], force=[Vector3(x=0.02)], has_wall=True)
+    message.wall_normal.x = 1.0
+
+    def shown() -> bool:
+        forces.publish(message)
+        return bool(stand.viewer.observer.snapshot().virtual_touches)
+
+    stand.until(shown, "no force")
+    snapshot = stand.viewer.observer.snapshot()
+    (touch,) = snapshot.virtual_touches
+    assert touch.source == "slab" and touch.force[0] == 0.02 and touch.place[2] == 0.1
+    assert snapshot.wall is not None and snapshot.wall[1][0] == 1.0
 
 
 def test_the_button_records_a_bag(stand, tmp_path):

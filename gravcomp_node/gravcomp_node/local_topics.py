@@ -13,7 +13,6 @@ publisher publishes; where the receiver's node is itself publishing, its message
 """
 
 import collections
-import contextlib
 import dataclasses
 import functools
 import time
@@ -64,13 +63,14 @@ class LocalTopics:
         self.wake: Callable[[], None] = lambda: None
         self._publishers: dict[str, list[LocalPublisher]] = collections.defaultdict(list)
         self._receivers: dict[str, list[_Receiver]] = collections.defaultdict(list)
+        self._of: dict[int, _Receiver] = {}  # by the id of the subscription; rclpy asks the middleware for the name of its topic
         self._waiting: collections.deque[tuple[_Receiver, Callable[[Any], None], Any]] = collections.deque()
         self._publishing: list[Node] = []  # nodes that publish now, each one in a callback that the one before it called
         self._followed = 0.0
 
     def add_publisher(self, node: Node, publisher: "LocalPublisher") -> None:
         """Take a publisher of a node of this process."""
-        publisher.local, publisher.node = self, node
+        publisher.local, publisher.node, publisher.receivers = self, node, self._receivers[publisher.topic_name]
         self._publishers[publisher.topic_name].append(publisher)
         self._decide(publisher.topic_name)
 
@@ -85,6 +85,7 @@ class LocalTopics:
         depth = subscription.qos_profile.depth if subscription.qos_profile.history == HistoryPolicy.KEEP_LAST else None
         receiver = _Receiver(node, subscription, callback, takes, kept=collections.deque(maxlen=depth))
         self._receivers[subscription.topic_name].append(receiver)
+        self._of[id(subscription)] = receiver
         self._decide(subscription.topic_name)
 
     def remove(self, entity: Publisher | Subscription) -> None:
@@ -93,31 +94,25 @@ class LocalTopics:
             publishers[:] = [publisher for publisher in publishers if publisher is not entity]
         for receivers in self._receivers.values():
             receivers[:] = [receiver for receiver in receivers if receiver.subscription is not entity]
+        self._of.pop(id(entity), None)
         self._waiting = collections.deque(call for call in self._waiting if call[0].subscription is not entity)
 
     def is_local(self, subscription: Subscription) -> bool:
         """Whether a subscription receives locally now."""
-        receiver = self._receiver(subscription)
+        receiver = self._of.get(id(subscription))
         return receiver is not None and receiver.is_local
 
     def kept(self, subscription: Subscription) -> list[tuple[Any, int, int]]:
         """Return the messages that a polled subscription has received locally since the last call: message, ns, number."""
-        receiver = self._receiver(subscription)
+        receiver = self._of.get(id(subscription))
         if receiver is None:
             return []
         taken = list(receiver.kept)
         receiver.kept.clear()
         return taken
 
-    def receivers(self, topic: str) -> int:
-        """Return the number of subscriptions that receive a topic locally."""
-        return sum(receiver.is_local for receiver in self._receivers.get(topic, ()))
-
-    def deliver(self, publisher: "LocalPublisher", message: Any) -> None:
-        """Hand a message or an `Adapted` value to the local receivers of its topic."""
-        receivers = [receiver for receiver in self._receivers.get(publisher.topic_name, ()) if receiver.is_local]
-        if not receivers:
-            return
+    def deliver(self, publisher: "LocalPublisher", message: Any, receivers: list[_Receiver]) -> None:
+        """Hand a message or an `Adapted` value of a publisher to local receivers of its topic."""
         self._publishing.append(publisher.node)
         try:
             for receiver in receivers:
@@ -143,9 +138,11 @@ class LocalTopics:
 
     def call_next(self) -> None:
         """Call the callback of the oldest message that waits, if there is one."""
-        with contextlib.suppress(IndexError):
+        try:
             _, callback, taken = self._waiting.popleft()
-            callback(taken)
+        except IndexError:
+            return
+        callback(taken)
 
     def follow(self) -> None:
         """Look for publishers in other processes, every FOLLOW_PERIOD."""
@@ -155,10 +152,6 @@ class LocalTopics:
         self._followed = now
         for topic in self._receivers:
             self._decide(topic)
-
-    def _receiver(self, subscription: Subscription) -> _Receiver | None:
-        receivers = self._receivers.get(subscription.topic_name, ())
-        return next((receiver for receiver in receivers if receiver.subscription is subscription), None)
 
     def _decide(self, topic: str) -> None:
         own = self._publishers.get(topic, [])
@@ -191,6 +184,7 @@ class LocalPublisher(Publisher):
 
     local: LocalTopics | None = None
     node: Node
+    receivers: list[_Receiver]
     count = 0
 
     def publish(self, message: Any) -> None:
@@ -201,6 +195,8 @@ class LocalPublisher(Publisher):
         self.count += 1
         # First to the middleware: the receivers here may take a while.
         latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL  # kept for those who subscribe later
-        if latched or self.get_subscription_count() > self.local.receivers(self.topic_name):
+        receivers = [receiver for receiver in self.receivers if receiver.is_local]
+        if latched or self.get_subscription_count() > len(receivers):
             super().publish(message_of(message))
-        self.local.deliver(self, message)
+        if receivers:
+            self.local.deliver(self, message, receivers)

@@ -6,16 +6,17 @@ from pathlib import Path
 
 from numba.core.caching import _CacheLocator  # Numba documents no public base class for locators
 
-from gravcomp.compiled_functions import PACKAGE, compiled_folder
+from gravcomp.compiled_functions import PACKAGE, module_folder
 
-_folder = functools.cache(compiled_folder)
+_folder = functools.cache(module_folder)
 
 
 class ContentLocator(_CacheLocator):
-    """Places the compiled code of a function of this package in the folder of the present code."""
+    """Places the compiled code of a function of this package in the folder of the code that it consists of."""
 
     def __init__(self, module: Path):
-        self._path = _folder() / module.with_suffix("")
+        self._folder = _folder(".".join(["gravcomp", *module.with_suffix("").parts]).removesuffix(".__init__"))
+        self._path = self._folder / module.with_suffix("")
 
     @classmethod
     def from_function(cls, py_func: Callable, py_file: str) -> "ContentLocator | None":
@@ -29,7 +30,7 @@ class ContentLocator(_CacheLocator):
 
     def get_source_stamp(self) -> str:
         """Return what must be equal for the compiled code to be valid: the folder's name stands for all code."""
-        return _folder().name
+        return self._folder.name
 
     def get_disambiguator(self) -> str:
         """Return what tells functions of one name in one module apart: nothing, their qualified names do."""

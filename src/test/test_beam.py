@@ -1,11 +1,15 @@
 """What a recording of the silicone beam shows without a model: the free swing, the hand's turn, the slowing to the rest."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from gravcomp.calibration.measured import MeasurementError
-from gravcomp.experiments.measured.beam import Damping, hand_removed, slowing
+from gravcomp.experiments.measured.beam import Damping
+from gravcomp.experiments.measured.beam_fit import COARSE, THEIRS, BareFit, hand_removed, prediction_interval, slowing
+from gravcomp.experiments.measured.beam_model import resting_face
 from gravcomp.experiments.measured.beam_recording import hand_turn, read, swing, turn_in_plane
 
 FREQUENCY, DECAY, TURN, CREEP = 4.0, 2.5, 15.0, 0.01  # Hz, 1/s, rad/m, per e-fold of the time
@@ -81,3 +85,17 @@ def test_a_recording_of_a_beam_that_never_falls_is_refused(tmp_path):
         read(path)
     with pytest.raises(MeasurementError, match="begins with none of gravity, load52, load101"):
         read(tmp_path / "other.csv")
+
+
+def test_what_the_bare_beam_leaves_open_widens_the_prediction_of_a_loaded_one():
+    """A modulus known within 1 %, and a plate that is known or not, against the sag of a cantilever."""
+    softer = np.diag([0.01**2, 0.0])
+    fit = BareFit(THEIRS, THEIRS, 2e-3, np.zeros(3), [], softer)
+    sag = -resting_face(THEIRS, 0.02, 2e-3, COARSE).position[0]
+    assert prediction_interval(fit, 0.02, COARSE) == pytest.approx(1.96 * 0.01 * sag, rel=0.15)
+    unknown = dataclasses.replace(fit, covariance=softer + np.diag([0.0, 1e-3**2]))
+    one_gram = 9.81e-3 * 0.1**3 / (3 * THEIRS * 0.03**4 / 12)  # m, of a slender cantilever
+    assert prediction_interval(unknown, 0.02, COARSE) == pytest.approx(1.96 * np.hypot(0.01 * sag, one_gram), rel=0.2)
+    # A heavier plate on a stiffer beam sags alike: what both leave open together is less.
+    together = unknown.covariance + 0.9 * 0.01 * 1e-3 * np.array([[0.0, -1.0], [-1.0, 0.0]])
+    assert prediction_interval(dataclasses.replace(fit, covariance=together), 0.02, COARSE) < 1.96 * max(0.01 * sag, one_gram)

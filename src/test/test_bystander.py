@@ -35,7 +35,7 @@ def pull(robot, place, seconds):
 
 def test_a_hand_pulls_the_tip_to_it_and_the_tip_comes_back(robot):
     before = robot.truth.tip_position
-    pull(robot, before + [0.02, 0.0, 0.0], 1.5)
+    pull(robot, before + np.array([0.02, 0.0, 0.0]), 1.5)
     moved, force = robot.truth.tip_position - before, robot.truth.hand_force
     # A spring three times as stiff as the tip takes it three quarters of the way, less what the cables hold.
     assert 0.008 < moved[0] < 0.016 and abs(moved[1]) < 0.002

@@ -23,31 +23,75 @@ def test_the_folder_can_be_chosen(tmp_path, monkeypatch):
     assert (tmp_path / "reduction").is_dir()
 
 
-@pytest.mark.parametrize(
-    ("other", "same"),
-    [
-        ("import numba  # another comment\n\ndef f(x):\n    return x + 1", True),
-        ('import numba\ndef f(x):\n    """Says what it does."""\n    return x + 1', True),
-        ("import numba\ndef f(x):\n    return x + 2", False),
-    ],
-)
-def test_compiled_functions_are_kept_by_the_code_of_all_modules(other, same, tmp_path, monkeypatch):
-    """Numba would take a function from its cache although one that it calls, in another file, has changed."""
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Return a function that writes a module of a package and returns the folder of its functions."""
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(compiled_functions, "PACKAGE", tmp_path / "package")
+
+    def write(text, name="compiled"):
+        path = tmp_path / "package" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        compiled_functions._read_sources.cache_clear()
+        return compiled_functions.module_folder(
+            "gravcomp.compiled" if (tmp_path / "package/compiled.py").exists() else "gravcomp"
+        )
+
     (tmp_path / "package").mkdir()
-    folders = []
-    for text in ("import numba\ndef f(x):\n    return x + 1", other):
-        (tmp_path / "package" / "compiled.py").write_text(text)
-        (tmp_path / "package" / "plain.py").write_text(f"# {text}".replace("numba", "other"))
-        folders.append(compiled_functions.compiled_folder())
-    assert (folders[0] == folders[1]) == same
+    write("", "__init__")
+    yield write
+    compiled_functions._read_sources.cache_clear()
+
+
+BEFORE = "import numba\nfrom gravcomp.parts import LIMIT, called\ndef f(x):\n    return x + 1"
+
+
+@pytest.mark.parametrize(
+    ("other", "same"),
+    [
+        (f"# another comment\n\n{BEFORE}", True),
+        (BEFORE.replace("(x):\n", '(x):\n    """Says what it does."""\n'), True),
+        (BEFORE.replace("+ 1", "+ 2"), False),
+    ],
+)
+def test_compiled_functions_are_kept_by_their_code(package, other, same):
+    assert (package(BEFORE) == package(other)) == same
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after", "same"),
+    [
+        ("parts/inner", "import numba\ndef called():\n    return 1", "import numba\ndef called():\n    return 2", False),
+        ("parts/values", "LIMIT = 1.0", "LIMIT = 2.0", False),
+        ("parts/other", "import numba\ndef f():\n    return 1", "import numba\ndef f():\n    return 2", True),
+        ("parts/plain", "def g(): return 1", "def g(): return 2", True),
+    ],
+)
+def test_a_change_matters_where_functions_constants_or_named_tuples_come_from_it(package, name, before, after, same):
+    """Numba would take a function from its cache although one that it calls, in another file, has changed."""
+    passed_on = "from gravcomp.parts.inner import (\n    called,  # a function\n)\nfrom gravcomp.parts.values import LIMIT\n"
+    package(passed_on, "parts/__init__")
+    package("import numba\ndef called():\n    return 1", "parts/inner")
+    package("LIMIT = 1.0", "parts/values")
+    package(BEFORE + "\nfrom gravcomp.parts.plain import g")
+    assert (package(before, name) == package(after, name)) == same
+
+
+def test_the_functions_of_every_module_have_a_folder_by_what_they_consist_of(monkeypatch):
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    sources = compiled_functions._sources()
+    compiled = [name for name, source in sources.items() if source.compiled]
+    assert len({compiled_functions.module_folder(name) for name in compiled}) == len(compiled) > 40
+    assert "gravcomp.rounding" in compiled_functions._contained("gravcomp.mechanics.assembly", sources)
 
 
 def test_the_digests_of_unchanged_files_are_remembered(tmp_path, monkeypatch):
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    compiled_functions._read_sources.cache_clear()
     folder = compiled_functions.compiled_folder()
-    monkeypatch.setattr(compiled_functions, "digest", lambda source: pytest.fail("a file was read again"))
+    compiled_functions._read_sources.cache_clear()
+    monkeypatch.setattr(compiled_functions, "digest", lambda *source: pytest.fail("a file was read again"))
     assert compiled_functions.compiled_folder() == folder

@@ -10,6 +10,9 @@ from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file
 from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target
+from gravcomp.mesh import tube_mesh
+from gravcomp.references import calculix_contact
+from gravcomp.references.calculix_contact import cylinder, stored_rests
 from gravcomp.references.contact_beams import over_peg
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -150,11 +153,36 @@ def test_a_rod_over_a_peg_follows_the_closed_form():
     assert -shape.tip_position[0] == pytest.approx(tip, rel=2e-2)
 
 
+@pytest.mark.parametrize("rest", stored_rests()[1:], ids=lambda rest: f"{1e3 * rest.gap:g} mm")
+def test_a_cylinder_rests_on_a_plane_as_calculix_finds_it(rest):
+    model, low = RobotModel(cylinder()), -0.5e3 * cylinder().segments[0].outer_diameter
+    shape = in_scene(model, planes=[{"normal": [1, 0, 0], "point_mm": [low - 1e3 * rest.gap, 0, 0]}]).solve(G)
+    assert shape.is_equilibrium
+    assert shape.contacts.normal_force.sum() == pytest.approx(rest.force, rel=5e-3)
+    assert np.linalg.norm(shape.tip_position - [0.0, 0.0, model.length] - rest.tip) < 1e-3 * model.length
+
+
+def test_the_deck_of_calculix_has_a_gap_under_each_node_of_the_lowest_line():
+    mesh = tube_mesh(cylinder())
+    lines = calculix_contact.deck(mesh, 5e-3).splitlines()
+    start = lines.index("*ELEMENT, TYPE=GAPUNI, ELSET=GAPS") + 1
+    pairs = [[int(x) - 1 for x in line.split(",")[1:]] for line in lines[start : lines.index("*NSET, NSET=GROUND")]]
+    assert len(pairs) == 24 and lines[lines.index("*GAP, ELSET=GAPS") + 1].startswith("5.000000000e-03, 1.0, 0.0, 0.0")
+    ground, node = pairs[-1]
+    place = [float(x) for x in lines[lines.index("*NODE, NSET=ALL") + 1 + ground].split(",")[1:]]
+    assert place == pytest.approx(mesh.nodes[node] - [5e-3, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("kinds", "message"),
     [
         ({"planes": [{"normal": [1, 0, 0], "point_mm": [-3, 0, 0]}]}, "starts 1.5 mm inside 'plane 1'"),
         ({"tubes": [{"points_mm": [[0, 0, -10], [0, 0, 200]], "radius_mm": [9, 4]}]}, "radius of 'tube 1' is 4 mm"),
+        (
+            {"planes": [{"frame": "world", "normal": [0, 0, z], "point_mm": [0, 0, -3 * z]} for z in (1, -1)]},
+            "between the walls of 'plane 1' and 'plane 2' there are 6 mm; the robot needs more than its diameter, 9 mm",
+        ),
+        ({"boxes": [{"centre_mm": [0, 0, 60], "size_mm": [40, 8, 300], "side": "inside"}]}, "walls of 'box 1' there are 8 mm"),
     ],
 )
 def test_a_scene_that_leaves_no_room_for_the_robot_is_refused(model, kinds, message):

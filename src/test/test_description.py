@@ -67,6 +67,7 @@ def change(path, value):
 
 
 VIA_AND_START = {"name": "s1c2", "via_points_mm": [[0, 2, 5], [0, 2, 50]], "start_mm": 5}
+BACKWARDS = {"name": "s1c2", "via_points_mm": [[0, 2, 50], [0, 2, 5]]}
 MISTAKES = [
     (change(["segments", 0, "length_mm"], -5), ["robot.segments[0].length_mm", "-5", "1 to 5000 mm"]),
     (change(["segments", 1, "lumen_diameter_mm"], 9.5), ["robot.segments[1]", "lumen_diameter_mm is 9.5", "8.82"]),
@@ -83,6 +84,9 @@ MISTAKES = [
     (change(["cables", 1, "via_points_mm"], [[0, 2, 0], [0, 2, 50]]), ["cables[1]", "via_points_mm and also"]),
     (change(["body"], {"file": "a.stl", "length_mm": 100.0}), ["both of segments and body"]),
     (change(["segments"], None), ["neither of segments and body"]),
+    (change(["segments", 0, "material", "density"], 1.07), ["density is 1.07", "1.07 g/cm^3 would be 1070 kg/m^3"]),
+    (change(["cables", 1, "angle_deg"], 0.0), ["'s1c1' and 's1c2' are the same line"]),
+    (change(["cables", 1], BACKWARDS), ["cables[1]", "begin at z = 50 and end at 5", "farther from the base"]),
 ]
 
 

@@ -1,12 +1,16 @@
 """Layers of elements along a body: thin at the clamp of a slender one, dense where it is soft, and how many are chosen."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from gravcomp.description import Cable, Material, Robot, Segment
+from gravcomp.description import Cable, Lumen, Material, Robot, Section, Segment
 from gravcomp.full_model import mesh_choice
 from gravcomp.full_model.mesh_choice import chosen_mesh
+from gravcomp.mesh import tube_mesh
 from gravcomp.mesh.layers import layers_of
+from gravcomp.mesh.quality import mesh_quality
 
 
 def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path):
@@ -19,6 +23,26 @@ def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path
     choice = chosen_mesh(robot)
     assert choice.elements.softness > 0.0 and choice.elements.first_layer < 0.3e-3
     assert choice.error > mesh_choice.ACCURACY
+
+
+def test_the_mesh_of_a_section_whose_division_does_not_change_with_each_number_is_chosen(monkeypatch, tmp_path):
+    """Around two lumens in a rectangle 6 and 8 elements give the same division."""
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    monkeypatch.setattr(mesh_choice, "ACCURACY", 0.05)
+    material = Material(youngs_modulus=26e6, poissons_ratio=0.4)
+    section, lumens = Section("rectangle", 20e-3, 10e-3), (Lumen(4e-3, -5e-3), Lumen(4e-3, 5e-3))
+    robot = Robot("flat", segments=(Segment("a", 0.1, material=material, section=section, lumens=lumens),))
+    choice = chosen_mesh(robot)
+    assert 0.0 < choice.error < 0.05
+
+
+def test_the_first_mesh_of_a_tapered_body_with_lumens_is_well_shaped_with_its_thin_layers():
+    lumens = tuple(Lumen(5e-3, 7e-3 * np.cos(a), 7e-3 * np.sin(a), True) for a in (0.0, 2.1, 4.2))
+    arm = Segment("arm", 0.25, 30e-3, lumens=lumens, tip_outer_diameter=8e-3)
+    robot = Robot("octopus", segments=(arm,))
+    elements = mesh_choice._start(robot)
+    assert elements.first_layer is not None
+    assert mesh_quality(tube_mesh(dataclasses.replace(robot, elements=elements))).jacobian_ratio >= 0.2
 
 
 def test_layers_double_from_the_clamp_and_are_denser_where_the_body_is_soft():

@@ -45,6 +45,18 @@ def test_sections_see_where_the_axis_goes():
     assert rows[:, 1:] == pytest.approx(np.broadcast_to(gradient[:, :2].T, (3, 2, 3)), abs=1e-9)
 
 
+def test_the_sections_of_a_mesh_that_is_made_again_are_the_same_and_those_of_another_are_not():
+    robot = load_robot_file("article").robot
+    heights = np.array([0.0, 0.037, 0.1])
+    first = section_functionals(tube_mesh(robot), heights)
+    kept = first.copy()
+    first[:] = 0.0  # what is returned belongs to the caller
+    assert section_functionals(tube_mesh(robot), heights) == pytest.approx(kept, abs=0.0)
+    assert section_functionals(tube_mesh(robot), heights[::-1])[:3] == pytest.approx(kept[6:], abs=0.0)
+    finer = tube_mesh(dataclasses.replace(robot, elements=Elements(around=8, along=10)))
+    assert section_functionals(finer, heights).shape == (9, len(finer.nodes))
+
+
 def test_too_few_layers_are_named():
     robot = dataclasses.replace(load_robot_file("three_segment").robot, elements=Elements(along=2))
     with pytest.raises(MeshError, match=r"elements\.along is 2; the robot has 3 tubes"):

@@ -1,5 +1,7 @@
 """Recordings in BROAD's layout and in rosbag2 folders; others are refused with what was found and what is needed."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -110,7 +112,25 @@ def test_a_bag_without_imu_is_refused(tmp_path):
         read_recording(write_bag(tmp_path / "bag", "mcap", topics=()))
 
 
-def write_bag(path, storage, topics=("/robot/imu/data_raw",)):
+def test_a_bag_whose_imu_has_no_message_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="has 0 IMU samples"):
+        read_recording(write_bag(tmp_path / "bag", "mcap", samples=0))
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_the_memory_to_read_a_bag_does_not_grow_with_its_other_topics(tmp_path, storage):
+    size, shares = 400_000, []
+    bag = write_bag(tmp_path / "bag", storage, samples=2000, images=(75, size))
+    read_recording(bag)  # imports
+    tracemalloc.start()
+    recording = read_recording(bag, progress=shares.append)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(recording) == 2000 and peak < 15 * size  # of 75; a chunk of MCAP has 1 MB
+    assert shares == sorted(shares) and len(shares) > 3 and max(shares) <= 1.0
+
+
+def write_bag(path, storage, topics=("/robot/imu/data_raw",), *, samples=5, images=(0, 0)):
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -130,10 +150,13 @@ def write_bag(path, storage, topics=("/robot/imu/data_raw",)):
 
         temperature = writer.add_connection("/robot/imu/temperature", "sensor_msgs/msg/Temperature", typestore=store)
         truth = writer.add_connection("/robot/virtual/base_orientation", "geometry_msgs/msg/QuaternionStamped", typestore=store)
+        camera = writer.add_connection("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", typestore=store)
         write(temperature, "sensor_msgs/msg/Temperature", 2, temperature=30.0, variance=0.0)
         for topic in topics:
             imu = writer.add_connection(topic, "sensor_msgs/msg/Imu", typestore=store)
-            for k in range(5):
+            for k in range(samples):
+                if images[0] and k % max(1, samples // images[0]) == 0:  # never read, so that any bytes will do
+                    writer.write(camera, 10**18 + k * 10_000_000, bytes(images[1]))
                 write(
                     imu,
                     "sensor_msgs/msg/Imu",

@@ -10,6 +10,7 @@ import pytest
 from gravcomp.bench.stream_faults import FAULTS
 from gravcomp.bench.streams import outcome
 from gravcomp.orientation import estimate_recording
+from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.inclination import inclination_rmse
 from gravcomp.orientation.spike_review import AHEAD, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
@@ -149,6 +150,27 @@ def test_spikes_are_found_in_motion_that_changes_as_fast_as_they_do(all_axes):
     spiky = signal + hit * random.choice([-1.0, 1.0], (600, 3)) * random.uniform(1.5, 7.0, (600, 3))
     assert (reviewed(signal) == signal).all()
     assert np.abs(reviewed(spiky) - signal).max() < 0.35  # 20 deg/s
+
+
+def counted(stamps):
+    """Return the steps that count for stamps in s."""
+    even = EvenSteps()
+    return np.array([even.take(dt) for dt in np.diff(stamps).tolist()])
+
+
+@pytest.mark.parametrize("lost", [(), (500, 700, 701)])
+def test_stamps_that_jitter_are_evened_out_and_keep_their_time(lost):
+    taken = 0.01 * np.delete(np.arange(1000), lost)
+    stamps = taken + np.random.default_rng(5).uniform(-0.003, 0.003, len(taken))
+    steps = counted(stamps)
+    settled = slice(200, None)
+    assert np.std((steps - np.diff(taken))[settled]) < 0.25 * np.std((np.diff(stamps) - np.diff(taken))[settled])
+    assert np.abs(np.cumsum(steps) - (taken[1:] - taken[0])).max() < 0.008
+
+
+def test_stamps_without_jitter_count_as_they_are():
+    stamps = np.cumsum(0.01 + 0.0002 * np.sin(np.arange(500.0)) + 0.04 * (np.arange(500) % 97 == 0))  # with samples lost
+    np.testing.assert_allclose(counted(stamps), np.diff(stamps), rtol=1e-12)
 
 
 def test_a_counter_that_wraps_is_continued_live():

@@ -113,6 +113,22 @@ static void solve_answers(gc_equilibrium *state) {
   }
 }
 
+// Factorise the stiffness at q. Where what is known of the law's part does not fit the shape, the step goes without it. Returns false
+// where the stiffness is not positive definite.
+static bool factorise(gc_equilibrium *state) {
+  const gc_model *model = state->model;
+  gc_elasticity_stiffness(model, &state->elasticity, state->stiffness);
+  gc_cables_add_stiffness(model, &state->cables, state->tension, state->stiffness);
+  if (model->law_points > 0u) {
+    gc_law_deviation_add_stiffness(model, &state->law, state->stiffness, 1.0f);
+    if (gc_factorise(state->stiffness, model->modes, state->factor)) {
+      return true;
+    }
+    gc_law_deviation_add_stiffness(model, &state->law, state->stiffness, -1.0f);
+  }
+  return gc_factorise(state->stiffness, model->modes, state->factor);
+}
+
 // Evaluate forces, cables and stiffness at q, and the response of the shape to the tensions. Returns false where the stiffness
 // is not positive definite.
 static bool evaluate(gc_equilibrium *state) {
@@ -123,12 +139,7 @@ static bool evaluate(gc_equilibrium *state) {
     gc_law_deviation_at(model, state->q, &state->law, state->elasticity.force);
   }
   gc_cables_at(model, state->q, state->pulling, &state->cables);
-  gc_elasticity_stiffness(model, &state->elasticity, state->stiffness);
-  if (model->law_points > 0u) {
-    gc_law_deviation_add_stiffness(model, &state->law, state->stiffness);
-  }
-  gc_cables_add_stiffness(model, &state->cables, state->tension, state->stiffness);
-  if (!gc_factorise(state->stiffness, r, state->factor)) {
+  if (!factorise(state)) {
     return false;
   }
   solve_answers(state);

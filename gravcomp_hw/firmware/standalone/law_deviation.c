@@ -1,8 +1,10 @@
 #include "law_deviation.h"
 
+#include "../core/maths.h"
 #include "law_of_invariants.h"
 
 #define ROWS 9u  // of H
+#define LEAST_MOTION 1e-5f  // of q for which the stiffness follows the motion, as a fraction of the reach
 
 // Write F (3, 3), and E from 2 E = H + H^T + H^T H, at q.
 static void deform(const float *change, uint32_t r, const float *q, float f[ROWS], float e[6]) {
@@ -37,36 +39,25 @@ static void product(const float f[ROWS], const float t[6], float piola[ROWS]) {
   }
 }
 
+// Components of E in which row and column of a symmetric (3, 3) are.
+static const uint8_t COMPONENT[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+
 // Write A (9, 9) = B^T D B with B = dE/dH, plus T where F and H have the same row.
 static void stiffness_of(const float f[ROWS], const float t[6], float d[6][6], float a[ROWS][ROWS]) {
-  float b[6][ROWS];
-  for (uint32_t m = 0; m < 6u; ++m) {
-    for (uint32_t c = 0; c < ROWS; ++c) {
-      b[m][c] = 0.0f;
-    }
-  }
-  for (uint32_t i = 0; i < 3u; ++i) {
-    const float x = f[3u * i], y = f[3u * i + 1u], z = f[3u * i + 2u];
-    const uint32_t c = 3u * i;
-    b[0][c] = b[3][c + 1u] = b[5][c + 2u] = x;
-    b[1][c + 1u] = b[3][c] = b[4][c + 2u] = y;
-    b[2][c + 2u] = b[4][c + 1u] = b[5][c] = z;
-  }
+  // Column 3 i + j of B has row i of F in the components of E that contain j.
   const float full[3][3] = {{t[0], t[3], t[5]}, {t[3], t[1], t[4]}, {t[5], t[4], t[2]}};
   for (uint32_t c = 0; c < ROWS; ++c) {
+    const uint8_t *own = COMPONENT[c % 3u];
+    const float *row = f + c / 3u * 3u;
     float db[6];
     for (uint32_t m = 0; m < 6u; ++m) {
-      db[m] = 0.0f;
-      for (uint32_t n = 0; n < 6u; ++n) {
-        db[m] += d[m][n] * b[n][c];
-      }
+      db[m] = (d[m][own[0]] * row[0] + d[m][own[1]] * row[1]) + d[m][own[2]] * row[2];
     }
-    for (uint32_t k = 0; k < ROWS; ++k) {
-      float sum = k / 3u == c / 3u ? full[k % 3u][c % 3u] : 0.0f;
-      for (uint32_t m = 0; m < 6u; ++m) {
-        sum += b[m][k] * db[m];
-      }
-      a[k][c] = sum;
+    for (uint32_t k = 0; k <= c; ++k) {
+      const uint8_t *other = COMPONENT[k % 3u];
+      const float *left = f + k / 3u * 3u;
+      const float sum = k / 3u == c / 3u ? full[k % 3u][c % 3u] : 0.0f;
+      a[k][c] = a[c][k] = sum + ((left[0] * db[other[0]] + left[1] * db[other[1]]) + left[2] * db[other[2]]);
     }
   }
 }
@@ -102,6 +93,43 @@ static void add_stiffness(const float *change, uint32_t r, float a[ROWS][ROWS], 
   }
 }
 
+// Return the place of the entry (i, j), j <= i, in a matrix by tiles.
+static uint32_t place_of(uint32_t i, uint32_t j) {
+  const uint32_t first = i / GC_TILE * GC_TILE, row = i - first, before = first * (first + 1u) / 2u;
+  return j < first ? before + GC_TILE * j + row : before + GC_TILE * first + row * (row + 1u) / 2u + (j - first);
+}
+
+// Make the stiffness right for the last motion from state->q to q, at which the force is `force`.
+static void follow_motion(const gc_model *model, gc_law_deviation *state, const float *q, const float *force) {
+  const uint32_t r = model->modes;
+  float s[GC_MODES_MAX], y[GC_MODES_MAX], square = 0.0f, along = 0.0f;
+  for (uint32_t i = 0; i < r; ++i) {
+    s[i] = q[i] - state->q[i];
+    y[i] = force[i] - state->force[i];
+    square += s[i] * s[i];
+  }
+  const float least = LEAST_MOTION * model->settings->reach;
+  if (square < least * least) {
+    return;  // rounding errors would be the larger part
+  }
+  for (uint32_t i = 0; i < r; ++i) {
+    for (uint32_t j = 0; j <= i; ++j) {
+      const float entry = state->stiffness[place_of(i, j)];
+      y[i] -= entry * s[j];
+      y[j] -= j < i ? entry * s[i] : 0.0f;
+    }
+  }
+  for (uint32_t i = 0; i < r; ++i) {
+    along += s[i] * y[i];
+  }
+  const float inverse = 1.0f / square, twice = along * inverse * inverse;
+  for (uint32_t i = 0; i < r; ++i) {
+    for (uint32_t j = 0; j <= i; ++j) {
+      state->stiffness[place_of(i, j)] += (y[i] * s[j] + s[i] * y[j]) * inverse - twice * s[i] * s[j];
+    }
+  }
+}
+
 static void use_next(const gc_model *model, gc_law_deviation *state) {
   for (uint32_t k = 0; k < model->modes * (model->modes + 1u) / 2u; ++k) {
     state->stiffness[k] = state->next[k];
@@ -112,7 +140,12 @@ static void use_next(const gc_model *model, gc_law_deviation *state) {
 
 void gc_law_deviation_at(const gc_model *model, const float *q, gc_law_deviation *state, float *force) {
   const uint32_t r = model->modes;
-  const uint32_t end = state->turn + GC_LAW_SHARE < model->law_points ? state->turn + GC_LAW_SHARE : model->law_points;
+  const uint32_t share = (uint32_t)gc_clamp(model->settings->law_share, 1.0f, (float)GC_LAW_POINTS_MAX);
+  const uint32_t end = state->turn + share < model->law_points ? state->turn + share : model->law_points;
+  float own[GC_MODES_MAX];
+  for (uint32_t i = 0; i < r; ++i) {
+    own[i] = 0.0f;
+  }
   for (uint32_t p = 0; p < model->law_points; ++p) {
     const float *change = model->law_change + (size_t)p * ROWS * r;
     const bool is_due = p >= state->turn && p < end;
@@ -121,11 +154,11 @@ void gc_law_deviation_at(const gc_model *model, const float *q, gc_law_deviation
     gc_law_deviating_stress(&model->law[p], e, t, is_due ? d : NULL);
     product(f, t, piola);
     for (uint32_t i = 0; i < r; ++i) {
-      float sum = force[i];
+      float sum = own[i];
       for (uint32_t a = 0; a < ROWS; ++a) {
         sum += change[i * ROWS + a] * piola[a];
       }
-      force[i] = sum;
+      own[i] = sum;
     }
     if (is_due) {
       float a[ROWS][ROWS];
@@ -137,10 +170,16 @@ void gc_law_deviation_at(const gc_model *model, const float *q, gc_law_deviation
   if (end == model->law_points) {
     use_next(model, state);
   }
+  follow_motion(model, state, q, own);
+  for (uint32_t i = 0; i < r; ++i) {
+    state->q[i] = q[i];
+    state->force[i] = own[i];
+    force[i] += own[i];
+  }
 }
 
-void gc_law_deviation_add_stiffness(const gc_model *model, const gc_law_deviation *state, float *matrix) {
+void gc_law_deviation_add_stiffness(const gc_model *model, const gc_law_deviation *state, float *matrix, float factor) {
   for (uint32_t k = 0; k < model->modes * (model->modes + 1u) / 2u; ++k) {
-    matrix[k] += state->stiffness[k];
+    matrix[k] += factor * state->stiffness[k];
   }
 }

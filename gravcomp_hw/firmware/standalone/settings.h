@@ -62,6 +62,7 @@ typedef struct {
   float spike_ratio;
   float spike_time_constant; // s
   float spike_longest;       // samples
+  float law_share;           // points of a law of which a step computes the stiffness
   float cable_motor[9];      // number of each cable's motor, 1 to 8; 0: no such cable
 } gc_settings;
 

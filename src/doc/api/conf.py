@@ -1,6 +1,7 @@
 """Configuration of Sphinx for `./gravcomp docs`, which reads a copy of the repository."""
 
 import builtins
+import logging
 import re
 from pathlib import Path
 from types import GenericAlias
@@ -104,6 +105,7 @@ def unlink_foreign_types(app: Any, doctree: Any) -> None:
 
 def setup(app: Any) -> None:
     """Register the hooks; the conversion comes before napoleon's."""
+    logging.getLogger("sphinx").setLevel(logging.INFO)  # a hundred thousand messages of autodoc for its authors are not made
     app.connect("autodoc-skip-member", skip_aliases)
     app.connect("autodoc-process-docstring", plain_text, priority=400)
     app.connect("doctree-read", unlink_foreign_types)

@@ -1,4 +1,4 @@
-"""Contact of the model with a scene: accuracy against closed forms, penetration, energy, and the time of a step.
+"""Contact of the model with a scene: accuracy against closed forms and CalculiX, penetration, energy, and the time of a step.
 
 What a scene that is wrong does to the loop is in `wrong_scene`.
 """
@@ -16,6 +16,7 @@ from gravcomp.description import Elements, Material, Robot, Segment, load_robot_
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import InverseController, straight_target
+from gravcomp.references.calculix_contact import Rest, cylinder, stored_rests
 from gravcomp.references.contact_beams import buckled_in_tube, laid_on_plane, over_peg, pressed_on_plane
 from gravcomp.scene import SceneSection
 from gravcomp.scene.scene import Scene
@@ -52,7 +53,7 @@ def slender_rod() -> Robot:
 
 
 def accuracy(progress: Progress) -> dict:
-    """Return `contact_by_case_pct`: errors of force and tip against the closed forms, and their largest, `contact_error_pct`.
+    """Return `contact_by_case_pct`: errors against closed forms and CalculiX, and the worst, `contact_error_pct`.
 
     Errors of the force are shares of it, those of the tip of the length.
     """
@@ -86,6 +87,13 @@ def accuracy(progress: Progress) -> dict:
     # Its weight lays it on the tube, and the load, beyond the one at which it buckles freely, presses it on.
     shape = simulator.solve(gravity, wrench=Wrench(force=np.array([0.0, 0.0, -load])))
     errors["buckled in a tube"] = _errors(shape, *buckled_in_tube(weight, load, _LENGTH, stiffness, clearance))
+    progress("against CalculiX")
+    model = RobotModel(cylinder())
+    low = -0.5 * model.robot.segments[0].outer_diameter
+    for rest in stored_rests():
+        plane = scene_of(planes=[{"normal": [1, 0, 0], "point_mm": [1e3 * (low - rest.gap), 0, 0]}])
+        shape = Simulator(model, reduced=False, scene=plane).solve(np.array([-_GRAVITY, 0.0, 0.0]))
+        errors[f"CalculiX, {1e3 * rest.gap:g} mm over a plane"] = _from_calculix(shape, rest, model.length)
     worst = max(max(pair.values()) for pair in errors.values())
     return {"contact_error_pct": worst, "contact_by_case_pct": errors}
 
@@ -99,6 +107,14 @@ def _errors(shape: Shape, force: float, deflection: float) -> dict[str, float]:
         "force": round(100.0 * abs(found - force) / force, 4),
         "tip": round(100.0 * abs(lateral - deflection) / _LENGTH, 4),
     }
+
+
+def _from_calculix(shape: Shape, rest: Rest, length: float) -> dict[str, float]:
+    if not shape.is_equilibrium:
+        return {"force": np.inf, "tip": np.inf}
+    force = float(shape.contacts.normal_force.sum())
+    tip = float(np.linalg.norm(shape.tip_position - [0.0, 0.0, length] - rest.tip))
+    return {"force": round(100.0 * abs(force - rest.force) / rest.force, 4), "tip": round(100.0 * tip / length, 4)}
 
 
 def motion(progress: Progress, every: int = 1) -> dict:

@@ -38,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="time at each pose in seconds (default: 5)")
+    parser.add_argument(
+        "--travel", type=float, default=3.0, metavar="S", help="time of each motion between two poses in seconds (default: 3)"
+    )
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for one of several robots")
@@ -76,7 +79,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             fed = args.gravity == "fused"
             specs.append(graph.node("gravcomp_estimation", "arm_gravity", use=use, urdf=str(urdf), feed_acceleration=fed))
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
-        player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=args.hold, result_file=str(result))
+        stops = {"hold": args.hold, "travel": args.travel}
+        player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), result_file=str(result), **stops)
         logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
         with builder, Graph([*specs, player], logs, {**domain, **builder.environment}, host) as processes:
             if args.viewer:

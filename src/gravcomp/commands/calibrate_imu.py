@@ -56,7 +56,9 @@ def run(args: argparse.Namespace) -> int:
     for direction in args.up or ():
         if not np.isfinite(direction).all() or np.linalg.norm(direction) < 1e-6:
             raise ConfigError(f"--up is {direction}; a direction other than zero is needed")
-    recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
+    columns = read_mapping(args.columns) if args.columns else None
+    with output.progress(f"reading {args.file}") as progress:
+        recording = read_recording(args.file, args.topic, columns, progress)
     found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
     span = _learn_bias(recording, options, found, Path(args.bias_model)) if args.bias_model else None
     target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()

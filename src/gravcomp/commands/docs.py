@@ -19,6 +19,9 @@ PAGE = Path("src/doc/bodies.md")
 GALLERY = Path("src/doc/pictures/robots")
 """Folder with a picture of each shipped robot, which the README shows, relative to the repository."""
 
+TOUCHES = Path("src/doc/pictures/touched")
+"""Folder of the pictures of the live page in which a user touches the virtual robot, relative to the repository."""
+
 _LEFT_OUT = (".*", "build", "install", "log", "reports", "__pycache__", "*.egg-info")
 
 
@@ -30,7 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help=f"draw the pictures of the shipped robots and of those that {PAGE} describes again, and build nothing",
     )
-    parser.add_argument("--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository)")
+    parser.add_argument(
+        "--page",
+        action="store_true",
+        help="take the pictures of the live page in which a user touches the virtual robot again, and build nothing",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository) or the pictures"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
     root = Path(os.environ["GRAVCOMP_ROOT"])
     if args.pictures:
         return _draw_pictures(root)
+    if args.page:
+        return _take_pictures(root, Path(args.out).expanduser().resolve() if args.out else root / TOUCHES)
     provide_extra("development")
     out = Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs"
     try:
@@ -70,6 +82,20 @@ def _draw_pictures(root: Path) -> int:
         output.note(f"{picture}")
         pictures.append(str(picture))
     output.result({"pictures": pictures}, f"{root / PAGE}, {root / GALLERY}: {len(pictures)} pictures")
+    return 0
+
+
+def _take_pictures(root: Path, folder: Path) -> int:
+    """Take the pictures of the live page. Raises ConfigError."""
+    from gravcomp.commands.touch_pictures import draw_touches
+    from gravcomp.config import ConfigError
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out is {folder}: cannot be created: {error.strerror}") from error
+    pictures = [str(path) for path in draw_touches(root, folder)]
+    output.result({"pictures": pictures}, f"{folder}: {len(pictures)} pictures")
     return 0
 
 

@@ -49,31 +49,31 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
     from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
     from gravcomp.orientation.inclination import inclination_rmse
+    from gravcomp.orientation.offline import without_rate_spikes
     from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
     if args.average < 1:
         raise ConfigError(f"--average is {args.average}; 1 or more is needed")
     try:
-        recording = read_recording(args.file, args.topic, read_mapping(args.columns) if args.columns else None)
+        columns = read_mapping(args.columns) if args.columns else None
+        with output.progress(f"reading {args.file}") as reading:
+            recording = read_recording(args.file, args.topic, columns, reading)
         recording, findings = in_si(recording, convert=args.units == "auto")
         correction = calibrate_in_motion(recording) if args.calibrate else None
         if correction is not None:
             recording = calibrated(recording, correction)
         if args.average > 1:
-            recording = recording.averaged(args.average)
+            recording = without_rate_spikes(recording).averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         options, mount = _of_robot(args.robot)
         estimator = GravityEstimator(options, mount, model)
     except (BiasModelError, ValueError) as error:
         raise ConfigError(str(error)) from error
 
-    from rich.progress import Progress
-
-    with Progress(console=output.console(), transient=True) as progress:
-        task = progress.add_task("estimating", total=1.0)
+    with output.progress("estimating") as progress:
         begin = time.perf_counter()
-        result = estimate_recording(recording, estimator, lambda done: progress.update(task, completed=done))
+        result = estimate_recording(recording, estimator, progress)
         elapsed = time.perf_counter() - begin
 
     figures = {

@@ -7,7 +7,10 @@ from pathlib import Path
 from gravcomp.commands import output
 from gravcomp.commands.parsers import add_subcommand
 
-_TESTS = tuple(f"src/test/test_{name}.py" for name in ("firmware", "virtual_board", "standalone", "model_transfer"))
+_TESTS = tuple(
+    f"src/test/test_{name}.py"
+    for name in ("firmware", "virtual_board", "standalone", "standalone_board", "model_transfer", "board_laws", "board_heater")
+)
 _FOLDER = "build/firmware"
 
 

@@ -4,15 +4,18 @@ With --json the result is exactly one line on stdout, a JSON object. With --quie
 """
 
 import argparse
+import contextlib
 import json
 import os
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+_LINE_PERIOD = 5.0  # s between two lines of progress
 _options = argparse.Namespace(json=False, quiet=False)
 
 
@@ -30,6 +33,28 @@ def note(text: str) -> None:
 def console() -> "Console":
     """Return a console for progress, notes and tables in addition to the result: stderr, silent with --quiet."""
     return _console(sys.stderr, quiet=_options.quiet)
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Callable[[float], None]]:
+    """Show on stderr how far something is, as a bar or in lines where there is no terminal; the function receives the share."""
+    from rich.progress import Progress
+
+    shown = console()
+    if shown.is_terminal:
+        with Progress(console=shown, transient=True) as bar:
+            task = bar.add_task(what, total=1.0)
+            yield lambda done: bar.update(task, completed=done)
+        return
+    last = time.monotonic()
+
+    def line(done: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _LINE_PERIOD:
+            last = time.monotonic()
+            note(f"{what}: {100 * done:.0f} %")
+
+    yield line
 
 
 def result(figures: Mapping[str, Any], readable: Any) -> None:

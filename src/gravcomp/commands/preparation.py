@@ -49,7 +49,7 @@ def _is_surrounded(robot: str) -> bool:
 
 
 def compile_parts(parts: tuple[str, ...]) -> None:
-    """Wait until these parts are compiled, with a note. One that fails is left to whoever needs it, who reports the error."""
+    """Wait until these parts are compiled, with a note. A part that fails is left to the nodes, which report the error."""
     missing = compilation.missing(parts)
     if not missing:
         return

@@ -67,7 +67,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if args.out and Path(args.out).exists():
         raise ConfigError(f"{args.out}: exists and is not overwritten; name another folder")
     bag = _whole(args.bag)
-    recording = read_recording(bag, args.topic or None)
+    with output.progress(f"reading {args.bag}") as progress:
+        recording = read_recording(bag, args.topic or None, progress=progress)
     for note in recording.notes:
         output.note(f"{args.bag}: {note}")
     builder = prepare(args.robot, virtual=False)
@@ -116,7 +117,8 @@ def _whole(path: str) -> str:
 
     if Path(path).suffix == ".npz" or is_csv(Path(path)):
         return path
-    bag = readable(path)
+    with output.progress(f"checking {path}") as progress:
+        bag = readable(path, progress)
     if bag.problem:
         output.note(f"{path}: damaged ({bag.problem}); {bag.messages} messages could be read")
     return str(bag.path)

@@ -30,8 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run pytest. Returns 0: all tests passed, 1: a test failed, 2: wrong use, or no test found."""
+    from gravcomp.commands.model.build import prepare_model
+    from gravcomp.commands.preparation import compile_parts
     from gravcomp.environment.packages import provide_extra
     from gravcomp.firmware.toolchain import provide as provide_firmware_tools
+    from gravcomp.launcher.compilation import PARTS
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
     for extra in ("development", "reports"):
@@ -45,6 +48,12 @@ def run(args: argparse.Namespace) -> int:
     targets = [] if any((root / a.split("::")[0]).exists() for a in given if not a.startswith("-")) else folders
     how = ["-q", "--no-header"] if args.quiet else ["-ra", "--durations=10"]
     if targets:
+        if "--collect-only" not in given:
+            # Here once, with a note, rather than in each of the processes that need it at the same time.
+            compile_parts(PARTS)
+            if not args.fast:
+                # Else the first graph builds it in the background with low priority, and a command that needs it waits for that.
+                prepare_model("article")
         # A module's tests share a process, because they share what takes long to make: a graph, a model, a browser.
         how += ["-n", str(_WORKERS), "--dist", "loadgroup", "--no-loadscope-reorder"]
         # pytest-xdist 3.8 waits for ever after it has replaced a process that crashed: it then hands out tests that are done (its

@@ -2,7 +2,8 @@
 
 At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
 half of g'^2 / g'': where it is a minimum along the robot, the place moves there, so that no point of the surface is deeper in
-a wall than at these places, within a few micrometres.
+a wall than at these places, within a few micrometres. Where a wall is across the robot, the points on the rim of the tip's face
+are places too; the nearest one of the rim is one then only where it is deeper than they are, as in a small tilt.
 """
 
 from typing import NamedTuple
@@ -11,26 +12,29 @@ import numpy as np
 from numba import njit
 
 from gravcomp.contact.surface import ContactSurface
-from gravcomp.scene.distance import SceneArrays, gap_to
+from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
 
 _TURNS = 4  # corrections of the direction in which the outline is nearest
 _SETTLED = 1e-7  # of the radius
 _MOVES = 3  # corrections of the place along the robot
+_ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
 _WORTH = 1e-4  # of the radius: a place moves along the robot if that makes the gap smaller by this
 
 
 class Places(NamedTuple):
     """c places.
 
-    row (c,): of the obstacle in the scene; station (c,): the nearest one; first (c,) and share (c, 3): the first of three
-    neighbours, and their weights; own (c, 2): x and y in the section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent
-    in the section; along (c, 3): the other tangent; curvature (c,) of the obstacle across the robot in 1/m: change of the
-    normal along `around`, positive next to a ball; tilt (c, 3): weights of the three stations for the slope along the robot, a
-    station; rocking (c,): -1 / g'' a station in 1/m, by which the place moves along the robot when it tilts; 0 where it does not.
+    row (c,): of the obstacle in the scene; station (c,): the nearest one; slot (c,): the station, or, after all of them, the
+    point of the rim; first (c,) and share (c, 3): the first of three neighbours, and their weights; own (c, 2): x and y in the
+    section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent in the section; along (c, 3): the other tangent; curvature
+    (c,) of the obstacle across the robot in 1/m: change of the normal along `around`, positive next to a ball; tilt (c, 3):
+    weights of the three stations for the slope along the robot, a station; rocking (c,): -1 / g'' a station in 1/m, by which
+    the place moves along the robot when it tilts; 0 where it does not.
     """
 
     row: np.ndarray
     station: np.ndarray
+    slot: np.ndarray
     first: np.ndarray
     share: np.ndarray
     own: np.ndarray
@@ -123,9 +127,9 @@ def find_places(
     """Return the places that touch, or would touch if nothing held the robot.
 
     sections (s, 3, 3): p, f_1, f_2 of the stations; moved (s, 3): how far p goes in m with the forces of last time; margin:
-    places with a smaller gap in m are returned too; last (k, s, 3): forces of last time.
+    places with a smaller gap in m are returned too; last (k, slots, 3): forces of last time.
     """
-    rows, stations = len(scene.kind), len(surface.place)
+    rows, stations, rim = len(scene.kind), len(surface.place), len(surface.rim)
     own, normal = np.zeros((rows, stations, 2)), np.zeros((rows, stations, 3))
     reach = np.empty(stations)
     for s in range(stations):
@@ -133,6 +137,8 @@ def find_places(
     # A force moves from station to station as the robot slides or tilts.
     chosen = np.zeros((rows, stations), dtype=np.bool_)
     for k in range(rows):
+        if last[k, stations:].any():
+            chosen[k, stations - 1] = True
         for s in range(stations):
             if last[k, s, 0] != 0.0 or last[k, s, 1] != 0.0 or last[k, s, 2] != 0.0:
                 chosen[k, max(s - 1, 0) : s + 2] = True
@@ -144,12 +150,39 @@ def find_places(
                 free = gap[k, s] + normal[k, s] @ moved[s]
                 chosen[k, s] = gap[k, s] < margin or free < margin
             count += chosen[k, s]
+    # The tip's face.
+    tip, shift = sections[stations - 1], moved[stations - 1]
+    axis = _cross(tip[1], tip[2])
+    least = _ACROSS * _length(axis)
+    on_rim, edge, there = np.zeros((rows, rim), dtype=np.bool_), np.empty((rows, rim)), np.empty((rows, rim, 3))
+    for k in range(rows):
+        if not chosen[k, stations - 1] or abs(normal[k, stations - 1] @ axis) < least:
+            continue
+        lowest, some = np.inf, False
+        for n in range(rim):
+            point = tip[0] + surface.rim[n, 0] * tip[1] + surface.rim[n, 1] * tip[2]
+            edge[k, n] = gap_to(scene, k, point, there[k, n])
+            lowest = min(lowest, edge[k, n])
+            free = edge[k, n] + there[k, n] @ shift
+            pressed = last[k, stations + n, 0] != 0.0 or last[k, stations + n, 1] != 0.0 or last[k, stations + n, 2] != 0.0
+            on_rim[k, n] = pressed or edge[k, n] < margin or free < margin
+            some |= on_rim[k, n]
+            count += on_rim[k, n]
+        if some and gap[k, stations - 1] > lowest - _WORTH * surface.radius[stations - 1]:
+            chosen[k, stations - 1] = False
+            count -= 1
     result = empty_places(count)
     i = 0
     for k in range(rows):
         for s in range(stations):
             if chosen[k, s]:
                 _write_place(scene, surface, sections, gap, own, normal, k, s, result, i)
+                i += 1
+        for n in range(rim):
+            if on_rim[k, n]:
+                result.row[i], result.station[i], result.slot[i] = k, stations - 1, stations + n
+                result.first[i], result.share[i, 2] = stations - 3, 1.0
+                _write_frame(scene, surface, tip, surface.rim[n], edge[k, n], there[k, n], result, i)
                 i += 1
     return result
 
@@ -158,9 +191,9 @@ def find_places(
 def empty_places(count: int) -> Places:
     """Return arrays for `count` places, in which nothing is written yet."""
     return Places(
-        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.zeros((count, 3)),
-        np.empty((count, 2)), np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty(count),
-        np.zeros((count, 3)), np.zeros(count),
+        np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64),
+        np.empty(count, dtype=np.int64), np.zeros((count, 3)), np.empty((count, 2)), np.empty(count), np.empty((count, 3)),
+        np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.zeros((count, 3)), np.zeros(count),
     )  # fmt: skip
 
 
@@ -173,7 +206,7 @@ def _write_place(
     stations = len(surface.place)
     first = min(max(s - 1, 0), stations - 3)
     share, place = result.share[i], float(s - first)
-    result.row[i], result.station[i], result.first[i] = k, s, first
+    result.row[i], result.station[i], result.slot[i], result.first[i] = k, s, s, first
     section = sections[s].copy()
     best, here, there = gap[k, s], own[k, s].copy(), normal[k, s].copy()
     before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
@@ -199,21 +232,42 @@ def _write_place(
     _section_at(sections, first, place, share, section)
     tilt = result.tilt[i]
     tilt[0], tilt[1], tilt[2] = place - 1.5, 2.0 - 2.0 * place, place - 0.5
-    result.own[i], result.gap[i], result.normal[i] = here, best, there
-    axis = np.cross(section[1], section[2])
-    around = np.cross(axis, there)
+    _write_frame(scene, surface, section, here, best, there, result, i)
+
+
+@njit(cache=True)
+def _write_frame(
+    scene: SceneArrays, surface: ContactSurface, section: np.ndarray, own: np.ndarray, gap: float, normal: np.ndarray,
+    result: Places, i: int,
+) -> None:  # fmt: skip
+    """Write gap, normal, tangents and curvature of place i, which is at own (2,) in a section (3, 3)."""
+    result.own[i], result.gap[i], result.normal[i] = own, gap, normal
+    axis = _cross(section[1], section[2])
+    around = _cross(axis, normal)
     length = _length(around)
     if length < 1e-6 * _length(axis):  # the wall is across the robot
-        around[:] = section[1] - (section[1] @ there) * there
+        around[:] = section[1] - (section[1] @ normal) * normal
         length = _length(around)
     around /= length
-    result.around[i], result.along[i] = around, np.cross(there, around)
-    h = 0.02 * surface.radius[s]
-    one, other_side = np.empty(3), np.empty(3)
-    gap_to(scene, k, section[0] + h * around, one)
-    gap_to(scene, k, section[0] - h * around, other_side)
-    bend_across = ((one - other_side) @ around) / (2.0 * h)
-    result.curvature[i] = min(max(bend_across, -1.0 / h), 1.0 / h)
+    result.around[i], result.along[i] = around, _cross(normal, around)
+    if scene.kind[result.row[i]] == PLANE:
+        result.curvature[i] = 0.0
+        return
+    h = 0.02 * surface.radius[result.station[i]]
+    one, other = np.empty(3), np.empty(3)
+    gap_to(scene, result.row[i], section[0] + h * around, one)
+    gap_to(scene, result.row[i], section[0] - h * around, other)
+    bend = ((one - other) @ around) / (2.0 * h)
+    result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
+
+
+@njit(cache=True)
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    result = np.empty(3)
+    result[0] = a[1] * b[2] - a[2] * b[1]
+    result[1] = a[2] * b[0] - a[0] * b[2]
+    result[2] = a[0] * b[1] - a[1] * b[0]
+    return result
 
 
 @njit(cache=True)
@@ -307,7 +361,8 @@ def yielding(scene: SceneArrays, surface: ContactSurface, places: Places) -> np.
     result = np.zeros(len(places.row))
     for i in range(len(result)):
         if np.isfinite(scene.stiffness[places.row[i]]):
-            result[i] = 1.0 / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
+            parts = len(surface.rim) if places.slot[i] >= len(surface.place) else 1
+            result[i] = parts / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
     return result
 
 
@@ -325,11 +380,11 @@ def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray
 
 @njit(cache=True)
 def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, s, 3) in N: of `remember`."""
+    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, slots, 3) in N: of `remember`."""
     count = len(places.row)
     pressed, rub = np.empty(count), np.empty((count, 2))
     for i in range(count):
-        last = force[places.row[i], places.station[i]]
+        last = force[places.row[i], places.slot[i]]
         pressed[i] = max(places.normal[i] @ last, 0.0)
         rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
     return pressed, rub
@@ -337,10 +392,10 @@ def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @njit(cache=True)
 def remember(places: Places, forces: np.ndarray, force: np.ndarray) -> None:
-    """Write the forces (c, 3) of the places to force (k, s, 3), by obstacle and station; 0 elsewhere."""
+    """Write the forces (c, 3) of the places to force (k, slots, 3), by obstacle and slot; 0 elsewhere."""
     force[:] = 0.0
     for i in range(len(places.row)):
-        force[places.row[i], places.station[i]] = forces[i]
+        force[places.row[i], places.slot[i]] = forces[i]
 
 
 @njit(cache=True)

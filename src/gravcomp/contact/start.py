@@ -1,4 +1,6 @@
-"""Scenes in which a robot cannot be: its base is inside an obstacle, or a lumen is narrower than the robot."""
+"""Scenes in which a robot cannot be: its base is inside an obstacle, or a lumen or two walls leave less room than it needs."""
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -6,15 +8,19 @@ from gravcomp.config import ConfigError
 from gravcomp.contact.places import deepest
 from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Robot
-from gravcomp.scene.distance import TUBE, gap_to
+from gravcomp.scene.distance import PLANE, TUBE, SceneArrays, gap_to
 from gravcomp.scene.scene import Scene
 
 # Of the radius: a base that is deeper in an obstacle is refused.
 _TOUCHING = 1e-2
+# Of two planes whose normals differ from opposite ones by less, in rad: they are parallel.
+_PARALLEL = 1e-3
 
 
 def refuse_start(scene: Scene, robot: Robot) -> None:
-    """Raise ConfigError where the clamped base is inside an obstacle of soft_base, or a lumen is narrower than the robot.
+    """Raise ConfigError where the base is inside an obstacle of soft_base, or where there is less room than the robot needs.
+
+    Room is that of a lumen, or of two planes that face each other.
 
     Raises ValueError for a robot that has no outlines along its axis.
     """
@@ -22,6 +28,14 @@ def refuse_start(scene: Scene, robot: Robot) -> None:
     base = np.vstack([np.zeros(3), np.eye(3)[:2]])
     thinnest = float(surface.radius.min())
     own, normal = np.zeros(2), np.zeros(3)
+    for one, other, width in _facing(arrays, scene.in_world):
+        if width < 2.0 * thinnest:
+            first, second = (scene.names[arrays.obstacle[row]] for row in (one, other))
+            between = f"'{first}'" if first == second else f"'{first}' and '{second}'"
+            raise ConfigError(
+                f"{scene.source}: scene: between the walls of {between} there are {1e3 * max(width, 0.0):.3g} mm;"
+                f" the robot needs more than its diameter, {2e3 * thinnest:g} mm"
+            )
     for row in range(len(arrays.kind)):
         name = scene.names[arrays.obstacle[row]]
         if arrays.kind[row] == TUBE and arrays.sign[row] < 0.0:
@@ -43,3 +57,13 @@ def refuse_start(scene: Scene, robot: Robot) -> None:
                 f"{scene.source}: scene: the robot starts {1e3 * depth:.3g} mm inside '{name}', where it is clamped;"
                 f" move the obstacle by at least that (the robot's shortest displacement that frees it is {way} mm)"
             )
+
+
+def _facing(arrays: SceneArrays, in_world: np.ndarray) -> Iterator[tuple[int, int, float]]:
+    """Yield the rows of two planes that face each other in the same frame, and the width between them in m."""
+    planes = np.flatnonzero(arrays.kind == PLANE)
+    for i, one in enumerate(planes):
+        for other in planes[i + 1 :]:
+            normal, against = arrays.rotation[one][:, 2], arrays.rotation[other][:, 2]
+            if in_world[one] == in_world[other] and float(np.linalg.norm(normal + against)) < _PARALLEL:
+                yield int(one), int(other), float(normal @ (arrays.origin[other] - arrays.origin[one]))

@@ -1,6 +1,7 @@
 """The robot's surface for contact: outlines of cross-sections at stations along it.
 
 A section moves as a whole: its points are p + x f_1 + y f_2 (`mesh.sections`). Between stations p, f_1 and f_2 are parabolas.
+The tip's face is flat. So that it can lie on a wall ahead, points of its rim can touch too, always the same ones.
 """
 
 from typing import NamedTuple
@@ -12,19 +13,26 @@ from gravcomp.description import Robot
 # Stations are at most a radius apart; there are at least and at most so many distances between them.
 _FEWEST, _MOST = 40, 120
 _CORNERS = 48  # of an outline that is not round
+_RIM = 8  # points on the rim of the tip's face; corners of a rectangle are among them
 
 
 class ContactSurface(NamedTuple):
     """Stations from base to tip, those after the base.
 
     place (s,): m along the robot; length (s,): m of robot that each stands for; radius (s,) of a round section, about the axis;
-    outline (s, k, 2): points of the others, (s, 0, 2) where all are round.
+    outline (s, k, 2): points of the others, (s, 0, 2) where all are round; rim (n, 2): points around the tip's face.
     """
 
     place: np.ndarray
     length: np.ndarray
     radius: np.ndarray
     outline: np.ndarray
+    rim: np.ndarray
+
+    @property
+    def slots(self) -> int:
+        """Places that can touch one obstacle."""
+        return len(self.place) + len(self.rim)
 
 
 def contact_surface(robot: Robot) -> ContactSurface:
@@ -39,7 +47,8 @@ def contact_surface(robot: Robot) -> ContactSurface:
     length = np.full(count, robot.length / count)
     length[-1] = 0.5 * length[-1] + radius
     size = np.array([max(outline.half_width, outline.half_height) for outline in outlines])
+    rim = outlines[-1].boundary(2.0 * np.pi * np.arange(_RIM) / _RIM)
     if all(outline.round for outline in outlines):
-        return ContactSurface(place, length, size, np.zeros((count, 0, 2)))
+        return ContactSurface(place, length, size, np.zeros((count, 0, 2)), rim)
     angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
-    return ContactSurface(place, length, size, np.array([outline.boundary(angle) for outline in outlines]))
+    return ContactSurface(place, length, size, np.array([outline.boundary(angle) for outline in outlines]), rim)

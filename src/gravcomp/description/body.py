@@ -5,6 +5,9 @@ import math
 
 from gravcomp.config import parameter
 
+# Below it (kg/m^3) there are no solids but aerogels: the number is in another unit.
+_LIGHTEST = 10.0
+
 
 @dataclasses.dataclass(frozen=True)
 class PronyTerm:
@@ -58,6 +61,11 @@ class Material:
     fibres: Fibres | None = parameter(None, description="fibres that make the material stiffer along themselves")
 
     def __post_init__(self) -> None:
+        if 0.0 < self.density < _LIGHTEST:
+            raise ValueError(
+                f"density is {self.density:g} kg/m^3; allowed: 0 (weightless) or {_LIGHTEST:g} to 30000"
+                f" ({self.density:g} g/cm^3 would be {1e3 * self.density:g} kg/m^3)"
+            )
         if not self.prony:
             return
         if self.creep_ratio:

@@ -56,6 +56,12 @@ class Cable(CableLine):
                 )
             if len(self.via_points) < 2:
                 raise ValueError(f"cable '{self.name}' has {len(self.via_points)} via_points_mm; at least 2 are needed")
+            first, last = self.via_points[0][2], self.via_points[-1][2]
+            if last <= first:
+                raise ValueError(
+                    f"cable '{self.name}': via_points_mm begin at z = {first * 1e3:g} and end at {last * 1e3:g};"
+                    " they go from where the cable is pulled to its fixed end, which is farther from the base"
+                )
             return
         if self.follow_taper and self.tip_radius is not None:
             raise ValueError(f"cable '{self.name}' has follow_taper and also tip_radius_mm; give one of them")

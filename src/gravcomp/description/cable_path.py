@@ -1,4 +1,4 @@
-"""The checks that a cable runs inside the body or through the disks, and crosses no other."""
+"""The checks that a cable runs inside the body or through the disks, and neither crosses nor repeats another."""
 
 import dataclasses
 import itertools
@@ -48,7 +48,10 @@ def check_path(key: str, run: CableRun, pieces: Sequence[Piece], segments: Seque
 
 
 def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
-    """Raise ValueError where two cables cross; cables that share a channel or only begin or end together do not."""
+    """Raise ValueError where two cables cross or are the same line.
+
+    Cables that share a channel or only begin or end together do not cross.
+    """
     # A path that turns back is not known from its arc length alone.
     onward = [r for r in runs if not r.cable.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(r.cable.via_points))]
     for one, other in itertools.combinations(onward, 2):
@@ -59,6 +62,10 @@ def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
             continue
         apart = np.array([one.place(height) for height in s])
         apart -= [other.place(height) for height in s]
+        if not apart.any() and (one.start, one.end) == (other.start, other.end):
+            raise ValueError(
+                f"the cables '{one.cable.name}' and '{other.cable.name}' are the same line; leave one out or move it"
+            )
         place = _crossing(s, apart, pieces)
         if place is not None:
             raise ValueError(

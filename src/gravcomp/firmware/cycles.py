@@ -16,6 +16,7 @@ from typing import Any
 
 from gravcomp.firmware.emulator.core import CCM, CCM_SIZE, FLASH, FLASH_SIZE, RAM, RAM_SIZE, RETURN, Core
 from gravcomp.firmware.image import Image
+from gravcomp.firmware.model_settings import CABLES_MAX
 
 CLOCK_HZ = 168e6
 MODEL_AT = 0x08040000
@@ -23,9 +24,6 @@ MODEL_AT = 0x08040000
 
 MEMORY_AT = 0x20008000
 """Begin of the RAM that the image's own data leave free."""
-
-LAW_SHARE = 4
-"""Points of which a step computes the stiffness of a law (GC_LAW_SHARE)."""
 
 _LINE, _WAIT, _WAIT_BEHIND, _INSTRUCTION_LINES = 4, 5, 1, 64
 _TAKEN = 2
@@ -211,9 +209,10 @@ def table_waits(blob: bytes) -> int:
     for each cable; of some points of the law it computes the stiffness.
     """
     modes, strains, cables, pieces, _, _, points, _ = struct.unpack_from("<8I", blob, 32)
+    share = int(struct.unpack_from("<f", blob, len(blob) - 4 * (CABLES_MAX + 1) - -(-pieces // 4) * 4)[0])
     pairs = modes * (modes + 1) // 2
     floats = pairs * (2 * strains + cables) + 6 * pieces * modes + 3 * modes + 9 * modes * (cables + 1)
-    floats += 18 * modes * points + min(points, LAW_SHARE) * (81 * modes + 9 * pairs // 4)
+    floats += 18 * modes * points + min(points, share) * (81 * modes + 9 * pairs // 4)
     return _WAIT * (4 * floats >> _LINE)
 
 

@@ -18,7 +18,7 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 MAGIC, VERSION = b"GCMB", 2
 TILE = 4
-SETTINGS = 74  # floats of gc_settings
+SETTINGS = 75  # floats of gc_settings
 MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX, BRANCHES_MAX = 48, 96, 192, 64, 128, 4
 LAW_FLOATS, BRANCH_FLOATS = 6, 3
 _HEADER = struct.Struct("<4sIII16s8I")

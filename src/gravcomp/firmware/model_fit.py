@@ -8,8 +8,8 @@ import numpy as np
 from gravcomp.cables.friction import Sliding
 from gravcomp.cache import cache_path, content_key
 from gravcomp.config import ConfigError
-from gravcomp.firmware.cycles import CLOCK_HZ, LAW_SHARE
-from gravcomp.firmware.loop_on_host import HostRun, run_on_host, turning_gravity
+from gravcomp.firmware.cycles import CLOCK_HZ
+from gravcomp.firmware.loop_on_host import LOADING_STEPS, HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import (
     BRANCHES_MAX,
     LAW_POINTS_MAX,
@@ -24,6 +24,7 @@ from gravcomp.firmware.model_blob import (
     truncated,
 )  # fmt: skip
 from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, least_tensions, settings
+from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.reduction.memory import Memory
@@ -44,7 +45,9 @@ _EXTRA = (36, 16, 8, 4, 0)
 # Cycles of the Cortex-M4 for one multiply-add of each part, with its loads and the wait states of the flash; measured on the
 # emulated image (`bench board`).
 _CYCLES = {"elasticity": 4.1, "cables": 8.4, "factor": 9.7, "answers": 6.1, "tension": 14.5, "law": 6.0}
-_LAW_FORCE, _LAW_STIFFNESS = 150, 1100  # multiply-adds at a point, whatever the number of modes
+_LAW_FORCE, _LAW_STIFFNESS = 150, 700  # multiply-adds at a point, whatever the number of modes
+_LEAST_SHARE = 3  # points of a law: fewer make a stiffness of which half is older than a tenth of a second
+
 _REST_CYCLES = 215_000  # inverse problem, filter, tip, compliance: hardly depend on the basis
 
 
@@ -52,8 +55,8 @@ _REST_CYCLES = 215_000  # inverse problem, filter, tip, compliance: hardly depen
 class Fit:
     """A basis that fits: its model, bytes of the blob, multiply-adds of a step, estimated ms, and error in m.
 
-    error: worst distance of the tip from that of the whole reduced model in the closed loop; reduction_error: of that from the
-    full model, where it was built.
+    error: worst distance of the tip from that of the whole reduced model in the closed loop, with a law of rubber that of the
+    loop on the board; reduction_error: of that from the full model, where it was built.
     """
 
     model: ReducedModel
@@ -73,18 +76,22 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     whole = reduction.reduced_model(model)
     _check(model, whole, parameters)
     run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200), rise=True)
-    best: tuple[float, ReducedModel] | None = None
-    for smaller in _candidates(whole):
-        error = _error(smaller, model, run)
-        if best is None or error < best[0]:
-            best = error, smaller
+    best: Fit | None = None
+    for smaller, share in _candidates(whole):
+        values = settings(parameters, smaller.reach, joystick_bend, share)
+        blob = pack(smaller, model.robot, values, least_tensions(parameters), _branches(model))
+        error = _error_of_loop(blob, whole, model, run) if share else _error(smaller, model, run)
+        if best is None or error < best.error:
+            strains = smaller.elasticity.linear.shape[1]
+            best = Fit(smaller, blob, strains, *cost(smaller, share), error, reduction.error_worst)
     if best is None:
         raise ConfigError(_too_big(whole, parameters))
-    error, chosen = best
-    values = settings(parameters, chosen.reach, joystick_bend)
-    blob = pack(chosen, model.robot, values, least_tensions(parameters), _branches(model))
-    adds, milliseconds = cost(chosen)
-    return Fit(chosen, blob, chosen.elasticity.linear.shape[1], adds, milliseconds, error, reduction.error_worst)
+    if not np.isfinite(best.error):
+        raise ConfigError(
+            f"{parameters.source}: with none of the bases that take up to {LONGEST_MS:g} ms a step does the loop on the board"
+            " follow gravity that turns at 90 deg/s"
+        )
+    return best
 
 
 def reduction_for(model: RobotModel, source: str) -> Reduction:
@@ -111,8 +118,11 @@ def blob_for(parameters: LoopParameters) -> bytes:
     return path.read_bytes()
 
 
-def cost(model: ReducedModel) -> tuple[int, float]:
-    """Return the multiply-adds of a step and its estimated time in ms at 168 MHz."""
+def cost(model: ReducedModel, share: int = 0) -> tuple[int, float]:
+    """Return the multiply-adds of a step and its estimated time in ms at 168 MHz.
+
+    share: points of a law of rubber of which a step computes the stiffness.
+    """
     r, k = model.elasticity.linear.shape
     m, s, pairs = len(model.cables.rest_length), len(model.cables.cable), r * (r + 1) // 2
     parts = {
@@ -121,16 +131,20 @@ def cost(model: ReducedModel) -> tuple[int, float]:
         "factor": r**3 // 6,
         "answers": r * r * -(-(m + 4) // 4) * 4,
         "tension": pairs * m,
-        "law": law_cost(r, len(model.deviation.weight)),
+        "law": _law_cost(r, len(model.deviation.weight)) + share * _share_cost(r),
     }
     cycles = sum(_CYCLES[name] * count for name, count in parts.items()) + _REST_CYCLES
     return sum(parts.values()), 1e3 * cycles / CLOCK_HZ
 
 
-def law_cost(modes: int, points: int) -> int:
-    """Return the multiply-adds of a step for a law of rubber at these points: the force at all, the stiffness at some."""
-    due = min(points, LAW_SHARE)
-    return points * (18 * modes + _LAW_FORCE) + due * (81 * modes + 9 * modes * (modes + 1) // 2 + _LAW_STIFFNESS)
+def _law_cost(modes: int, points: int) -> int:
+    """Return the multiply-adds of a step for the force of a law of rubber at these points."""
+    return points * (18 * modes + _LAW_FORCE) + (2 * modes * modes if points else 0)
+
+
+def _share_cost(modes: int) -> int:
+    """Return the multiply-adds for the stiffness of a law of rubber at one point."""
+    return 81 * modes + 9 * modes * (modes + 1) // 2 + _LAW_STIFFNESS
 
 
 def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -> None:
@@ -159,14 +173,26 @@ def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -
         raise ConfigError(f"{source}: its cables have {len(whole.cables.cable)} pieces; the firmware has room for {PIECES_MAX}")
 
 
-def _candidates(whole: ReducedModel) -> Iterator[ReducedModel]:
-    """Yield the bases with most strains of every size that fits."""
+def _candidates(whole: ReducedModel) -> Iterator[tuple[ReducedModel, int]]:
+    """Yield the bases with most strains of every size that fits, with the points of a law whose stiffness a step can compute.
+
+    Where there is such a law, those with fewer strains as well: they leave more time for it.
+    """
+    points = len(whole.deviation.weight)
     for modes in range(min(whole.size, MODES_MAX) // TILE * TILE, 0, -TILE):
         for extra in _EXTRA:
             smaller = truncated(whole, modes, extra)
-            if fits(smaller):
-                yield smaller
-                break
+            share = min(points, _affordable(smaller))
+            if fits(smaller) and (share >= _LEAST_SHARE or not points):
+                yield smaller, share
+                if not points:
+                    break
+
+
+def _affordable(model: ReducedModel) -> int:
+    """Return at how many points there is time for the stiffness of a law of rubber."""
+    cycles = 1e-3 * (LONGEST_MS - cost(model)[1]) * CLOCK_HZ
+    return max(0, int(cycles / (_CYCLES["law"] * _share_cost(model.size))))
 
 
 def fits(model: ReducedModel) -> bool:
@@ -184,6 +210,30 @@ def _bytes(model: ReducedModel) -> int:
 def _branches(model: RobotModel) -> tuple[tuple[float, float], ...]:
     """Return the branches of the material, of a robot with one kind of them."""
     return model.mesh.materials[0].branches
+
+
+def _error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: HostRun) -> float:
+    """Return the worst distance in m of the tip in the loop on the board from that of the whole reduced model, inf: it is lost.
+
+    The loop is the C code on this machine, with the run's gravity and its own commands, which the whole model gets as well.
+    """
+    loop, tracker = StandaloneLoop(blob), ReducedTracker(whole, model.length)
+    count, branches = len(model.robot.cables), _branches(model)
+    tracker.place(np.zeros(whole.size), np.zeros(count), Sliding.none(count))
+    memory, wound, worst = Memory.of(branches, np.zeros(whole.size), tracker.strain), np.zeros(count), 0.0
+    for step, gravity in enumerate(run.gravity):
+        creep = memory.stress(SAMPLE_PERIOD) if branches else None
+        state = tracker.track(gravity, CableInput(wound=wound), iterations=10, creep=creep)
+        # The loop lets gravity rise by itself.
+        loop.follow(SAMPLE_PERIOD, run.gravity[max(step, LOADING_STEPS - 1)])
+        result = loop.read()
+        if not (state.converged and result.converged):
+            return np.inf
+        if branches:
+            memory = memory.after(state.q, tracker.strain, SAMPLE_PERIOD)
+        worst = max(worst, float(np.linalg.norm(whole.tip(state.q) - result.tip)))
+        wound = result.displacement
+    return worst
 
 
 def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:

@@ -74,10 +74,11 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
     return [numbers[name] for name in parameters.robot.cable_names]
 
 
-def settings(parameters: LoopParameters, reach: float, joystick_bend: float) -> np.ndarray:
+def settings(parameters: LoopParameters, reach: float, joystick_bend: float, law_share: int = 1) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
-    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection. Raises ConfigError for motors that are shared.
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; law_share: points of a law of rubber of which
+    a step computes the stiffness. Raises ConfigError for motors that are shared.
     """
     robot, wanted = parameters.robot, parameters.straight
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
@@ -100,6 +101,6 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float) -> 
         rest.time_constant, rest.gyro_deviation, rest.accel_deviation, rest.accel_drift, rest.minimum_time, rest.largest_bias,
         sensor.gyro_range, sensor.accel_range, sensor.delay, sensor.stuck_time, sensor.largest_gap,
         spikes.gyro, spikes.accel, spikes.ratio, spikes.time_constant, float(spikes.longest),
-        *numbers, *[0] * (CABLES_MAX - len(numbers)),
+        float(law_share), *numbers, *[0] * (CABLES_MAX - len(numbers)),
     ]  # fmt: skip
     return np.array(values, dtype="<f4")

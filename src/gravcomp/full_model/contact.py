@@ -41,8 +41,9 @@ class FullContact:
 
     Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
     nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
-    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; settled: whether all conditions of
-    contact hold; longest: largest step in m that cannot pass over an obstacle.
+    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; force (k, slots, 3): those of
+    `places.remember`; settled: whether all conditions of contact hold; longest: largest step in m that cannot pass over an
+    obstacle.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -62,7 +63,7 @@ class FullContact:
 
     def reset(self) -> None:
         """Forget the forces: nothing touches."""
-        self._force = np.zeros((len(self.arrays.kind), len(self.surface.place), 3))
+        self.force = np.zeros((len(self.arrays.kind), self.surface.slots, 3))
         self._start = self.sections_at_rest
         self.longest = np.inf
         self.pull, self.settled = np.zeros(3 * self._model.n_free), True
@@ -88,7 +89,7 @@ class FullContact:
 
     def depth(self, u: np.ndarray) -> float:
         """Return in m how deep the robot is in an obstacle at the displacements u (n, 3); 0 outside."""
-        shape = self._force.shape[:2]
+        shape = len(self.arrays.kind), len(self.surface.place)
         reach = np.full(shape[1], self.margin)
         own, normal, asked = np.zeros((*shape, 2)), np.zeros((*shape, 3)), np.zeros(shape, dtype=np.bool_)
         gaps = all_gaps(self.arrays, self.surface, self.sections(u), reach, asked, own, normal)
@@ -110,12 +111,12 @@ class FullContact:
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self._force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self.force)
         if not len(places.row):
             state.compliance, state.answer = compliance, answer
             self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m)), np.zeros(len(y)))
             return y + answer @ tension, tension
-        pressed, rub = remembered(places, self._force)
+        pressed, rub = remembered(places, self.force)
         turns, moves, bend = turning(places, pressed)
         directions, friction, slid = self._directions(places, turns, moves), np.zeros(0), np.zeros(0)
         arrays, count = self.arrays, len(places.row)
@@ -134,7 +135,7 @@ class FullContact:
         )  # fmt: skip
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
-        remember(places, forces, self._force)
+        remember(places, forces, self.force)
         self._keep(places, forces, held, change[m : m + count], force[m:] @ directions)
         return y + columns @ force, force[:m]
 
@@ -169,7 +170,7 @@ class FullContact:
 
     def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray) -> None:
         if not len(places.row):
-            self._force[:], self.settled = 0.0, True
+            self.force[:], self.settled = 0.0, True
         self._last, self.pull = (places, forces, held, by_tension), pull
         self.longest = float(self.surface.radius.min()) if len(places.row) else np.inf
 

@@ -26,7 +26,8 @@ from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, me
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.mesh.layers import least_layers, softest
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.refusal import well_shaped
+from gravcomp.mesh.quality import mesh_quality
+from gravcomp.mesh.refusal import LEAST_JACOBIAN_RATIO, well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
 from gravcomp.whole_file import write_whole
 
@@ -115,21 +116,23 @@ def _choose(robot: Robot) -> MeshChoice:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
         gains: dict[str, float] = {}
+        meshes: dict[str, Elements] = {}
         for direction in _ORDER:
-            finer = _finer(robot, here, direction)
-            if finer == here:
+            finer = tips.finer(here, direction)
+            if finer is None:
                 continue
             twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
             changes[direction] = twice * tips.change(here, finer)
             if tips.unknowns(finer) > _MOST_UNKNOWNS:  # too many to be used, but the error has to be known
                 continue
+            meshes[direction] = finer
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
         error = _together(list(changes.values())) if changes else 0.0
         if error <= _USED * ACCURACY or not gains:
             return MeshChoice(here, error)
-        here = _not_deep(robot, _finer(robot, here, max(gains, key=lambda direction: gains[direction])))
+        here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
 
 
 def _to_twice(number: int, finer: int, direction: str) -> float:
@@ -164,6 +167,15 @@ class _Tips:
         if elements not in self._unknowns:
             self._unknowns[elements] = 3 * len(tube_mesh(dataclasses.replace(self._robot, elements=elements)).nodes)
         return self._unknowns[elements]
+
+    def finer(self, elements: Elements, direction: str) -> Elements | None:
+        """Return the next mesh in a direction that has more unknowns and a good shape; None where there is none."""
+        here = elements
+        while (finer := _finer(self._robot, here, direction)) != here:
+            if self.unknowns(finer) > self.unknowns(elements):
+                return finer if _is_well_shaped(self._robot, finer) else None
+            here = finer
+        return None
 
     def change(self, one: Elements, other: Elements) -> np.ndarray:
         """Return the change of the tips (l, 3) from one mesh to another, over the length."""
@@ -202,7 +214,22 @@ def _start(robot: Robot) -> Elements:
         raise MeshError(
             f"robot '{robot.name}': no mesh of its segments has elements of a good shape; its walls are too thin or too steep"
         )
-    return _not_deep(robot, shaped if disks else with_grading(robot, shaped))
+    return _not_deep(robot, shaped if disks else _graded(robot, shaped))
+
+
+def _graded(robot: Robot, elements: Elements) -> Elements:
+    """The well-shaped elements with the grading that suits them, where needed more along the robot; else without it."""
+    for more in (1.0, 1.5, 2.0, 3.0):
+        graded = with_grading(robot, dataclasses.replace(elements, along=min(round(more * elements.along), 500)))
+        if _is_well_shaped(robot, graded):
+            return graded
+    return elements
+
+
+def _is_well_shaped(robot: Robot, elements: Elements) -> bool:
+    """Whether a mesh with these elements would not be refused."""
+    mesh = tube_mesh(dataclasses.replace(robot, elements=elements))
+    return mesh_quality(mesh).jacobian_ratio >= LEAST_JACOBIAN_RATIO
 
 
 def _softness(robot: Robot) -> float:

@@ -12,9 +12,14 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gravcomp.compiled_functions import compiled_folder, configure_numba
 from gravcomp.environment.end_with_parent import end_with_parent
+
+if TYPE_CHECKING:
+    from gravcomp.full_model.robot_model import RobotModel
+    from gravcomp.reduction.reduced_model import ReducedModel
 
 LOOP = ("model", "controller")
 """Parts of the nodes of the loop."""
@@ -24,6 +29,12 @@ VIRTUAL = ("virtual_robot",)
 
 SURROUNDED = ("contact", "surroundings")
 """Parts of a robot with obstacles or zones around it, of the model and of the controller; the set-up does not compile them."""
+
+REDUCED = ("reduced",)
+"""Part of the reduced model, at rest and in motion, which is otherwise compiled when one is built."""
+
+PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED
+"""All parts."""
 
 
 def missing(parts: Iterable[str]) -> list[str]:
@@ -50,8 +61,13 @@ def compile_part(part: str) -> None:
     with open(folder / f"{part}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not mark.exists():
-            _WORK[part]()
+            run_part(part)
             mark.touch()
+
+
+def run_part(part: str) -> None:
+    """Call all functions of a part, which compiles them or loads them from the cache."""
+    _WORK[part]()
 
 
 def _mark(folder: Path, part: str) -> Path:
@@ -79,17 +95,40 @@ def _contact() -> None:
     from gravcomp.scene import PlaneWall, SceneSection
     from gravcomp.scene.scene import Scene
     from gravcomp.simulation import Simulator
-    from gravcomp.training import BuildOptions, TrainingOptions
-    from gravcomp.training.build import trained
 
     robot = load_robot_file("article").robot
     floor = PlaneWall(name="floor", normal=(1.0, 0.0, 0.0), point=(-0.1 * robot.length, 0.0, 0.0), friction=0.2)
     simulator = Simulator(robot, reduced=False, scene=Scene(SceneSection(planes=(floor,))))
     for cables in (None, np.zeros(len(robot.cables))):
         simulator.step(np.array([-9.81, 0.0, 0.0]), cables)
-    few = BuildOptions(modes=8, strains=4, training=TrainingOptions(paths=2, steps=8))
-    reduction = trained(simulator.model, few)
-    ReducedServing(simulator.model, reduction.reduced_model(simulator.model), simulator.solver).warm_up()
+    ReducedServing(simulator.model, _small_reduced_model(simulator.model), simulator.solver).warm_up()
+
+
+def _reduced() -> None:
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.full_model.cable_input import CableInput
+    from gravcomp.full_model.robot_model import RobotModel
+    from gravcomp.full_model.statics import StaticSolver
+    from gravcomp.reduction.motion import ReducedDynamicSolver
+    from gravcomp.reduction.serving import ReducedServing
+
+    model = RobotModel(load_robot_file("article").robot)
+    reduced, gravity = _small_reduced_model(model), np.array([-9.81, 0.0, 0.0])
+    ReducedServing(model, reduced, StaticSolver(model)).warm_up()
+    mass = reduced.basis.T @ model.mass_matrix().multiply(reduced.basis)
+    solver = ReducedDynamicSolver(reduced, mass, model.mesh.materials[0].damping_time, model.length)
+    solver.place(np.zeros(reduced.size), np.zeros(model.tendons.count), gravity)
+    solver.step(gravity, CableInput(), 5e-3)
+
+
+def _small_reduced_model(model: "RobotModel") -> "ReducedModel":
+    """Return a reduced model from a few shapes, which is not stored: it has the types of every other one."""
+    from gravcomp.training import BuildOptions, TrainingOptions
+    from gravcomp.training.build import trained
+
+    return trained(model, BuildOptions(modes=8, strains=4, training=TrainingOptions(paths=2, steps=8))).reduced_model(model)
 
 
 def _surroundings() -> None:
@@ -122,6 +161,7 @@ _WORK = {
     "model": _model,
     "controller": _controller,
     "virtual_robot": _virtual_robot,
+    "reduced": _reduced,
     "contact": _contact,
     "surroundings": _surroundings,
 }

@@ -9,6 +9,10 @@ A body that ends in a rounding has no section at its tip: there points of its la
 On a body whose axis is bent at rest, Z is the arc length along the axis, and the section is perpendicular to it there.
 """
 
+import hashlib
+import threading
+from collections import OrderedDict
+
 import numpy as np
 
 from gravcomp.mesh.elements import is_hexahedron, shape_gradients, shape_values
@@ -18,6 +22,12 @@ from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.tet_sections import near_tip, on_plane
 
 _RINGS, _SPOKES = 9, 18
+_GAUSS = np.polynomial.legendre.leggauss(3)
+
+# Functionals (3, n) of a mesh by height, for the last meshes: a fit makes the same mesh again for each set of its parameters.
+_known: OrderedDict[bytes, dict[float, np.ndarray]] = OrderedDict()
+_REMEMBERED, _LARGEST = 2, 5000  # meshes, nodes: the functionals of a larger one take tens of MB
+_guard = threading.Lock()
 
 
 def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
@@ -25,6 +35,31 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
 
     Raises MeshError where the body has no section.
     """
+    known = _known_of(mesh)
+    missing = [height for height in dict.fromkeys(heights.tolist()) if height not in known]
+    if missing:
+        known.update(zip(missing, _computed(mesh, missing)))
+    return np.concatenate([known[height] for height in heights.tolist()] or [np.zeros((0, len(mesh.nodes)))])
+
+
+def _known_of(mesh: Mesh) -> dict[float, np.ndarray]:
+    """Return the known functionals by height of a mesh with these nodes and elements, to be added to."""
+    if mesh.axis.bent or len(mesh.nodes) > _LARGEST:  # a bent axis is more than the nodes
+        return {}
+    content = hashlib.blake2b(mesh.kind.encode(), digest_size=16)
+    for array in (mesh.nodes, mesh.straight, mesh.elements):
+        content.update(np.ascontiguousarray(array))
+    key = content.digest()
+    with _guard:
+        found = _known.setdefault(key, {})
+        _known.move_to_end(key)
+        while len(_known) > _REMEMBERED:
+            _known.popitem(last=False)
+    return found
+
+
+def _computed(mesh: Mesh, heights: list[float]) -> np.ndarray:
+    """Return the functionals (s, 3, n) of the heights."""
     rows = np.zeros((3 * len(heights), len(mesh.nodes)))
     layered = _layered(mesh)
     rounded = not _ends_flat(mesh)
@@ -43,7 +78,7 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
         for row in range(3):
             np.add.at(rows[3 * index + row], nodes, fit[row][:, None] * weights)
     rows[np.abs(rows) < 1e-9 * np.abs(rows).max(axis=1, keepdims=True)] = 0.0
-    return rows
+    return rows.reshape(len(heights), 3, -1)
 
 
 def _ends_flat(mesh: Mesh) -> bool:
@@ -78,7 +113,7 @@ def _in_layer(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray, np.nda
     slack = 1e-9 * mesh.length
     layer = (low < height - slack) & (high >= height - slack) if height > slack else low <= slack
     elements = mesh.elements[layer]
-    x, w = np.polynomial.legendre.leggauss(3)
+    x, w = _GAUSS
     a, b = (grid.ravel() for grid in np.meshgrid(x, x, indexing="ij"))
     part = np.clip(2.0 * (height - low[layer]) / (high - low)[layer] - 1.0, -1.0, 1.0)
     part[np.abs(np.abs(part) - 1.0) < 1e-9] = np.sign(part[np.abs(np.abs(part) - 1.0) < 1e-9])

@@ -90,9 +90,16 @@ class GuardClient:
         return True
 
     def close(self) -> None:
-        """End the connection cleanly, which ends the guard. The currents must be zero."""
+        """End the connection cleanly, which ends the guard. The currents must be zero.
+
+        The guard closes its end first: closed here with answers that are not read, the connection would be reset, and the guard
+        would take that for the death of the bridge before it reads the good-bye.
+        """
         with contextlib.suppress(OSError):
+            self._connection.settimeout(ANSWER_TIMEOUT)
             self._connection.send(b'{"bye": true}')
+            while self._connection.recv(64):
+                pass
         self._connection.close()
 
     def _read_answers(self) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
+from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.guard import REJECTED, RESTARTED, Problem, SampleGuard, Verdict
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector, agrees
@@ -52,6 +53,7 @@ class OrientationFilter:
         self.temperature_stable = False  # set by the caller; while True the bias hardly walks
         self.rejected = 0  # samples not used, since construction
         self._guard = SampleGuard(self.options.sensor)
+        self._even = EvenSteps()
         self._rest = RestDetector(self.options.rest)
         spikes = self.options.spikes
         self._gyro_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO, PATIENCE_GYRO)
@@ -65,6 +67,7 @@ class OrientationFilter:
     def reset(self) -> None:
         """Reset all state: the next sample starts with yaw 0 and no bias."""
         self._guard.reset()
+        self._even.reset()
         self._started = False
         self._orientation = quat.IDENTITY
         self._velocity = (0.0, 0.0, 0.0)
@@ -107,10 +110,11 @@ class OrientationFilter:
             return verdict.problem
         if not self._started or verdict.problem in RESTARTED:
             self._start(rate, force, verdict.dt)
+            self._even.reset()
             self._forget_suspects()
             return self._estimate(stamp_ns, rate, False, verdict.problem)
 
-        dt = verdict.dt
+        dt = self._even.take(verdict.dt)
         gyro_usable, accel_usable = self._usable(verdict)
         rate, force = self._without_spikes(dt, rate, force, gyro_usable, accel_usable)
         self._steps.append([self._saved(), dt, rate, force, gyro_usable, accel_usable])

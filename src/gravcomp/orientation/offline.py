@@ -1,12 +1,16 @@
 """The estimator over a whole recording, as fast as possible; the result is that of the node."""
 
+import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gravcomp.orientation.estimator import GravityEstimator
+from gravcomp.orientation.filter import MISSED_PERIODS
 from gravcomp.orientation.guard import Problem
+from gravcomp.orientation.spike_review import AHEAD, SpikeReview
+from gravcomp.orientation.spikes import SpikeOptions
 from gravcomp.recordings.imu import Recording
 
 PROGRESS_EVERY = 2000  # samples
@@ -36,9 +40,7 @@ def estimate_recording(
     row: tuple | None = None
     temperatures = _temperatures(recording)
     next_temperature = next(temperatures, None)
-    # Python numbers: with NumPy scalars a sample takes 1.5 times as long.
-    samples = zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist())
-    for i, (stamp_ns, gyro, accel) in enumerate(samples):
+    for i, (stamp_ns, gyro, accel) in enumerate(recording.samples()):
         while next_temperature is not None and next_temperature[0] <= stamp_ns:
             estimator.add_temperature(*next_temperature)
             next_temperature = next(temperatures, None)
@@ -63,6 +65,22 @@ def estimate_recording(
         inclination_std=rows[:, 11],
         problems=problems,
     )
+
+
+def without_rate_spikes(recording: Recording, options: SpikeOptions | None = None) -> Recording:
+    """Return the recording without single spikes of the rate, for what takes means of samples: a mean would hide them."""
+    options = options or SpikeOptions()
+    review, gyro, longest = SpikeReview(options.gyro, options), recording.gyro.copy(), MISSED_PERIODS / recording.rate
+    before = int(recording.stamp_ns[0])
+    for i, (stamp_ns, rate, _) in enumerate(recording.samples()):
+        dt, before = (stamp_ns - before) * 1e-9, stamp_ns
+        if not 0.0 <= dt <= longest or not math.isfinite(sum(rate)):
+            review.reset()
+            continue
+        decided = review.take(dt, (rate[0], rate[1], rate[2]))
+        if decided is not None:
+            gyro[i - AHEAD] = decided
+    return replace(recording, gyro=gyro)
 
 
 def _temperatures(recording: Recording) -> Iterator[tuple[int, float]]:

@@ -44,8 +44,8 @@ _LEFT = 0.2
 class Touching(NamedTuple):
     """What contact needs: scene, surface, rest (s, 3, 3) and change (9 s, r) of the stations' p, f_1, f_2; and the memory.
 
-    start (s, 3, 3): stations at the last equilibrium; force (k, s, 3) in N: of `places.remember`; pull (1, r): force of contact
-    on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer places are candidates.
+    start (s, 3, 3): stations at the last equilibrium; force (k, slots, 3) in N: of `places.remember`; pull (1, r): force of
+    contact on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer places are candidates.
     """
 
     scene: SceneArrays
@@ -70,9 +70,17 @@ class ReducedContact:
 
     def forget(self) -> None:
         """Forget the forces, for a start from another shape."""
-        self._force = np.zeros((len(self._full.arrays.kind), len(self._full.surface.place), 3))
+        self.force = np.zeros((len(self._full.arrays.kind), self._full.surface.slots, 3))
         self._pull = np.zeros((1, self._change.shape[1]))
         self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray, Pressed] | None = None
+
+    def take_over(self, basis: np.ndarray) -> None:
+        """Take the forces of the full model's last solution as guesses; basis (3 n_free, r)."""
+        self.force, self._pull = self._full.force.copy(), (self._full.pull @ basis)[None]
+
+    def hand_over(self) -> None:
+        """Give the forces of the last solution to the full model as guesses."""
+        self._full.force[:] = self.force
 
     def sections(self, q: np.ndarray) -> np.ndarray:
         """Return p, f_1, f_2 (s, 3, 3) of the stations at q (r,)."""
@@ -83,7 +91,7 @@ class ReducedContact:
         full = self._full
         scene = full.place(gravity)
         return Touching(
-            scene, full.surface, self._rest, self._change, self.sections(q), self._force.copy(), self._pull.copy(),
+            scene, full.surface, self._rest, self._change, self.sections(q), self.force.copy(), self._pull.copy(),
             full.rubbing, full.margin,
         )  # fmt: skip
 
@@ -97,7 +105,7 @@ class ReducedContact:
         pressed: Pressed,
     ) -> None:
         """Keep what a step has found."""
-        self._force, self._pull = touching.force, touching.pull
+        self.force, self._pull = touching.force, touching.pull
         self._last = (places, forces, held, by_tension, pressed) if len(pressed.numbers) else None
 
     def contacts(self) -> Contacts:

@@ -35,6 +35,8 @@ _TOLERANCE = 1e-3
 _CHECK_EVERY, _CHECK_AT_LEAST, _CHECK_MOVED = 300, 20, 0.1
 # Steps of the full model before the reduced model is tried again.
 _RETURN_AFTER = 25
+# Iterations in which the reduced model may find the forces of contact at a shape of the full one.
+_TO_AGREE = 30
 _DIFFERENT_CREEP = "the materials creep differently, which the reduced model does not have"
 _UNTRAINED = "the shape is outside the range that the reduced model was trained for"
 
@@ -162,7 +164,9 @@ class ReducedServing:
             return
         q, strain = self._projected(state)
         self._tracker.place(q, state.tension, self._full.sliding)
-        own = self._tracked(gravity, cables, h, loads)
+        if self._tracker.contact is not None:
+            self._tracker.contact.take_over(self.reduced.basis)
+        own = self._tracked(gravity, cables, h, loads, iterations=_TO_AGREE)
         self._remember(q, strain, h)
         if h is not None and not self._uniform:
             self.reason = _DIFFERENT_CREEP
@@ -171,12 +175,14 @@ class ReducedServing:
         if own.converged and self.reduced.outside(own.q) <= 1.0 and error < 0.5 * self._tolerance:
             self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
 
-    def _tracked(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> ReducedState:
+    def _tracked(
+        self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None, iterations: int = 10
+    ) -> ReducedState:
         """Track the reduced model; the forces of loads that turn with their sections are those of the last shape."""
         creep = None if h is None else self._memory.stress(h)
         loads = with_payload(self._model, gravity, loads)
         force = None if loads is None else self._loads.at(loads, self._tracker.state.q)
-        return self._tracker.track(gravity, cables, iterations=10, creep=creep, force=force)
+        return self._tracker.track(gravity, cables, iterations=iterations, creep=creep, force=force)
 
     def _projected(self, state: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
         """Return the coordinates (r,) of a shape of the full model and their strain (m,)."""
@@ -195,6 +201,8 @@ class ReducedServing:
     def _hand_over(self) -> None:
         """Set the full model to the reduced model's shape, and its memory to that before the present step."""
         u, sliding = self.displacements, self._tracker.sliding
+        if self._tracker.contact is not None:
+            self._tracker.contact.hand_over()
         if self._creep is not None and self._uniform:
             assert isinstance(self._model.elements, SolidElements)
             self._creep.strain, self._creep.held = self._memory.at_points(self._model.elements, self.reduced.basis)

@@ -23,6 +23,9 @@ LONGEST_STEP = 0.2  # s: with a longer gap a stretch is left out
 LIVE_PAUSE = 16.0  # s between two stretches of a live stream
 QUIET = 0.01  # largest deviation of the specific force in a block at rest, of its length: elsewhere a mean rate is no bias
 ALIKE = 1.1  # ratio of scatters that says nothing
+STUCK = 0.25  # s with the same rates: they are not those of the sensor, and their stretch says nothing
+CERTAIN = 4.0  # standard deviations from 1 of a scale of the rates that is reported
+NEAR = 0.25  # of a scale: what is fitted differs by less
 CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
 OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
 FEWEST = 3  # stretches: one that hardly turns says nothing
@@ -79,13 +82,15 @@ class Axes:
 
     def findings(self) -> list[Finding]:
         """Return what is odd."""
-        if self._stretches < FEWEST or self._scatter.max() < LEAST * self._stretches:
+        if self._stretches < FEWEST:
             return []
+        if self._scatter.max() < LEAST * self._stretches:
+            return self._of_scale()
         best, same_axes = self._likeliest(len(CANDIDATES)), self._likeliest(len(SCALES))
         if self._scatter[best] > OTHER_AXES * self._scatter[same_axes]:
             best = same_axes
         if best == 0 or self._scatter[best] > CLEAR * self._scatter[0]:
-            return []
+            return self._of_scale()
         matrix, scale = CANDIDATES[best]
         unit = scale if scale in ("deg/s", "millideg/s") else ""
         correction = matrix * (SCALES[unit] if unit else 1.0)
@@ -102,9 +107,26 @@ class Axes:
         if unit:
             found.append(Finding("gyro_unit", f"the gyroscope is in {unit}: rad/s is needed", fatal=True, gyro_matrix=correction))
         elif scale and self._rested and self._scatter[best] <= CLEAR * self._scatter[best - list(SCALES).index(scale)]:
-            text = f"the turns by the gyroscope are {'twice' if scale == 'half' else 'half'} those by the accelerometer"
-            found.append(Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2"))
+            found.append(_wrong_by_two(scale))
         return found
+
+    def _of_scale(self) -> list[Finding]:
+        """Return whether the rates are wrong by 2 where the sensor turns so little that linear acceleration hides most of it.
+
+        The scatter is about a parabola over the scale s of the rates, S = c + k (s - s0)^2, and s0 the scale that fits best, with
+        the variance c / (9 k n) for n stretches: each has nine differences of its means.
+        """
+        same, half, double = self._scatter[:3] / self._stretches  # the order of SCALES
+        first = (same - half) / (1.0 - SCALES["half"])
+        curvature = ((double - same) / (SCALES["double"] - 1.0) - first) / (SCALES["double"] - SCALES["half"])
+        if not self._rested or not curvature > 0.0:
+            return []
+        fitted = 0.5 * (1.0 + SCALES["half"] - first / curvature)
+        least = half + first * (fitted - SCALES["half"]) + curvature * (fitted - SCALES["half"]) * (fitted - 1.0)
+        deviation = math.sqrt(max(least, 0.0) / (9.0 * curvature * self._stretches))
+        if abs(fitted - 1.0) <= CERTAIN * deviation:
+            return []
+        return [_wrong_by_two(name) for name in ("half", "double") if abs(fitted / SCALES[name] - 1.0) < NEAR]
 
     @property
     def _rested(self) -> bool:
@@ -122,6 +144,8 @@ class Axes:
         return int(np.argmax(scatter <= ALIKE * scatter.min()))
 
     def _take_stretch(self, blocks: list[Block]) -> None:
+        if _longest_repeated(np.concatenate([block.gyro for block in blocks])) * blocks[-1].period > STUCK:
+            return
         stamp = np.concatenate([block.stamp_ns for block in blocks])
         gyro = _median(np.concatenate([block.gyro for block in blocks]))
         accel = _median(np.concatenate([block.accel for block in blocks]))
@@ -152,6 +176,17 @@ def _median(values: np.ndarray) -> np.ndarray:
     """Return the values (n, 3) without single spikes: the median of three neighbours."""
     inner = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
     return np.concatenate([values[:1], inner, values[-1:]])
+
+
+def _longest_repeated(values: np.ndarray) -> int:
+    """Return the largest number of rows (n, 3) in a row that repeat the one before."""
+    changes = np.flatnonzero(np.concatenate([[True], (values[1:] != values[:-1]).any(axis=1), [True]]))
+    return int(np.diff(changes).max()) - 1
+
+
+def _wrong_by_two(scale: str) -> Finding:
+    text = f"the turns by the gyroscope are {'twice' if scale == 'half' else 'half'} those by the accelerometer"
+    return Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2")
 
 
 def _named(matrix: np.ndarray) -> str:

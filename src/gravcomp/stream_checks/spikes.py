@@ -4,7 +4,8 @@ import numpy as np
 
 from gravcomp.stream_checks.finding import Block, Finding
 
-RATIO = 10.0  # of the median change in the block
+RATIO = 4.0  # of the usual change in the block
+USUAL = 90  # percentile: nine of ten changes are no spikes, and vibration that begins within a block is no row of spikes
 SHARE = 0.005  # of the samples, from which spikes are a property of the stream
 
 
@@ -41,5 +42,5 @@ def spikes(values: np.ndarray, least: float) -> np.ndarray:
     change = np.diff(values, axis=0)
     into, out = change[:-1], -change[1:]
     peak = np.where(into * out > 0, np.minimum(abs(into), abs(out)), 0.0).max(axis=1)
-    usual = float(np.median(np.abs(change).max(axis=1)))
+    usual = float(np.percentile(np.abs(change).max(axis=1), USUAL))
     return np.concatenate([[False], peak > max(RATIO * usual, least), [False]])

@@ -6,6 +6,7 @@ import queue
 import viser
 
 from gravcomp.view.graphics import GRAPHICS
+from gravcomp.view.inset import Inset
 from gravcomp.view.requests import (
     BridgeService,
     Compensate,
@@ -29,9 +30,11 @@ _MODES = {"Compensate": "compensate", "Hold": "hold", "Release": "relax"}
 class Controls:
     """Builds the control panel and collects its requests."""
 
-    def __init__(self, server: viser.ViserServer, scene: Scene, length: float, cables: tuple[str, ...], graphics: str) -> None:
+    def __init__(
+        self, server: viser.ViserServer, scene: Scene, inset: Inset, length: float, cables: tuple[str, ...], graphics: str
+    ) -> None:
         self._requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
-        self._gui, self._scene = server.gui, scene
+        self._gui, self._scene, self._inset = server.gui, scene, inset
         self._recording = False
         self._target = TargetControls(server.gui, scene.target.gizmo, length, self._requests.put)
         self._record = self._add_compensation()
@@ -70,8 +73,8 @@ class Controls:
             modes = self._gui.add_button_group("cables", tuple(_MODES))
             bridge = self._gui.add_button_group("motors", ("Home", "Stop"))
             record = self._gui.add_button("Record a bag")
-        modes.on_click(lambda e: self._requests.put(Compensate(_MODES[e.target.value])))
-        bridge.on_click(lambda e: self._requests.put(BridgeService(e.target.value.lower())))
+        modes.on_click(lambda e: self._requests.put(Compensate(_MODES.get(str(e.target.value), str(e.target.value)))))
+        bridge.on_click(lambda e: self._requests.put(BridgeService(str(e.target.value).lower())))
         record.on_click(lambda _: self._requests.put(Record(not self._recording)))
         return record
 
@@ -88,9 +91,11 @@ class Controls:
                 "obstacles": self._gui.add_checkbox("obstacles", True),
                 "forces": self._gui.add_checkbox("forces", True),
             }
+            camera = self._gui.add_checkbox("camera at the tip", True, hint="what a person sees who steers by its picture")
             handle = self._gui.add_checkbox("drag the target", False, hint="handle at the tip of the target")
         quality.on_update(lambda _: self._scene.set_graphics(quality.value))
         view.on_update(lambda _: self._scene.set_view(view.value))
+        camera.on_update(lambda _: self._inset.show_panel(camera.value))
         handle.on_update(lambda _: self._target.show_gizmo(handle.value))
         for what, box in boxes.items():
             box.on_update(functools.partial(self._on_box, what))

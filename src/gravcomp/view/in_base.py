@@ -22,5 +22,9 @@ class BaseFrame:
         return rotations(np.array([[x, y, z, w]]))[0]
 
     def place(self, point: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return a point (3,) of the drawn scene in soft_base, m."""
-        return np.asarray(point, dtype=float) @ self.rotation / SCALE
+        """Return a point (3,) of the drawn scene in soft_base, m; NaN for what is no point, as a browser may send it."""
+        try:
+            place = np.asarray(point, dtype=float)
+        except (TypeError, ValueError):
+            place = np.zeros(0)
+        return place @ self.rotation / SCALE if place.shape == (3,) else np.full(3, np.nan)

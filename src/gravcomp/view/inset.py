@@ -12,7 +12,7 @@ from gravcomp.view.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from gravcomp.view.obstacle_shapes import ObstacleShape
-    from gravcomp.view.tip_camera import Surface
+    from gravcomp.view.tip_camera import Surface, TipCamera
 
 _SIZE = 200  # px
 _WIDTH, _HEIGHT = 232, 288  # px, of the panel
@@ -26,17 +26,21 @@ class Inset:
     def __init__(self, gui: viser.GuiApi, shapes: "Sequence[ObstacleShape]", length: float, radius: float) -> None:
         """shapes: the obstacles; length, radius: of the robot, m."""
         self._shapes, self._length, self._radius = shapes, length, radius
-        self._camera = None
-        self.wanted = True
+        self._camera: TipCamera | None = None
+        self._wanted = True
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab("Camera at the tip"):
             self._image = gui.add_image(np.zeros((_SIZE, _SIZE, 3), np.uint8), format="jpeg", jpeg_quality=85)
         self._panel.float(x=_MARGIN, y=-_MARGIN, width=_WIDTH, height=_HEIGHT)
 
+    def show_panel(self, wanted: bool) -> None:
+        """Show or hide the panel."""
+        self._wanted = wanted
+
     def show(self, snapshot: Snapshot) -> None:
         """Show what the camera sees: at the virtual robot's tip where there is one, else at the model's."""
         body = snapshot.truth or snapshot.backbone
-        there = self.wanted and body is not None and bool(self._shapes or snapshot.wall is not None)
+        there = self._wanted and body is not None and bool(self._shapes or snapshot.wall is not None)
         if self._panel.visible != there:
             self._panel.visible = there
         if not there or body is None:

@@ -52,7 +52,8 @@ class Page:
         with gui.add_folder("Cables"):
             self._cables = gui.add_html("")
         self._touches = gui.add_html("", visible=False)
-        self._controls = Controls(self._server, self._scene, robot.length, self._names, graphics)
+        self._inset = Inset(gui, shapes, robot.length, half_width(robot))
+        self._controls = Controls(self._server, self._scene, self._inset, robot.length, self._names, graphics)
         self._legend = gui.add_html(legend_html(False))
         panel = gui.add_panel()
         with panel.add_tab(f"The last {options.window:g} s"):
@@ -60,7 +61,6 @@ class Page:
             self._plots = Plots(self._server, self._names, options)
         panel.dock_left()
         panel.set_width(_PANEL_WIDTH)
-        self._inset = Inset(gui, shapes, robot.length, half_width(robot))
         self._server.on_client_disconnect(self._on_disconnect)
 
     @property

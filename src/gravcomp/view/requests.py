@@ -3,6 +3,9 @@
 import dataclasses
 import math
 
+MODES = ("compensate", "hold", "relax")
+SERVICES = ("home", "stop", "release")
+
 Triple = tuple[float, float, float]
 
 
@@ -78,6 +81,10 @@ def objection(request: Request, length: float) -> str:
         case SetTarget(first, second) | TiltBase(first, second):
             if not (math.isfinite(first) and math.isfinite(second)):
                 return f"angles of {first:g} and {second:g} rad are asked for; finite ones are needed"
+        case Compensate(wanted) if wanted not in MODES:
+            return f"'{wanted}' is asked of the cables; allowed: {', '.join(MODES)}"
+        case BridgeService(wanted) if wanted not in SERVICES:
+            return f"'{wanted}' is asked of the motors; allowed: {', '.join(SERVICES)}"
         case Push((_, _, _) as place):
             return _far(place, length, "the hand")
         case PlaceWall((point, normal)):

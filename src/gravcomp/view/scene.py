@@ -22,6 +22,7 @@ from gravcomp.view.skin import cable_skin, half_width, joined, revolved
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.surroundings import Surroundings
 from gravcomp.view.tip_handle import TipHandle
+from gravcomp.view.touches import HAND
 from gravcomp.view.wall import lumen_skin, wall_skins
 from gravcomp.view.world import BaseInWorld, quaternion_wxyz
 
@@ -103,7 +104,9 @@ class Scene:
 
     def _show_forces(self, snapshot: Snapshot) -> None:
         load = () if snapshot.load is None else (snapshot.load,)
-        shown = {"model": snapshot.model_touches, "virtual": snapshot.virtual_touches, "load": load}
+        pushes = [touch for touch in snapshot.virtual_touches if touch.source != HAND]
+        pulls = [touch for touch in snapshot.virtual_touches if touch.source == HAND]
+        shown = {"model": snapshot.model_touches, "virtual": pushes, "hand": pulls, "load": load}
         self._forces.show(snapshot.time, {} if "forces" in self._hidden else shown)
 
     def _show_gravity(self, snapshot: Snapshot) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from gravcomp.view.handles import set_value
+from gravcomp.view.handles import number, set_value
 from gravcomp.view.requests import Request, SetTarget
 from gravcomp.view.scale import SCALE
 
@@ -32,17 +32,17 @@ class TargetControls:
         self._angle.on_update(self._on_bend)
         self._plane.on_update(self._on_bend)
         gizmo.on_update(self._on_gizmo)
-        straight.on_click(lambda _: self._set_bend(0.0, math.radians(self._plane.value)))
+        straight.on_click(lambda _: self._set_bend(0.0, math.radians(number(self._plane))))
 
     def show_gizmo(self, visible: bool) -> None:
         """Show or hide the handle that drags the tip of the target."""
-        self._place_gizmo(math.radians(self._angle.value), math.radians(self._plane.value))
+        self._place_gizmo(math.radians(number(self._angle)), math.radians(number(self._plane)))
         self._gizmo.visible = visible
 
     def _on_bend(self, event: viser.GuiEvent) -> None:
         if event.client is None:  # set by the program, not by the user
             return
-        angle, plane = math.radians(self._angle.value), math.radians(self._plane.value)
+        angle, plane = math.radians(number(self._angle)), math.radians(number(self._plane))
         self._place_gizmo(angle, plane)
         self._put(SetTarget(angle, plane))
 
@@ -52,7 +52,7 @@ class TargetControls:
         # The arc through the handle: its chord is inclined by half the bend.
         x, y, z = np.asarray(self._gizmo.position)
         angle = min(2.0 * math.atan2(math.hypot(x, y), z), math.radians(_LARGEST_BEND))
-        plane = math.atan2(y, x) if angle > _SMALLEST_BEND else math.radians(self._plane.value)
+        plane = math.atan2(y, x) if angle > _SMALLEST_BEND else math.radians(number(self._plane))
         set_value(self._angle, round(math.degrees(angle), 1))
         set_value(self._plane, round(math.degrees(plane), 1))
         self._put(SetTarget(angle, plane))

@@ -1,8 +1,8 @@
 """The picture of a camera at the robot's tip that looks along it, as the person of `gravcomp.operator` sees it.
 
 A place in the picture is given by angles, as in `operator.picture`: how far a point lies off the middle is the angle between the
-line of sight and the tip's direction, to the right along x and down along y of the tip's section. The camera brings its own
-light: what it looks at straight is bright, what is far away is dark.
+line of sight and the tip's direction. The tip's x axis points up, which is upright for a horizontal robot, and its y axis to the
+right. The camera brings its own light: what it looks at straight is bright, what is far away is dark.
 """
 
 import math
@@ -20,6 +20,8 @@ _BEHIND = 2.6  # rad off the middle, beyond which a point has no place near the 
 _AMBIENT = 0.25
 _EMPTY, _OUTSIDE = np.array([6.0, 8.0, 12.0]), np.array([36.0, 36.0, 36.0])
 _RING, _LINE = 0.08, 0.022  # radius and half the width of the target's ring, in halves of the picture
+# Right, down and forward of the picture, as columns in the tip's section.
+_AXES = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 Surface = tuple[np.ndarray, np.ndarray, Rgb]
 """Vertices (v, 3) m in soft_base, faces (f, 3), colour."""
@@ -41,13 +43,14 @@ class TipCamera:
 
         target (3,) m: marked by a ring, which is dark where a surface hides the target.
         """
+        view = rotation @ _AXES
         colour = np.tile(_EMPTY, (self._size, self._size, 1))
         depth = np.full((self._size, self._size), np.inf)
         for vertices, faces, paint in surfaces:
-            own = (np.asarray(vertices, dtype=float) - tip) @ rotation
+            own = (np.asarray(vertices, dtype=float) - tip) @ view
             _draw(own, np.ascontiguousarray(faces, dtype=np.int64), np.array(paint, float), self._reach, colour, depth)
         if target is not None:
-            self._mark(colour, depth, (target - tip) @ rotation)
+            self._mark(colour, depth, (target - tip) @ view)
         colour[~self._round] = _OUTSIDE
         return np.clip(colour, 0.0, 255.0).astype(np.uint8)
 

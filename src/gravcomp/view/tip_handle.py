@@ -8,7 +8,7 @@ from gravcomp.view.in_base import BaseFrame
 from gravcomp.view.requests import Push
 from gravcomp.view.scale import SCALE, scaled
 
-_BALL = 1.25  # radius over the robot's
+_BALL = 0.8  # radius over the robot's
 
 
 class TipHandle:
@@ -20,7 +20,7 @@ class TipHandle:
         self._held: tuple[int, np.ndarray] | None = None  # browser, place of the cursor in soft_base
         self._announced = False
         self._ball = scene.add_icosphere(
-            "/robot/hand", SCALE * _BALL * radius, color=colours.PLACED, opacity=0.55, cast_shadow=False, visible=False
+            "/robot/hand", SCALE * _BALL * radius, color=colours.PLACED, cast_shadow=False, visible=False
         )
         self._spring = scene.add_line_segments(
             "/robot/spring", np.zeros((1, 2, 3)), colours.PLACED, thickness=SCALE * 0.25 * radius, visible=False

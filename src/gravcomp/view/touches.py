@@ -9,6 +9,9 @@ import numpy as np
 if TYPE_CHECKING:
     from gravcomp.scene.scene import Scene
 
+HAND = "hand"
+"""Source of a hand's force on the virtual robot."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Touch:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import viser
 
-from gravcomp.view.handles import set_value
+from gravcomp.view.handles import number, set_value
 from gravcomp.view.placed_wall import SIDES, WallHandle
 from gravcomp.view.requests import InjectFault, Request, TiltBase
 
@@ -71,15 +71,16 @@ class VirtualControls:
         return folder
 
     def _on_preset(self, event: viser.GuiEvent) -> None:
-        set_value(self._inclination, float(event.target.value.rstrip("°")))
-        self._put_tilt()
+        if event.target.value in _TILTS:
+            set_value(self._inclination, float(event.target.value.rstrip("°")))
+            self._put_tilt()
 
     def _on_tilt(self, event: viser.GuiEvent) -> None:
         if event.client is not None:  # set by the user, not by the program
             self._put_tilt()
 
     def _put_tilt(self) -> None:
-        self._put(TiltBase(math.radians(self._inclination.value), math.radians(self._roll.value)))
+        self._put(TiltBase(math.radians(number(self._inclination)), math.radians(number(self._roll))))
 
     def _add_faults(self, gui: viser.GuiApi, cables: tuple[str, ...]) -> viser.GuiFolderHandle:
         texts = {text.replace("{1}", "the cable"): fault for text, fault in _FAULTS.items()}
@@ -90,6 +91,11 @@ class VirtualControls:
             duration = gui.add_slider("duration s", min=0.5, max=20.0, step=0.5, initial_value=2.0)
             inject = gui.add_button("Inject", color="red")
             clear = gui.add_button("Clear all")
-        inject.on_click(lambda _: self._put(InjectFault(texts[kind.value].format(duration.value, cable.value if cable else ""))))
+        inject.on_click(lambda _: self._put(_fault(texts.get(str(kind.value), ""), number(duration), cable and cable.value)))
         clear.on_click(lambda _: self._put(InjectFault("clear")))
         return folder
+
+
+def _fault(text: str, duration: float, cable: object) -> InjectFault:
+    """The request for a fault of `duration` s; the virtual robot refuses what is none."""
+    return InjectFault(text.format(duration, "" if cable is None else cable))

@@ -8,7 +8,7 @@ import contextlib
 import hashlib
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +22,8 @@ from gravcomp.recordings.bags.cut_sqlite import repaired
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
 
+_REPORTED = 200  # messages between two reports of progress
+
 
 @dataclass(frozen=True)
 class ReadableBag:
@@ -32,16 +34,17 @@ class ReadableBag:
     messages: int = 0
 
 
-def readable(path: str | Path) -> ReadableBag:
+def readable(path: str | Path, progress: Callable[[float], None] | None = None) -> ReadableBag:
     """Return a complete bag for `path`, a folder or its .mcap or .db3 file; a damaged one is recovered.
 
-    Raises BagError when nothing can be read.
+    Every message is read once, one after the other; `progress` receives the share of the bag's time that is read. Raises BagError
+    when nothing can be read.
     """
     path = Path(path)
     if not path.exists():
         raise BagError(f"{path}: does not exist; a rosbag2 folder, or an .mcap or .db3 file, is needed")
     try:
-        return ReadableBag(path, messages=_read_through(path))
+        return ReadableBag(path, messages=_read_through(path, progress))
     except FileNotFoundError:
         problem = "metadata.yaml is missing"
     except Exception as error:  # any error of a reader on a damaged file
@@ -55,10 +58,15 @@ def readable(path: str | Path) -> ReadableBag:
     return ReadableBag(saved, problem, _save(path, files, saved, problem))
 
 
-def _read_through(path: Path) -> int:
+def _read_through(path: Path, progress: Callable[[float], None] | None = None) -> int:
     """Read every message once and return their number."""
+    count = 0
     with Reader(path) as reader:
-        return sum(1 for _ in reader.messages())
+        begin, duration = reader.start_time, max(reader.duration, 1)
+        for count, (_, received, _) in enumerate(reader.messages(), 1):
+            if progress is not None and count % _REPORTED == 0:
+                progress(min(1.0, (received - begin) / duration))
+    return count
 
 
 def _save(path: Path, files: list[Path], saved: Path, problem: str) -> int:

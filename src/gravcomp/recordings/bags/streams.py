@@ -1,5 +1,6 @@
 """Topics of a bag as arrays, one row for each message."""
 
+from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +45,21 @@ class Stream:
         return np.column_stack([np.interp(time, self.stamp[order], column[order]) for column in self.values.T])
 
 
+class _Rows:
+    """Stamp, time of reception and values of each message of a topic, 8 bytes each: a long recording has millions."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.widths: set[int] = set()
+        self.numbers = array("d")
+
+    def append(self, stamp: float, received: float, values: tuple[float, ...]) -> None:
+        """Add a message: stamp and time of reception in s, values (n,)."""
+        self.count += 1
+        self.widths.add(len(values))
+        self.numbers.extend((stamp, received, *values))
+
+
 def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int = 2) -> dict[str, Stream | None]:
     """Return the topics by the keys of `wanted`, None for an optional one that is missing or empty. A damaged bag is recovered.
 
@@ -61,20 +77,20 @@ def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int =
         with AnyReader([readable(path).path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             found = {c.topic: c.msgtype for c in reader.connections}
             topics = {key: _topic(path, found, want) for key, want in wanted.items()}
-            rows: dict[str, list] = {topic: [] for topic in topics.values() if topic}
+            rows = {topic: _Rows() for topic in topics.values() if topic}
             for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-                rows[connection.topic].append((stamp, 1e-9 * received, _VALUES[connection.msgtype](message)))
+                rows[connection.topic].append(stamp, 1e-9 * received, _VALUES[connection.msgtype](message))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
         raise BagError(f"{path}: is not a readable bag: {error}") from error
     streams: dict[str, Stream | None] = {}
     for key, topic in topics.items():
-        if topic is None or (wanted[key].optional and not rows[topic]):
+        if topic is None or (wanted[key].optional and not rows[topic].count):
             streams[key] = None
             continue
-        if not wanted[key].optional and len(rows[topic]) < least:
-            raise BagError(f"{path}: '{topic}' has {len(rows[topic])} messages; at least {least} are needed")
+        if not wanted[key].optional and rows[topic].count < least:
+            raise BagError(f"{path}: '{topic}' has {rows[topic].count} messages; at least {least} are needed")
         streams[key] = _stream(path, topic, rows[topic])
     return streams
 
@@ -104,12 +120,11 @@ def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
     )
 
 
-def _stream(path: str | Path, topic: str, rows: list[tuple]) -> Stream:
-    width = len(rows[0][2])
-    if any(len(row[2]) != width for row in rows):
+def _stream(path: str | Path, topic: str, rows: _Rows) -> Stream:
+    if len(rows.widths) > 1:
         raise BagError(f"{path}: the messages of '{topic}' have different numbers of values; those of one robot are needed")
-    stamp, received, values = zip(*rows)
-    return Stream(topic, np.array(stamp), np.array(received), np.array(values, dtype=float).reshape(len(rows), width))
+    table = np.frombuffer(rows.numbers).reshape(rows.count, -1)
+    return Stream(topic, table[:, 0], table[:, 1], table[:, 2:])
 
 
 def _vector(v: Any) -> tuple[float, ...]:

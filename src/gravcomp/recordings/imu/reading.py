@@ -1,5 +1,6 @@
 """Choice of the reader by the kind of the path."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from gravcomp.recordings.imu.broad import read_broad
@@ -11,11 +12,16 @@ from gravcomp.recordings.imu.rosbag import read_rosbag
 _KINDS = "an .npz file in BROAD's layout, a CSV file or folder, or a rosbag2 folder"
 
 
-def read_recording(path: str | Path, topic: str | None = None, columns: CsvColumns | None = None) -> Recording:
+def read_recording(
+    path: str | Path,
+    topic: str | None = None,
+    columns: CsvColumns | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
     """Read an .npz file in BROAD's layout, CSV, or a rosbag2 folder.
 
-    topic: the IMU topic of a bag with several; columns: of a CSV file whose names do not say what they are. Raises
-    RecordingError, which names what was found and what is needed.
+    topic: the IMU topic of a bag with several; columns: of a CSV file whose names do not say what they are; progress: receives
+    the share of a bag that is read. Raises RecordingError, which names what was found and what is needed.
     """
     path = Path(path).expanduser()
     if not path.exists():
@@ -23,7 +29,7 @@ def read_recording(path: str | Path, topic: str | None = None, columns: CsvColum
     if is_csv(path):
         return read_csv(path, columns)
     if path.is_dir() or path.suffix in (".mcap", ".db3"):
-        return read_rosbag(path, topic)
+        return read_rosbag(path, topic, progress)
     if path.suffix != ".npz":
         raise RecordingError(f"{path}: is of no known kind; {_KINDS} is needed")
     return read_broad(path)

@@ -6,7 +6,7 @@ namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/Quater
 """
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 IMU = "sensor_msgs/msg/Imu"
 TEMPERATURE = "sensor_msgs/msg/Temperature"
+_CHECKED = 0.5  # share of the search for damage in the time to read a bag
+_REPORTED = 1000  # messages between two reports of progress
 TRUTH = "geometry_msgs/msg/QuaternionStamped"
 
 
@@ -39,12 +41,16 @@ class _Rows:
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
-        stamp, received = (np.array(times, dtype=np.int64) for times in self._times)
-        return stamp, received, np.array(self._values, dtype=float).reshape(len(stamp), self._width)
+        stamp, received = (np.frombuffer(times, dtype=np.int64) for times in self._times)
+        return stamp, received, np.frombuffer(self._values).reshape(len(stamp), self._width)
 
 
-def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
-    """Return the IMU stream in the folder; `topic` names one of several. Raises RecordingError."""
+def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[float], None] | None = None) -> Recording:
+    """Return the IMU stream in the folder; `topic` names one of several; `progress` receives the share that is read.
+
+    All messages are read once, to find damage, and those of the IMU once more; only the values of the IMU are kept. Raises
+    RecordingError.
+    """
     from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.rosbag2 import ReaderError
     from rosbags.serde import SerdeError
@@ -55,7 +61,7 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
 
     path = Path(path)
     try:
-        whole = readable(path)
+        whole = readable(path, (lambda done: progress(_CHECKED * done)) if progress else None)
     except BagError as error:
         raise RecordingError(str(error)) from error
     damage = (f"damaged ({whole.problem}): read up to the damage, {whole.messages} messages",) if whole.problem else ()
@@ -68,7 +74,10 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
             rows = {t: _Rows(width) for t, width in ((name, 6), *((t, 1) for t in temperatures[:1]), *((t, 4) for t in truths))}
-            for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
+            begin, duration = reader.start_time, max(reader.duration, 1)
+            for i, (connection, received, raw) in enumerate(reader.messages([c for c in reader.connections if c.topic in rows])):
+                if progress is not None and i % _REPORTED == 0:
+                    progress(_CHECKED + (1.0 - _CHECKED) * min(1.0, (received - begin) / duration))
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
                 rows[connection.topic].append(stamp, received, _values(message))
@@ -84,8 +93,8 @@ def read_rosbag(path: str | Path, topic: str | None = None) -> Recording:
     return Recording(
         source=str(path),
         stamp_ns=samples,
-        gyro=values[:, :3].copy(),
-        accel=values[:, 3:].copy(),
+        gyro=values[:, :3],
+        accel=values[:, 3:],
         temperature_stamp_ns=temperature[0] if temperature else None,
         temperature=temperature[2][:, 0] if temperature else None,
         orientation=nearest(samples, truth[0], truth[2]) if truth and len(truth[0]) else None,
