@@ -5,8 +5,8 @@
 with the tensions lambda from the cables' complementarity. Creep adds a stress that is linear in the strain (`memory`). One step
 is enough to track a turning gravity; another is taken if the correction with the last factor moves the tip by more than the
 tolerance. A straight step along a curved path stretches a body, which in one that hardly changes its volume makes large stresses
-and a stiffness without meaning: the W that is returned is never that of a shape to which a long step has led. All of it is one compiled function: with many small calls, a control step would spend more time on calling than on
-computing.
+and a stiffness without meaning: the W that is returned is never that of a shape to which a long step has led. All of it is one
+compiled function: with many small calls, a control step would spend more time on calling than on computing.
 """
 
 from dataclasses import dataclass, replace
