@@ -168,6 +168,12 @@ def test_stamps_that_jitter_are_evened_out_and_keep_their_time(lost):
     assert np.abs(np.cumsum(steps) - (taken[1:] - taken[0])).max() < 0.008
 
 
+@pytest.mark.parametrize("before", [[0.05], [0.01] * 300], ids=["a gap first", "a slower rate first"])
+def test_a_period_that_is_wrong_does_not_move_the_time_away_from_the_stamps(before):
+    stamps = np.cumsum([0.0, *before, *[0.0025] * 600])
+    assert np.abs(np.cumsum(counted(stamps)) - stamps[1:]).max() <= 0.5 * before[0] + 1e-9
+
+
 def test_stamps_without_jitter_count_as_they_are():
     stamps = np.cumsum(0.01 + 0.0002 * np.sin(np.arange(500.0)) + 0.04 * (np.arange(500) % 97 == 0))  # with samples lost
     np.testing.assert_allclose(counted(stamps), np.diff(stamps), rtol=1e-12)

@@ -9,6 +9,8 @@ JITTER = 0.1  # RMS of the steps, of the period, from which they are evened
 _SHARE = 0.02  # of a new step in the means
 _GAIN = 0.1  # of the time by which the stamps are ahead
 _NEXT = 1.75  # periods: in a longer step samples are missing
+_OFF = 0.5  # periods by which the time counted may be ahead of the stamps, as after a gap that was taken for the period
+_LEAST = 0.1  # of a step counts in any case
 
 
 class EvenSteps:
@@ -38,6 +40,6 @@ class EvenSteps:
             step = waiting if waiting > 0.0 else dt
         else:
             even = max(1, round(waiting / period)) * period
-            step = even + _GAIN * (waiting - even)
+            step = min(even + _GAIN * (waiting - even), max(waiting + _OFF * period, _LEAST * dt))
         self._ahead = waiting - step
         return step
