@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gravcomp.description import Elements, load_robot_file
 from gravcomp.external_loads import BaseTurnOptions
@@ -41,6 +42,30 @@ def test_a_payload_raises_the_place(robot, turn):
     assert BaseTurn(RobotModel(heavy), BaseTurnOptions()).height == pytest.approx(robot.length, rel=0.01)
 
 
+def test_a_robot_without_weight_feels_no_turn(robot):
+    material = dataclasses.replace(robot.materials[0], density=0.0)
+    weightless = dataclasses.replace(robot, segments=tuple(dataclasses.replace(s, material=material) for s in robot.segments))
+    turn = BaseTurn(RobotModel(weightless), BaseTurnOptions())
+    assert not follow(turn, PERIOD * np.arange(5)).any()
+
+
+def test_a_place_on_the_turning_base_accelerates_by_as_much_the_other_way(model):
+    """The attitude of the base is a function of time; rates and acceleration are its difference quotients."""
+    step, end = 1e-3, 0.7
+    turn = BaseTurn(model, BaseTurnOptions(lag=0.01))
+
+    def attitude(time):
+        return Rotation.from_rotvec([0.3 * np.sin(3.0 * time), 0.5 * np.sin(2.0 * time), 0.2 * time])
+
+    for k in range(700):
+        time = step * k
+        turn.add(time, (attitude(time - step).inv() * attitude(time + step)).as_rotvec() / (2.0 * step))
+        turn.acceleration(time)
+    before, here, after = (attitude(end + t).apply([0.0, 0.0, turn.height]) for t in (-step, 0.0, step))
+    expected = -attitude(end).inv().apply(after - 2.0 * here + before) / step**2
+    assert turn.acceleration(end) == pytest.approx(expected, abs=0.03 * np.linalg.norm(expected))
+
+
 def test_a_steady_change_of_the_rate_gives_the_forces_of_the_turning_frame(turn):
     change, start = np.array([2.0, -1.0, 0.5]), np.array([0.3, 0.5, -0.4])
     rate = start
@@ -62,6 +87,37 @@ def test_only_fresh_rates_from_before_the_sample_count(turn):
     assert turn.acceleration(2 * PERIOD) == pytest.approx(before)
     assert turn.acceleration(3 * PERIOD) != pytest.approx(before)
     assert turn.acceleration(0.5) == pytest.approx(np.zeros(3))
+
+
+def follow(turn, times):
+    """Give rates that grow evenly; return what acts after each of them."""
+    acting = []
+    for time in times:
+        turn.add(time, np.array([time, 0.0, 0.0]))
+        acting.append(turn.acceleration(time + 1e-5))
+    return np.array(acting)
+
+
+def test_after_a_gap_it_begins_again(turn):
+    follow(turn, PERIOD * np.arange(20))
+    assert not follow(turn, [5.0]).any()
+    assert follow(turn, [5.0 + PERIOD]).any()
+    assert not turn.acceleration(6.0).any()  # the gap is no interval between rates
+
+
+def test_rates_in_bursts_act_all_the_time(turn):
+    bursts = (4 * PERIOD * np.arange(40)[:, None] + 1e-4 * np.arange(4)).ravel()
+    follow(turn, bursts[:-4])
+    for time in bursts[-4:]:
+        turn.add(time, np.array([time, 0.0, 0.0]))
+        assert turn.acceleration(time + 1e-5).any() and turn.acceleration(time + 3.9 * PERIOD).any()
+
+
+def test_a_replay_that_restarts_acts_as_the_first_one(turn):
+    times = PERIOD * np.arange(20)
+    first = follow(turn, times)
+    turn.add(1.0, np.zeros(3))  # waits for a sample that never comes
+    np.testing.assert_array_equal(follow(turn, times), first)
 
 
 def test_it_can_be_switched_off(model):

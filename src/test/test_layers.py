@@ -1,6 +1,7 @@
 """Layers of elements along a body: thin at the clamp of a slender one, dense where it is soft, and how many are chosen."""
 
 import dataclasses
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -23,6 +24,35 @@ def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path
     choice = chosen_mesh(robot)
     assert choice.elements.softness > 0.0 and choice.elements.first_layer < 0.3e-3
     assert choice.error > mesh_choice.ACCURACY
+
+
+def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_mesh_found(monkeypatch, tmp_path):
+    """The tips of the meshes are made up: cells through the wall always seem to gain most, and the estimate climbs with them."""
+
+    class Climbing(mesh_choice._Tips):
+        asked: ClassVar[list] = []
+
+        def __init__(self, robot, start):
+            self._robot = robot
+
+        def unknowns(self, elements):
+            return 12 * elements.around * elements.along * elements.radial
+
+        def finer(self, elements, direction):
+            finer = mesh_choice._finer(self._robot, elements, direction)
+            return None if finer == elements else finer
+
+        def change(self, one, other):
+            self.asked.append(one)
+            return np.array([[0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4, 0.0, 0.0]])
+
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    monkeypatch.setattr(mesh_choice, "_Tips", Climbing)
+    segment = Segment("a", 0.08, section=Section("ellipse", 18e-3, 12e-3), material=Material(youngs_modulus=0.5e6))
+    choice = chosen_mesh(Robot("finger", segments=(segment,)))
+    assert max(one.radial for one in Climbing.asked) >= 3
+    assert all(one.radial <= 0.5 * one.around for one in Climbing.asked)
+    assert choice.elements.radial == min(one.radial for one in Climbing.asked)
 
 
 def test_the_mesh_of_a_section_whose_division_does_not_change_with_each_number_is_chosen(monkeypatch, tmp_path):

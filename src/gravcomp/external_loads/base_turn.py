@@ -25,7 +25,8 @@ from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.robot_model import RobotModel
 
 _KEPT = 16  # rates that wait for a later sample of gravity
-_STALE = 10.0  # intervals between rates, after which the last one says nothing
+_STALE = 10.0  # mean intervals between rates, after which the last one says nothing
+_SHARE = 0.1  # of a new interval in the mean: rates that come in bursts are no gaps
 
 
 class BaseTurn:
@@ -48,6 +49,8 @@ class BaseTurn:
     def add(self, time: float, rate: np.ndarray) -> None:
         """Take the rate (3,) in rad/s in soft_base at `time` s; one that is not finite is left out."""
         if np.isfinite(rate).all():
+            if self._waiting and time < self._waiting[-1][0]:
+                self._waiting.clear()  # a replay has restarted: what waits is of its end
             self._waiting.append((time, np.array(rate, dtype=float)))
 
     def acceleration(self, time: float) -> np.ndarray:
@@ -58,29 +61,39 @@ class BaseTurn:
         """
         while self._waiting and self._waiting[0][0] < time:
             self._follow(*self._waiting.popleft())
-        fresh = 0.0 < time - self._time <= _STALE * self._interval
-        return self._acting if self.options.enabled and fresh else np.zeros(3)
+        return self._acting if self.options.enabled and self._fresh(time) else np.zeros(3)
+
+    def _fresh(self, time: float) -> bool:
+        """Return whether the last rate says something about `time` s."""
+        return 0.0 < time - self._time < math.inf and time - self._time <= _STALE * self._interval
 
     def _follow(self, time: float, rate: np.ndarray) -> None:
-        """Go on to a rate; time that runs backwards begins again, as after a restart of a replay."""
-        if not math.isfinite(self._time) or time <= self._time:
-            self._time, self._interval = time, math.inf
-            self._rate, self._acting = rate, np.zeros(3)
+        """Go on to a rate; after a gap, and where time runs backwards as at a restart of a replay, it begins again."""
+        interval, fresh = time - self._time, self._fresh(time)
+        if not 0.0 < interval < math.inf:
+            self._interval = math.inf
+        elif math.isfinite(self._interval):
+            self._interval += _SHARE * (min(interval, _STALE * self._interval) - self._interval)
+        else:
+            self._interval = interval
+        if not fresh:
+            self._time, self._rate, self._acting = time, rate, np.zeros(3)
             return
-        share = lag_share(self._time, time, self.options.lag * self.period)
-        step, self._interval = share * (rate - self._rate), time - self._time
+        step = lag_share(self._time, time, self.options.lag * self.period) * (rate - self._rate)
         self._rate, self._time = self._rate + step, time
-        ax, ay, _ = (step / self._interval).tolist()
+        ax, ay, _ = (step / interval).tolist()
         wx, wy, wz = self._rate.tolist()
         # - a x r - w x (w x r) at r = (0, 0, h)
         self._acting = self.height * np.array([-ay - wx * wz, ax - wy * wz, wx * wx + wy * wy])
 
 
 def _height_and_period(model: RobotModel) -> tuple[float, float]:
-    """Return h in m and T in s of the straight robot, as means over both directions across it."""
+    """Return h in m and T in s of the straight robot, as means over both directions across it; 0 and inf without weight."""
+    mass, along = model.nodal_weight[: model.n_free], model.mesh.nodes[: model.n_free, 2]
+    if not mass.any():
+        return 0.0, math.inf
     stiffness = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), stiffness)
-    mass, along = model.nodal_weight[: model.n_free], model.mesh.nodes[: model.n_free, 2]
     loads = np.zeros((model.n_free, 3, 4))
     for axis in range(2):
         loads[:, axis, axis], loads[:, axis, 2 + axis] = mass, mass * along

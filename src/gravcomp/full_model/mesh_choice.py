@@ -3,7 +3,8 @@
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
 to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
-direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`. The first direction is
+direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`; where no direction can be
+refined any more, the mesh with the least error so far is taken. The first direction is
 along the robot: under coarse layers the sections seem to be worse than they are, several times so where the stiffness jumps.
 
 The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
@@ -34,7 +35,7 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 5  # part of the key; to be raised when the choice changes
+_FORMAT = 6  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -45,6 +46,8 @@ _START_ALONG = 8
 # The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
 _SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
+# The most cells through the wall, of those around: with more they are flat, and the estimate of both directions is wrong.
+_FLAT = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,7 +114,7 @@ def _rounded_down(modulus: float) -> float:
 
 def _choose(robot: Robot) -> MeshChoice:
     here = _start(robot)
-    tips = _Tips(robot, here)
+    tips, choices = _Tips(robot, here), []
     while True:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
@@ -123,15 +126,17 @@ def _choose(robot: Robot) -> MeshChoice:
                 continue
             twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
             changes[direction] = twice * tips.change(here, finer)
-            if tips.unknowns(finer) > _MOST_UNKNOWNS:  # too many to be used, but the error has to be known
+            flat = "around" in changes and direction == "radial" and finer.radial > _FLAT * finer.around
+            if flat or tips.unknowns(finer) > _MOST_UNKNOWNS:  # not to be used, but the error has to be known
                 continue
             meshes[direction] = finer
             gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
-        error = _together(list(changes.values())) if changes else 0.0
-        if error <= _USED * ACCURACY or not gains:
-            return MeshChoice(here, error)
+        else:  # all directions are measured
+            choices.append(MeshChoice(here, _together(list(changes.values())) if changes else 0.0))
+            if choices[-1].error <= _USED * ACCURACY or not gains:
+                return min(choices, key=lambda choice: choice.error)
         here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
 
 
