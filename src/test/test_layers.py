@@ -44,10 +44,12 @@ def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_
 
         def change(self, one, other):
             self.asked.append(one)
-            return np.array([[0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4, 0.0, 0.0]])
+            size = 0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4 * (other.around > one.around)
+            return np.array([[size, 0.0, 0.0]])
 
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
     monkeypatch.setattr(mesh_choice, "_Tips", Climbing)
+    monkeypatch.setattr(mesh_choice, "_MOST_UNKNOWNS", 6000)
     segment = Segment("a", 0.08, section=Section("ellipse", 18e-3, 12e-3), material=Material(youngs_modulus=0.5e6))
     choice = chosen_mesh(Robot("finger", segments=(segment,)))
     assert max(one.radial for one in Climbing.asked) >= 3

@@ -4,8 +4,8 @@ The error of a mesh is the distance of its tip from that of a mesh twice as fine
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
 to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
 direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`; where no direction can be
-refined any more, the mesh with the least error so far is taken. The first direction is
-along the robot: under coarse layers the sections seem to be worse than they are, several times so where the stiffness jumps.
+refined any more, the mesh with the least error so far is taken. The first direction is along the robot: under coarse layers the
+sections seem to be worse than they are, several times so where the stiffness jumps.
 
 The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
 
