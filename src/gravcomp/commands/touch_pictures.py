@@ -12,6 +12,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands import output
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
+from gravcomp.inverse import ControllerCode
 from gravcomp.inverse.target import straight_target
 from gravcomp.view.backbone import Backbone
 from gravcomp.view.browser import Browser, BrowserError
@@ -27,7 +28,8 @@ ROBOT = Path("src/examples/lumen_robot.yaml")
 
 _PORT, _RATE = 8990, 20.0
 _DRAWN = 3.0  # s after which a browser has drawn what it has received
-_BELOW = -0.013  # m: the wall lifts the compensated robot by that much less its radius
+# It rises towards the tip and lifts it, also that of a straight robot.
+_WALL = {"name": "unknown wall", "normal": [1, 0, -0.12], "point_mm": [-8, 0, 0]}
 
 
 def draw_touches(root: Path, folder: Path) -> list[Path]:
@@ -63,9 +65,7 @@ def draw_touches(root: Path, folder: Path) -> list[Path]:
             run(2.0, np.array([0.012, 0.0, 0.95 * length]))
             take("pulled")
             bystander.order_hand("release", "virtual/hand", loop.time)
-            bystander.order_wall(
-                {"name": "unknown wall", "normal": [1, 0, 0.1], "point_mm": [1e3 * _BELOW, 0, 80]}, "virtual/wall"
-            )
+            bystander.order_wall(_WALL, "virtual/wall")
             run(3.0)
             take("unknown_wall")
     except BrowserError as error:
@@ -96,7 +96,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
         truth=Backbone(station, truth.backbone_position, truth.backbone_orientation),
         target=TargetView(np.array([0.0, 0.0, loop.setup.robot.length])),
         status=command.message if command is not None else "",
-        status_level="ok",
+        status_level="ok" if command is not None and command.code == ControllerCode.OK else "warn",
         virtual=True,
         model_touches=tuple(model),
         virtual_touches=tuple(touched),

@@ -52,6 +52,8 @@ class Controls:
         if push is not None:
             taken.append(push)
         refused = {request: objection(request, self._length) for request in taken}
+        if push is not None and refused[push]:  # else the refusal would come again with every frame
+            self._scene.hand.drop()
         taken = [request for request in taken if not refused[request]]
         newest = {type(r): r for r in taken if isinstance(r, _REPLACED)}
         accepted = [r for r in taken if not isinstance(r, _REPLACED)] + list(newest.values())

@@ -5,6 +5,7 @@ largest force of the last seconds in steps of 1, 2 and 5, so that it suits every
 """
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 import viser
@@ -57,7 +58,9 @@ class ForceMarkers:
             f"/robot/{kind}_points", np.zeros((1, 3), np.float32), colour, point_size=SCALE * 0.45 * radius,
             point_shape="circle", precision="float32", visible=False)  # fmt: skip
         self._colour = colour
-        self._labels = [scene.add_label(f"/robot/{kind}_label{i}", "", visible=False, anchor="top-right") for i in range(_LABELS)]
+        # The model's on the other side: its forces are often those on the virtual robot.
+        anchor: Literal["top-left", "top-right"] = "top-left" if kind == "model" else "top-right"
+        self._labels = [scene.add_label(f"/robot/{kind}_label{i}", "", visible=False, anchor=anchor) for i in range(_LABELS)]
 
     def show(self, touches: Sequence[Touch], scale: ForceScale) -> None:
         """Show these forces."""

@@ -17,7 +17,7 @@ from gravcomp.view.requests import PlaceWall, Request
 from gravcomp.view.scale import SCALE, scaled
 from gravcomp.view.snapshot import Snapshot
 
-SIDES = ("below", "above", "beside", "ahead")
+SIDES = ("below", "above", "side", "ahead")
 _GAP = 0.08  # between a new wall and the robot, in lengths of the robot
 _TEXT = "unknown wall: the model does not know it"
 
@@ -42,7 +42,7 @@ class WallHandle:
         scene.add_line_segments(
             "/robot/placed_wall/edge", scaled(np.stack([edge[:-1], edge[1:]], axis=1)), colours.PLACED, thickness=SCALE * 0.0006
         )
-        scene.add_label("/robot/placed_wall/text", _TEXT, position=tuple(SCALE * edge[0]), anchor="bottom-left")
+        scene.add_label("/robot/placed_wall/text", _TEXT, position=SCALE * edge[0], anchor="bottom-right")
         self._rings = scene.add_transform_controls(
             "/robot/placed_wall_rings", scale=SCALE * 0.22 * length, disable_axes=True, disable_sliders=True,
             depth_test=False, opacity=0.85, visible=False)  # fmt: skip
@@ -94,7 +94,7 @@ class WallHandle:
             up = -snapshot.gravity / np.linalg.norm(snapshot.gravity)
         if side == "ahead":
             return -axis
-        if side != "beside":
+        if side != "side":
             return up if side == "below" else -up
         across = np.cross(axis, up)
         return across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-3 else np.array([1.0, 0.0, 0.0])

@@ -39,6 +39,10 @@ class TipHandle:
         if self._held is not None and self._held[0] == browser:
             self._held = None
 
+    def drop(self) -> None:
+        """Let go, in whatever browser the tip is held."""
+        self._held = None
+
     def request(self) -> Push | None:
         """Return where the tip is held now, once more that it is released, or None."""
         held = self._held

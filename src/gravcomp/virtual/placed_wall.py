@@ -39,7 +39,8 @@ def parse_wall(mapping: object, source: str, length: float, base_radius: float) 
             f"{source}: the wall cuts the robot's base, which is {1e3 * depth:.3g} mm inside it; move point_mm by that against"
             " the normal"
         )
-    return dataclasses.replace(wall, normal=tuple(normal), point=tuple(offset * normal))
+    x, y, z = (float(part) for part in normal)
+    return dataclasses.replace(wall, normal=(x, y, z), point=(offset * x, offset * y, offset * z))
 
 
 class PlacedWall:

@@ -1,6 +1,7 @@
 """What is around the rod: walls, the surface that touches them, and what pushes it where it does."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class RodSurroundings:
         """Return these surroundings and a plane in the frame of the base, as a further obstacle with the last row."""
         scene, own = self.walls.scene, Scene(SceneSection(planes=(wall,))).turned(np.eye(3))
         own = own._replace(obstacle=np.array([scene.obstacle.max(initial=-1) + 1]))
-        rows = {name: np.concatenate([getattr(scene, name), getattr(own, name)]) for name in _ROWS}
+        rows: dict[str, Any] = {name: np.concatenate([getattr(scene, name), getattr(own, name)]) for name in _ROWS}
         return replace(self, walls=Walls(scene._replace(**rows), np.append(self.walls.moving, True)))
 
 
