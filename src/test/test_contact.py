@@ -153,6 +153,20 @@ def test_a_rod_over_a_peg_follows_the_closed_form():
     assert -shape.tip_position[0] == pytest.approx(tip, rel=2e-2)
 
 
+def test_the_face_of_the_tip_lies_flat_on_a_wall_ahead(model):
+    """Gravity pulls the robot onto the wall; as it turns, what presses moves over the face, and nothing is lost."""
+    simulator = in_scene(model, planes=[{"normal": [0, 0, -1], "point_mm": [0, 0, 1e3 * model.length + 0.05], "friction": 0.3}])
+    shape = simulator.solve(-9.81 * np.array([0.0, 0.0, -1.0]))
+    assert shape.is_equilibrium and len(shape.contacts) > 2
+    assert -shape.contacts.force[:, 2].sum() == pytest.approx(8.3e-3, rel=0.1)  # what more of the weight would stretch it
+    centre = (shape.contacts.position * shape.contacts.normal_force[:, None]).sum(axis=0) / shape.contacts.normal_force.sum()
+    assert np.linalg.norm(centre[:2]) < 1e-4
+    for step in range(1, 5):
+        shape = simulator.step(9.81 * np.array([-np.sin(3e-3 * step), 0.0, np.cos(3e-3 * step)]))
+        assert shape.is_equilibrium
+        assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
+
+
 @pytest.mark.parametrize("rest", stored_rests()[1:], ids=lambda rest: f"{1e3 * rest.gap:g} mm")
 def test_a_cylinder_rests_on_a_plane_as_calculix_finds_it(rest):
     model, low = RobotModel(cylinder()), -0.5e3 * cylinder().segments[0].outer_diameter

@@ -298,7 +298,7 @@ def positions(places: Places, sections: np.ndarray) -> np.ndarray:
 
 @njit(cache=True)
 def missed(scene: SceneArrays, places: Places, softness: np.ndarray, pressed: np.ndarray, sections: np.ndarray) -> float:
-    """Return by how much in m the places are beside the wall that presses them, or in one that does not, at most.
+    """Return by how much in m the places are off the wall that presses them, or in one that does not, at most.
 
     softness (c,): m/N of walls that yield; pressed (c,): normal forces in N; sections (s, 3, 3): of the stations now.
     """

@@ -207,8 +207,8 @@ def tracked_touching(
             if not len(given):
                 further += lacking(cables, point.tendons, tension, compliance, wound) @ answer
             wide = (change @ further).reshape(stations, 3, 3)[:, 0]
-            beside = missed(touching.scene, places, softness, force[m : m + count], sections)
-            if max(np.sqrt((wide**2).sum(axis=1).max()), beside) > _LEFT * tolerance:
+            off = missed(touching.scene, places, softness, force[m : m + count], sections)
+            if max(np.sqrt((wide**2).sum(axis=1).max()), off) > _LEFT * tolerance:
                 continue
         converged, residual = True, np.sqrt(out @ (body.force_norm @ out))
         break
