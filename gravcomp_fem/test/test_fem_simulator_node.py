@@ -70,7 +70,7 @@ class Stand:
 
 @pytest.fixture
 def stand(monkeypatch):
-    monkeypatch.setenv(MARK, "1")  # no reduced model is built beside the test
+    monkeypatch.setenv(MARK, "1")  # no reduced model is built during the test
     stand = Stand()
     yield stand
     stand.close()

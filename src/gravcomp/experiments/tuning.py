@@ -33,8 +33,8 @@ def run(context: Context) -> Result:
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
     factor = 1e-6 * setup.robot.materials[0].youngs_modulus / _MODULUS
-    moduli, dampings = (MODULI[1:3], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
-    moduli = tuple(factor * modulus for modulus in moduli)
+    dampings = RAYLEIGH[:2] if context.brief else RAYLEIGH
+    moduli = tuple(factor * modulus for modulus in (MODULI[1:3] if context.brief else MODULI))
     slower = setup.first_period / _PERIOD
     duration = (_BRIEF_FALL if context.brief else _FALL) * setup.first_period
     falls = context.map(free_fall, [(setup, *pose, duration, trial) for trial, pose in enumerate(poses)], "free falls for tuning")
@@ -169,7 +169,7 @@ def _heat_map(moduli: tuple, dampings: tuple, errors: dict, best: tuple, calibra
     return drawing.svg
 
 
-def _fall(robot: Robot, fall: Measured, best: tuple, slower: float, calibrated: np.ndarray) -> str:
+def _fall(robot: Robot, fall: Measured, best: tuple[float, float], slower: float, calibrated: np.ndarray) -> str:
     with Drawing(width=9.0, height=3.2) as drawing:
         axes = drawing.axes
         axes.plot(fall.time, 1e3 * fall.tip_position[:, 0], color=REAL, label="virtual robot")
