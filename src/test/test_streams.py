@@ -17,6 +17,7 @@ from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
 from gravcomp.recordings.imu import RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 from gravcomp.stream_checks import CounterStamps, StreamMonitor, check_recording, in_si
+from gravcomp.stream_checks.spikes import spikes as found_spikes
 
 TRIAL = "05_undisturbed_slow_rotation_with_breaks_B"
 LENGTH = 45.0  # s of motion
@@ -171,6 +172,28 @@ def test_stamps_that_jitter_are_evened_out_and_keep_their_time(lost):
 def test_stamps_without_jitter_count_as_they_are():
     stamps = np.cumsum(0.01 + 0.0002 * np.sin(np.arange(500.0)) + 0.04 * (np.arange(500) % 97 == 0))  # with samples lost
     np.testing.assert_allclose(counted(stamps), np.diff(stamps), rtol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.1, 0.2])
+def test_the_share_of_spikes_is_found_also_where_they_are_many(share):
+    rng = np.random.default_rng(11)
+    time = np.arange(2560)[:, None] / 95.2
+    signal = np.sin(2.0 * np.pi * 1.5 * time + [0.0, 1.0, 2.0]) + rng.normal(0.0, 0.01, (len(time), 3))
+    hit = rng.random(len(time)) < share
+    signal[hit] += rng.uniform(2.0, 7.0, (hit.sum(), 3)) * rng.choice([-1.0, 1.0], (hit.sum(), 3))
+    found = np.concatenate([found_spikes(block, 0.15) for block in signal.reshape(10, 256, 3)])
+    assert found.mean() == pytest.approx(hit.mean(), rel=0.35, abs=0.001)  # a sample between two spikes looks like one
+    assert found[hit].sum() >= 0.6 * hit.sum()
+
+
+@pytest.mark.parametrize("frequency", [10.0, 25.0, 40.0])
+@pytest.mark.parametrize("begin", [60, 128, 240])
+def test_vibration_that_begins_within_a_block_is_no_row_of_spikes(frequency, begin):
+    rng, k = np.random.default_rng(3), np.arange(256)
+    shaken = np.where(k < begin, 0.0, np.sin(2.0 * np.pi * frequency * k / 95.2) * rng.uniform(3.0, 6.0, 256))
+    signal = rng.normal(0.0, 0.01, (256, 3))
+    signal[:, 1] += shaken
+    assert found_spikes(signal, 0.15).sum() <= 1
 
 
 def test_a_counter_that_wraps_is_continued_live():
