@@ -65,7 +65,7 @@ def test_what_was_measured_is_kept_until_the_robot_changes(short, tmp_path, monk
 
 
 def test_a_figure_that_does_not_exist_is_refused():
-    with pytest.raises(ConfigError, match="allowed: mesh_error_pct"):
+    with pytest.raises(ConfigError, match="allowed: build_s, mesh_error_pct"):
         robots.run(silent, figures=["speed"])
 
 

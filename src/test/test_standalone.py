@@ -128,8 +128,10 @@ def test_the_settings_have_the_length_that_the_firmware_reads(parameters):
     assert len(settings(parameters, 1.0, 1.0)) == model_blob.SETTINGS == library().gc_loop_settings()
 
 
-def test_a_robot_that_creeps_does_so_on_the_board(parameters, built):
-    creeping = parameters.robot.with_material(prony=(PronyTerm(share=0.4, time=0.3), PronyTerm(share=0.2, time=3.0)))
+def test_a_robot_that_creeps_and_whose_cables_rub_does_so_on_the_board(parameters, built):
+    rubbing = tuple(dataclasses.replace(cable, friction=0.1) for cable in parameters.robot.cables)
+    robot = dataclasses.replace(parameters.robot, cables=rubbing)
+    creeping = robot.with_material(prony=(PronyTerm(share=0.4, time=0.3), PronyTerm(share=0.2, time=3.0)))
     own, model = dataclasses.replace(parameters, robot=creeping), RobotModel(creeping)
     found, path = fit(model, built[1], own), turning_gravity(np.radians(90.0), 0, 0)[:STEPS]
     host, still = run_on_host(model, own, path), run_on_host(built[0], parameters, path)

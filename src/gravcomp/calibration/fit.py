@@ -9,9 +9,10 @@ and says why (`estimates.unfit`); it keeps the described value. Creep that is no
 not tell it, at what is usual for the class of the material: every polymer creeps, and without it the moduli would stand for it.
 
 Intervals are at 95 %: cov = (J^T J + R^T R)^-1, with J scaled by those sigmas and with every unknown, those that are not fitted
-as well: what is not known of them widens the intervals of the others. Those of moduli and creep contain in addition what the
-model lacks (`TipNoise.stiffness`, `TipNoise.creep`). Gravity bends the robot by density over modulus, so tips alone cannot tell
-both: without a balance the density keeps its value, and its uncertainty is part of the moduli's intervals.
+as well: what is not known of them widens the intervals of the others. Those of moduli contain in addition what the model lacks
+(`TipNoise.stiffness`), and those of creep, with all that is correlated with it, what no branch follows (`TipNoise.creep`).
+Gravity bends the robot by density over modulus, so tips alone cannot tell both: without a balance the density keeps its value,
+and its uncertainty is part of the moduli's intervals.
 """
 
 import functools
@@ -138,10 +139,10 @@ def fit_statics(
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     deviation = np.sqrt(np.diag(problem.covariance(x)))
     after, parameters = problem.predict(x), parameters_at(x, unknowns, initial)
-    unseen = np.array([_unseen(unknown, parameters, noise) for unknown in unknowns])
+    deviation = np.hypot(deviation, _unseen(problem.covariance(x), unknowns, parameters, initial, noise))
     estimates = tuple(
         estimate(robot, unknown, initial, parameters, quantile * half, half, reason, creep_times)
-        for unknown, half, reason in zip(unknowns, np.hypot(deviation, unseen), reasons)
+        for unknown, half, reason in zip(unknowns, deviation, reasons)
     )
     for unknown, entry in zip(unknowns, x):
         if unknown.kind == "modulus" and min(entry - unknown.lowest(initial), unknown.highest() - entry) < _AT_BOUND:
@@ -171,13 +172,19 @@ def fit_statics(
     )
 
 
-def _unseen(unknown: Unknown, parameters: StaticParameters, noise: TipNoise) -> float:
-    """Return the deviation in x of an unknown that the scatter of the tips does not show."""
-    if unknown.kind == "modulus":
-        return noise.stiffness
-    if unknown.kind == "creep":
-        return noise.creep * float(parameters.creep[unknown.index[0]]) / unknown.scale
-    return 0.0
+def _unseen(
+    covariance: np.ndarray, unknowns: list[Unknown], parameters: StaticParameters, initial: StaticParameters, noise: TipNoise
+) -> np.ndarray:
+    """Return the deviations (u,) in x that the scatter of the tips does not show.
+
+    What the branches of creep cannot follow goes into all that is correlated with them.
+    """
+    found = np.array([noise.stiffness if unknown.kind == "modulus" else 0.0 for unknown in unknowns])
+    for i, unknown in enumerate(unknowns):
+        if unknown.kind == "creep":
+            of_branch = noise.creep * max(float(values.creep[unknown.index[0]]) for values in (parameters, initial))
+            found = np.hypot(found, of_branch / unknown.scale * covariance[:, i] / covariance[i, i])
+    return found
 
 
 def body_mass(robot: Robot) -> tuple[float, float, float]:
