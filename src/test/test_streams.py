@@ -12,9 +12,10 @@ from gravcomp.bench.streams import outcome
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.orientation.offline import without_rate_spikes
 from gravcomp.orientation.spike_review import AHEAD, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
-from gravcomp.recordings.imu import RecordingError, read_recording
+from gravcomp.recordings.imu import Recording, RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 from gravcomp.stream_checks import CounterStamps, StreamMonitor, check_recording, in_si
 from gravcomp.stream_checks.spikes import spikes as found_spikes
@@ -151,6 +152,18 @@ def test_spikes_are_found_in_motion_that_changes_as_fast_as_they_do(all_axes):
     spiky = signal + hit * random.choice([-1.0, 1.0], (600, 3)) * random.uniform(1.5, 7.0, (600, 3))
     assert (reviewed(signal) == signal).all()
     assert np.abs(reviewed(spiky) - signal).max() < 0.35  # 20 deg/s
+
+
+@pytest.mark.parametrize(("floor_deg_s", "removed"), [(20.0, True), (2000.0, False)])
+def test_means_of_samples_are_made_without_spikes_of_the_rate(floor_deg_s, removed):
+    time, place = np.arange(400) / 100.0, 201
+    gyro = np.sin(2.0 * np.pi * time)[:, None] * [1.0, 0.5, -0.7]
+    spiky = gyro.copy()
+    spiky[place] += [5.0, 0.0, -6.0]
+    recording = Recording("made", np.rint(1e9 * time).astype(np.int64), spiky, np.tile([0.0, 0.0, 9.81], (400, 1)))
+    means = without_rate_spikes(recording, SpikeOptions(gyro=np.radians(floor_deg_s))).averaged(2).gyro
+    off = np.abs(means - 0.5 * (gyro[::2] + gyro[1::2])).max(axis=1)
+    assert (off[place // 2] < 0.02) == removed and np.delete(off, place // 2).max() < 1e-9
 
 
 def counted(stamps):
