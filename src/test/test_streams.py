@@ -182,6 +182,25 @@ def test_stamps_that_jitter_are_evened_out_and_keep_their_time(lost):
     assert np.abs(np.cumsum(steps) - (taken[1:] - taken[0])).max() < 0.008
 
 
+def jittered(rng, count, period):
+    return period * (np.arange(count) + rng.uniform(-0.3, 0.3, count))
+
+
+@pytest.mark.parametrize("change", [(0.01, 0.005), (0.005, 0.01), (0.01, 0.002)])
+def test_steps_are_evened_after_a_change_of_the_rate_and_the_time_stays_that_of_the_stamps(change):
+    rng = np.random.default_rng(7)
+    first, second = (jittered(rng, 1500, period) for period in change)
+    stamps = np.concatenate([first, first[-1] + max(change) + second])
+    steps = counted(stamps)
+    assert (steps > 0.0).all() and np.abs(np.cumsum(steps) - (stamps[1:] - stamps[0])).max() < 0.8 * max(change)
+    assert np.std(steps[2000:]) < 0.5 * np.std(np.diff(stamps)[2000:])
+
+
+def test_a_short_first_step_is_not_taken_for_the_period_for_ever():
+    stamps = np.concatenate([[0.0, 0.001], 0.011 + jittered(np.random.default_rng(8), 1000, 0.01)])
+    assert np.std(counted(stamps)[300:]) < 0.5 * np.std(np.diff(stamps)[300:])
+
+
 def test_stamps_without_jitter_count_as_they_are():
     stamps = np.cumsum(0.01 + 0.0002 * np.sin(np.arange(500.0)) + 0.04 * (np.arange(500) % 97 == 0))  # with samples lost
     np.testing.assert_allclose(counted(stamps), np.diff(stamps), rtol=1e-12)
