@@ -1,5 +1,6 @@
 """Nodes as users of ros2cli see them: the whole lifecycle, reports of nodes that fail, parameters dumped and loaded."""
 
+import signal
 import time
 
 import pytest
@@ -148,6 +149,28 @@ def test_a_node_ends_without_error_messages(start, observer, tmp_path):
     process = start("gravcomp_fem", "inverse_controller")
     process.stop()
     assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text()
+
+
+def test_a_node_waits_at_its_gate_and_can_be_ended_there(start, observer):
+    def gated(name: str) -> NodeProcess:
+        process = NodeProcess(NodeSpec("gravcomp_estimation", "imu_estimator"), start.folder / f"{name}.log", gated=True)
+        start.processes.append(process)
+        observer.until(lambda: "imu_estimator" in observer.names(), "it does not start")
+        end = time.monotonic() + 0.5
+        observer.until(lambda: time.monotonic() > end, "")
+        assert process.exit_code is None and not process.was_active
+        return process
+
+    process = gated("opened")
+    process.open_gate()
+    assert observer.state_of("/imu_estimator") == "active"
+    observer.until(lambda: process.was_active, "it does not note that it is active")
+    process.stop()
+    observer.until(lambda: "imu_estimator" not in observer.names(), "it does not end")
+    process = gated("ended")
+    process.signal(signal.SIGINT)  # as by the kernel when the launcher ends
+    observer.until(lambda: process.exit_code is not None, "it waits for ever")
+    assert process.exit_code == 0 and not process.was_active
 
 
 def test_three_nodes_in_one_process_are_three_nodes(start, observer):
