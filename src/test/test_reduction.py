@@ -271,6 +271,34 @@ def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(ro
     assert max(apart) > 0.05e-3  # what friction changes
 
 
+@pytest.fixture(scope="module")
+def rubber(robot, cache):
+    """A model of a law of rubber that hardly changes its volume, and its reduction."""
+    return built_once(robot.with_material(law="neo_hookean", poissons_ratio=0.49))
+
+
+def test_the_response_is_that_of_an_equilibrium_however_far_the_step(rubber):
+    simulator = Simulator(rubber[0])
+    simulator.step(9.81 * np.array([0.0, 0.0, -1.0]))
+    for angle in (20.0, 40.0, 60.0):
+        gravity = 9.81 * np.array([-np.sin(np.radians(angle)), 0.0, -np.cos(np.radians(angle))])
+        far, near = simulator.step(gravity), simulator.step(gravity)
+        assert far.model == near.model == "reduced"
+        for name in ("compliance_ea", "compliance_aa"):
+            expected = getattr(near.response, name)
+            assert getattr(far.response, name) == pytest.approx(expected, abs=0.05 * np.abs(expected).max())
+
+
+def test_a_rubber_body_that_turns_fast_stays_with_the_reduced_model(rubber):
+    simulator, controller = Simulator(rubber[0]), InverseController(rubber[0].robot)
+    target, displacement = straight_target(rubber[0].length), None
+    for angle in np.radians(2.0) * np.arange(60):
+        shape = simulator.step(9.81 * np.array([-np.cos(angle), np.sin(angle), 0.0]), displacement)
+        assert shape.model == "reduced"
+        command = controller.step(shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension)
+        displacement = command.displacement
+
+
 def test_reduced_cables_with_friction_are_the_full_models(robot, modes):
     _, _, basis, shapes = modes
     cables = tuple(dataclasses.replace(cable, friction=0.5) for cable in robot.cables)

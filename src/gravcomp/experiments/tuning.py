@@ -33,8 +33,8 @@ def run(context: Context) -> Result:
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
     factor = 1e-6 * setup.robot.materials[0].youngs_modulus / _MODULUS
-    dampings = RAYLEIGH[:2] if context.brief else RAYLEIGH
-    moduli = tuple(factor * modulus for modulus in (MODULI[1:3] if context.brief else MODULI))
+    ratios, dampings = (MODULI[1:3], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
+    moduli = tuple(factor * modulus for modulus in ratios)
     slower = setup.first_period / _PERIOD
     duration = (_BRIEF_FALL if context.brief else _FALL) * setup.first_period
     falls = context.map(free_fall, [(setup, *pose, duration, trial) for trial, pose in enumerate(poses)], "free falls for tuning")

@@ -30,7 +30,7 @@ from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import TOUCHED, FullContact
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.law_deviation import KeptStiffness
+from gravcomp.reduction.law_deviation import KeptStiffness, forget
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.rounding import REORDERED
 from gravcomp.scene.distance import SceneArrays
@@ -117,7 +117,7 @@ class ReducedContact:
 def tracked_touching(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
     pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
-    iterations: int, longest_step: float, near: float, tolerance: float, touching: Touching,
+    iterations: int, longest_step: float, near: float, tolerance: float, calm: float, touching: Touching,
 ) -> tuple[
     bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray, np.ndarray,
     Pressed,
@@ -129,14 +129,17 @@ def tracked_touching(
     m, r, start, cables = len(tension), len(q), point, body.cables
     rest, change, stations = touching.rest, touching.change, len(touching.rest)
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
-    converged, residual, reuse = False, np.inf, False
+    converged, residual, reuse, before = False, np.inf, False, 0.0
     factor = np.zeros((r, r))
     forces, held, pressing = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m))
     sections = rest + (change @ q).reshape(stations, 3, 3)
     places = empty_places(0)
-    for _ in range(iterations):
+    for iteration in range(iterations):
         stress = scale * point.strain + offset
+        rough = before > calm and not reuse
         if not reuse:
+            if iteration:
+                forget(kept)
             matrix = elastic_stiffness(body, point, q, stress, scale, kept)
             add_stiffness(cables, point.tendons, tension, matrix)
             definite, factor = factorise(matrix)
@@ -196,8 +199,11 @@ def tracked_touching(
         q, tension = q + share * step, tension + share * (force[:m] - tension)
         point = point_at(body, q, pulling)
         sections = rest + (change @ q).reshape(stations, 3, 3)
-        reuse = size < _SHORT * longest_step
-        if not settled or size >= near:
+        before = share * size
+        reuse = not rough and before < _SHORT * longest_step
+        if rough:
+            forget(kept)
+        if rough or not settled or size >= near:
             continue
         out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
         out += touching.pull[0]

@@ -121,6 +121,12 @@ def near_stiffness(of: LawDeviation, point: DeviationPoint, q: np.ndarray, kept:
     return kept.lower
 
 
+@njit(cache=True)
+def forget(kept: KeptStiffness) -> None:
+    """Let the stiffness be computed again where it is asked for next."""
+    kept.q[:] = np.nan
+
+
 @njit(cache=True, fastmath=REORDERED)
 def add_deviation_stiffness(of: LawDeviation, point: DeviationPoint, matrix: np.ndarray) -> None:
     """Add the deviation's stiffness to the lower triangle of matrix (r, r).

@@ -176,7 +176,7 @@ class ReducedServing:
             self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
 
     def _tracked(
-        self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None, iterations: int = 10
+        self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None, iterations: int = 20
     ) -> ReducedState:
         """Track the reduced model; the forces of loads that turn with their sections are those of the last shape."""
         creep = None if h is None else self._memory.stress(h)

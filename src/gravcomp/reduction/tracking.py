@@ -4,8 +4,9 @@
 
 with the tensions lambda from the cables' complementarity. Creep adds a stress that is linear in the strain (`memory`). One step
 is enough to track a turning gravity; another is taken if the correction with the last factor moves the tip by more than the
-tolerance. All of it is one compiled function: with many small calls, a control step would spend more time on calling than on
-computing.
+tolerance. A straight step along a curved path stretches a body, which in one that hardly changes its volume makes large stresses
+and a stiffness without meaning: the W that is returned is never that of a shape to which a long step has led. All of it is one
+compiled function: with many small calls, a control step would spend more time on calling than on computing.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
 from gravcomp.reduction.contact import ReducedContact, tracked_touching
-from gravcomp.reduction.law_deviation import KeptStiffness
+from gravcomp.reduction.law_deviation import KeptStiffness, forget
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
@@ -47,15 +48,21 @@ class ReducedTracker:
     """Tracks the equilibrium of a reduced model. Owns the current `state`, and the `sliding` of the cables."""
 
     def __init__(
-        self, model: ReducedModel, length: float, tolerance: float = 5e-5, longest_step: float = 0.12, near: float = 0.02
+        self,
+        model: ReducedModel,
+        length: float,
+        tolerance: float = 5e-5,
+        longest_step: float = 0.05,
+        near: float = 0.02,
+        calm: float = 5e-4,
     ):
         """Start from the straight robot of `length` m.
 
-        tolerance, longest_step and near (largest step whose factor may decide on convergence) are displacements of the tip as
-        fractions of the length.
+        tolerance, longest_step, near (largest step whose factor may decide on convergence) and calm (largest step that leads near
+        enough to an equilibrium for the stiffness there) are displacements of the tip as fractions of the length.
         """
         self.model = model
-        self._limits = longest_step * length, near * length, tolerance * length
+        self._limits = longest_step * length, near * length, tolerance * length, calm * length
         self._body = body_of(model)
         self._kept = kept_stiffness(model)
         self._has_friction = bool(model.cables.friction.any())
@@ -143,7 +150,7 @@ class ReducedTracker:
     ) -> ReducedState:  # fmt: skip
         """Return the state as `track` does, with contact."""
         assert self.contact is not None
-        state, (longest, near, tolerance) = self.state, self._limits
+        state, (longest, near, tolerance, calm) = self.state, self._limits
         touching = self.contact.touching(state.q, gravity)
         longest = min(longest, touching.surface.radius.min())
         (
@@ -151,7 +158,7 @@ class ReducedTracker:
             pressed,
         ) = tracked_touching(
             self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
-            self._kept, iterations, longest, min(longest, near), tolerance, touching,
+            self._kept, iterations, longest, min(longest, near), tolerance, calm, touching,
         )  # fmt: skip
         if not converged:
             return replace(state, residual=np.inf, converged=False)
@@ -164,19 +171,23 @@ class ReducedTracker:
 def _tracked(
     body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
     pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
-    iterations: int, longest_step: float, near: float, tolerance: float,
+    iterations: int, longest_step: float, near: float, tolerance: float, calm: float,
 ) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
     """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
 
     wound and given: of `CableInput.arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
-    offset; kept: of `elastic_stiffness`; the last three in m.
+    offset; kept: of `elastic_stiffness`; the last four in m.
     """
     m, r, start, cables = len(tension), len(q), point, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
-    converged, residual = False, np.inf
-    for _ in range(iterations):
+    converged, residual, before = False, np.inf, 0.0
+    for iteration in range(iterations):
         stress = scale * point.strain + offset
+        if iteration:  # with that of another shape the steps may not come to an end
+            forget(kept)
         matrix = elastic_stiffness(body, point, q, stress, scale, kept)
+        if before > calm:
+            forget(kept)
         add_stiffness(cables, point.tendons, tension, matrix)
         definite, factor = factorise(matrix)
         if not definite:
@@ -207,9 +218,10 @@ def _tracked(
         out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
         pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
         left = of_tip @ out + body.tip @ (answer.T @ pull)
-        if size < near and (left**2).sum() < tolerance**2:
+        if before <= calm and size < near and (left**2).sum() < tolerance**2:
             converged, residual = True, np.sqrt(out @ (body.force_norm @ out))
             break
+        before = share * size
     if not converged:
         point = start
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
