@@ -92,6 +92,10 @@ class Ros2:
         """Return what the graph knows of the subscriptions of a topic."""
         return self._node.get_subscriptions_info_by_topic(topic)
 
+    def names(self) -> list[str]:
+        """Return the names of the nodes in the graph."""
+        return self._node.get_node_names()
+
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)
         answer = self.ask(service, name, _filled(service.Request(), content))

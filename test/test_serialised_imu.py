@@ -29,12 +29,25 @@ def test_a_sample_is_the_one_in_the_message(length):
     assert (rate, force) == ((w.x, w.y, w.z), (a.x, a.y, a.z))
 
 
-def test_another_encoding_is_left_to_rclpy():
-    filled = message(np.random.default_rng(1), "")
-    little = serialize_message(filled)
+@pytest.fixture
+def little():
+    return serialize_message(message(np.random.default_rng(1), ""))
+
+
+@pytest.fixture
+def big(little):
     body = struct.unpack("<iI", little[4:12]), struct.unpack("<37d", little[20:])
-    big = b"\x00\x00\x00\x00" + struct.pack(">iI", *body[0]) + struct.pack(">I", 1) + bytes(4) + struct.pack(">37d", *body[1])
+    return b"\x00\x00\x00\x00" + struct.pack(">iI", *body[0]) + struct.pack(">I", 1) + bytes(4) + struct.pack(">37d", *body[1])
+
+
+def test_another_encoding_is_left_to_rclpy(little, big):
     assert read_sample(big) == read_sample(little)
+
+
+@pytest.mark.parametrize("damaged", [lambda big: big[:40], lambda big: b"\xff\xff" + big[2:], lambda big: b""])
+def test_a_damaged_message_of_another_encoding_is_refused_and_does_not_end_the_node(big, damaged):
+    with pytest.raises(ValueError, match="cannot be read"):
+        read_sample(damaged(big))
 
 
 @pytest.mark.parametrize("kept", [0, 3, 11, 40, 100, 300])

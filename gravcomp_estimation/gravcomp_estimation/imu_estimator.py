@@ -132,12 +132,12 @@ class ImuEstimator(ManagedNode):
 
     def _on_sample(self, serialised: bytes) -> None:
         now = time.monotonic()
-        self._sample_time = now
         try:
             stamp, gyro, accel = read_sample(serialised)
         except ValueError as error:
             self.get_logger().warning(f"imu/data_raw: {error}", throttle_duration_sec=1.0)
             return
+        self._sample_time = now
         known = self._known if abs(stamp - self._known_stamp_ns) < KNOWN_AGE_NS else (0.0, 0.0, 0.0)
         continued = self._counter.continued(stamp)
         estimate = self._estimator.update(continued, gyro, accel, known)

@@ -75,11 +75,16 @@ def response_of(message: Deformation) -> Response:
         effector_free=_matrix(message.effector_free, 1, rows, "effector_free")[0],
     )
     _matrix(message.cable_tension, 1, cables, "cable_tension")
+    check_compliance(response)
+    return response
+
+
+def check_compliance(response: Response) -> None:
+    """Raise ValueError when the compliance of a cable is not positive."""
     if not (np.diagonal(response.compliance_aa) > 0.0).all():
         raise ValueError(
             f"the diagonal of compliance_aa is {np.diagonal(response.compliance_aa)}; positive numbers (m/N) are needed"
         )
-    return response
 
 
 def backbone_of(message: Deformation) -> Backbone | None:

@@ -3,6 +3,7 @@
 In a composed process the simulator publishes the shape as a value (gravcomp_node.local_topics.Adapted), and nothing is converted.
 """
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from std_msgs.msg import Header
 
 from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.simulation import Response, Shape
-from gravcomp_fem.conversion import contact_of, deformation_message, gravity_of, response_of
+from gravcomp_fem.conversion import check_compliance, contact_of, deformation_message, gravity_of, response_of
 from gravcomp_msgs.msg import Deformation
 
 
@@ -63,12 +64,16 @@ def from_message(message: Deformation) -> Deformed:
 
 
 def from_shape(published: PublishedShape) -> Deformed:
-    """Return what is in a shape of this process. Raises ValueError for numbers that are not finite."""
+    """Return what is in a shape of this process. Raises ValueError for the numbers for which `from_message` does."""
     shape = published.shape
-    response = shape.response
-    for name in ("compliance_aa", "compliance_ea", "displacement_free", "effector_free"):
-        if not np.isfinite(getattr(response, name)).all():
+    response, contact = shape.response, shape.contacts.by_obstacle()
+    numbers = {field.name: getattr(response, field.name) for field in dataclasses.fields(response)}
+    numbers |= {"gravity": shape.gravity, "cable_tension": shape.cable_tension}
+    numbers |= {"contact_force": contact.force, "contact_position": contact.position, "contact_force_change": contact.change}
+    for name, values in numbers.items():
+        if not np.isfinite(values).all():
             raise ValueError(f"{name} has numbers that are not finite")
+    check_compliance(response)
     return Deformed(
         header=published.header,
         status=int(shape.status),
@@ -78,5 +83,5 @@ def from_shape(published: PublishedShape) -> Deformed:
         cable_tension=shape.cable_tension,
         gravity=shape.gravity,
         response=response,
-        contact=shape.contacts.by_obstacle(),
+        contact=contact,
     )

@@ -56,10 +56,23 @@ def test_a_shape_and_its_message_say_the_same(published):
     assert here.status == ShapeStatus.FALLBACK and len(here.contact) == 2
 
 
-def test_numbers_that_are_not_finite_are_refused_in_both_ways(published):
-    response = published.shape.response
-    broken = dataclasses.replace(response, compliance_ea=np.where(response.compliance_ea > 0.0, np.nan, 0.0))
-    published = PublishedShape(dataclasses.replace(published.shape, response=broken), published.header)
+@pytest.mark.parametrize(
+    ("of_response", "name", "change", "said"),
+    [
+        (True, "compliance_ea", lambda x: np.where(x > 0.0, np.nan, 0.0), "compliance_ea has numbers that are not finite"),
+        (True, "compliance_aa", lambda x: -x, "the diagonal of compliance_aa"),
+        (False, "cable_tension", lambda x: x + np.inf, "cable_tension has numbers that are not finite"),
+        (False, "gravity", lambda x: x * np.nan, "gravity has numbers that are not finite"),
+    ],
+)
+def test_the_same_numbers_are_refused_in_both_ways(published, of_response, name, change, said):
+    shape = published.shape
+    if of_response:
+        broken = dataclasses.replace(shape.response, **{name: change(getattr(shape.response, name))})
+        shape = dataclasses.replace(shape, response=broken)
+    else:
+        shape = dataclasses.replace(shape, **{name: change(getattr(shape, name))})
+    published = PublishedShape(shape, published.header)
     for read, given in ((from_shape, published), (from_message, published.message())):
-        with pytest.raises(ValueError, match="compliance_ea has numbers that are not finite"):
+        with pytest.raises(ValueError, match=said):
             read(given)

@@ -49,7 +49,7 @@ def run(*node_classes: type[ManagedNode], argv: list[str] | None = None) -> int:
             nodes.append(node_class(local))
             nodes[-1].start(lambda: _wait_for_gate(stop))
         note = os.environ.get(ACTIVE_FILE)
-        if note and all(node.autostart for node in nodes):
+        if note and all(node.is_active for node in nodes):
             Path(note).touch()
         executor = StreamExecutor(*nodes, local=local)
         while not stop and not any(node.finished for node in nodes):

@@ -22,9 +22,12 @@ Vector = tuple[float, float, float]
 
 
 def read_sample(data: bytes) -> tuple[int, Vector, Vector]:
-    """Return stamp in ns, angular rate (3,) in rad/s and specific force (3,) in m/s^2. Raises ValueError for a cut message."""
+    """Return stamp in ns, angular rate (3,) in rad/s, specific force (3,) in m/s^2. Raises ValueError for a damaged message."""
     if data[:2] != _LITTLE_ENDIAN:
-        message = deserialize_message(data, Imu)
+        try:
+            message = deserialize_message(data, Imu)
+        except RuntimeError as error:
+            raise ValueError(f"a serialised sensor_msgs/Imu of {len(data)} bytes cannot be read: {error}") from error
         stamp, rate, force = message.header.stamp, message.angular_velocity, message.linear_acceleration
         return stamp.sec * 1_000_000_000 + stamp.nanosec, (rate.x, rate.y, rate.z), (force.x, force.y, force.z)
     try:

@@ -10,6 +10,7 @@ import pytest
 
 from gravcomp.canbus import c610
 from gravcomp.canbus.codec import decode
+from gravcomp.commands.__main__ import main
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.description.hardware import CanInterface, parse_hardware
@@ -115,6 +116,16 @@ def test_a_current_step_is_measured_and_the_current_ends_when_the_host_does(live
     page = write_page(list(found.values()), "virtual", channel, tmp_path)
     text = page.read_text()
     assert "gravcomp doctor --board" in text and "is unhooked" in text and html.escape(found["current step"].found) in text
+
+
+def test_a_board_that_has_run_alone_waits_for_its_host_again(monkeypatch):
+    written = {}
+    monkeypatch.setattr(BoardClient, "__init__", lambda *_: None)
+    monkeypatch.setattr(BoardClient, "__exit__", lambda *_: None)
+    monkeypatch.setattr(BoardClient, "configure", lambda _, settings: written.update(settings))
+    for option, alone in (["--standalone"], 1), ([], 0):
+        assert main(["firmware", "parameters", "article", *option]) == 0
+        assert written["at_start"] == written["heater_own"] == alone
 
 
 def test_the_parameters_of_a_robot_are_written_and_stored(live, monkeypatch):

@@ -1,5 +1,7 @@
 """Cache keys follow the content: equal content, equal key; any change, another key."""
 
+import ast
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,52 @@ def test_the_functions_of_every_module_have_a_folder_by_what_they_consist_of(mon
     compiled = [name for name, source in sources.items() if source.compiled]
     assert len({compiled_functions.module_folder(name) for name in compiled}) == len(compiled) > 40
     assert "gravcomp.rounding" in compiled_functions._contained("gravcomp.mechanics.assembly", sources)
+
+
+def test_all_that_compiled_functions_use_of_other_modules_counts():
+    """Lower-case values, classes and results of functions that are not compiled would not: a function would be kept wrongly."""
+    sources, waiting, missed, seen = compiled_functions._sources(), [], [], set()
+    waiting += [name for name, source in sources.items() if source.compiled]
+    while waiting:
+        name = waiting.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        contained = compiled_functions._contained(name, sources)
+        waiting += contained
+        for module, imported in used_imports(ast.parse(source_file(name).read_text())):
+            if compiled_functions._origin(module, imported, sources) not in contained:
+                missed.append(f"{name} uses {imported} of {module}")
+    assert not missed and len(seen) > 40
+
+
+def source_file(name):
+    path = compiled_functions.PACKAGE.joinpath(*name.split(".")[1:])
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def used_imports(tree):
+    """Return module and name of what compiled functions and constants of a module use of others of the package."""
+    parts = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and any("jit" in ast.dump(decorator) for decorator in node.decorator_list)
+    ]
+    parts += [node for node in tree.body if isinstance(node, ast.Assign) and any(name.isupper() for name in targets(node))]
+    used: set[str] = set()
+    while parts:
+        new = {name.id for part in parts for name in ast.walk(part) if isinstance(name, ast.Name)} - used
+        used |= new
+        # What these are made of: functions and values of the same module.
+        parts = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name in new]
+        parts += [node for node in tree.body if isinstance(node, ast.Assign) and targets(node) & new]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gravcomp"):
+            yield from ((node.module, alias.name) for alias in node.names if (alias.asname or alias.name) in used)
+
+
+def targets(assignment):
+    return {name.id for target in assignment.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
 
 
 def test_the_digests_of_unchanged_files_are_remembered(tmp_path, monkeypatch):

@@ -70,6 +70,15 @@ def test_broken_yaml_names_the_line(tmp_path, text, words):
         assert word in str(error.value)
 
 
+@pytest.mark.parametrize("depth", [2_000, 100_000])
+def test_a_document_that_is_nested_too_deeply_is_refused(tmp_path, depth):
+    """Libyaml ends the process where its stack overflows."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("[" * depth)
+    with pytest.raises(ConfigError, match="is nested too deeply"):
+        load_yaml(path)
+
+
 @dataclass(frozen=True)
 class Drive:
     travel: float = parameter(3.0, edge="mm", description="travel", renamed_from="stroke_mm")

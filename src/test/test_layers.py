@@ -38,6 +38,9 @@ def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_
         def unknowns(self, elements):
             return 12 * elements.around * elements.along * elements.radial
 
+        def cost(self, elements):
+            return self.unknowns(elements)
+
         def finer(self, elements, direction):
             finer = mesh_choice._finer(self._robot, elements, direction)
             return None if finer == elements else finer

@@ -12,11 +12,13 @@ from gravcomp.bench.streams import outcome
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.inclination import inclination_rmse
+from gravcomp.orientation.offline import without_rate_spikes
 from gravcomp.orientation.spike_review import AHEAD, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
-from gravcomp.recordings.imu import RecordingError, read_recording
+from gravcomp.recordings.imu import Recording, RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 from gravcomp.stream_checks import CounterStamps, StreamMonitor, check_recording, in_si
+from gravcomp.stream_checks.spikes import spikes as found_spikes
 
 TRIAL = "05_undisturbed_slow_rotation_with_breaks_B"
 LENGTH = 45.0  # s of motion
@@ -152,6 +154,18 @@ def test_spikes_are_found_in_motion_that_changes_as_fast_as_they_do(all_axes):
     assert np.abs(reviewed(spiky) - signal).max() < 0.35  # 20 deg/s
 
 
+@pytest.mark.parametrize(("floor_deg_s", "removed"), [(20.0, True), (2000.0, False)])
+def test_means_of_samples_are_made_without_spikes_of_the_rate(floor_deg_s, removed):
+    time, place = np.arange(400) / 100.0, 201
+    gyro = np.sin(2.0 * np.pi * time)[:, None] * [1.0, 0.5, -0.7]
+    spiky = gyro.copy()
+    spiky[place] += [5.0, 0.0, -6.0]
+    recording = Recording("made", np.rint(1e9 * time).astype(np.int64), spiky, np.tile([0.0, 0.0, 9.81], (400, 1)))
+    means = without_rate_spikes(recording, SpikeOptions(gyro=np.radians(floor_deg_s))).averaged(2).gyro
+    off = np.abs(means - 0.5 * (gyro[::2] + gyro[1::2])).max(axis=1)
+    assert (off[place // 2] < 0.02) == removed and np.delete(off, place // 2).max() < 1e-9
+
+
 def counted(stamps):
     """Return the steps that count for stamps in s."""
     even = EvenSteps()
@@ -168,15 +182,51 @@ def test_stamps_that_jitter_are_evened_out_and_keep_their_time(lost):
     assert np.abs(np.cumsum(steps) - (taken[1:] - taken[0])).max() < 0.008
 
 
-@pytest.mark.parametrize("before", [[0.05], [0.01] * 300], ids=["a gap first", "a slower rate first"])
-def test_a_period_that_is_wrong_does_not_move_the_time_away_from_the_stamps(before):
-    stamps = np.cumsum([0.0, *before, *[0.0025] * 600])
-    assert np.abs(np.cumsum(counted(stamps)) - stamps[1:]).max() <= 0.5 * before[0] + 1e-9
+def jittered(rng, count, period):
+    return period * (np.arange(count) + rng.uniform(-0.3, 0.3, count))
+
+
+@pytest.mark.parametrize("change", [(0.01, 0.005), (0.005, 0.01), (0.01, 0.002)])
+def test_steps_are_evened_after_a_change_of_the_rate_and_the_time_stays_that_of_the_stamps(change):
+    rng = np.random.default_rng(7)
+    first, second = (jittered(rng, 1500, period) for period in change)
+    stamps = np.concatenate([first, first[-1] + max(change) + second])
+    steps = counted(stamps)
+    assert (steps > 0.0).all() and np.abs(np.cumsum(steps) - (stamps[1:] - stamps[0])).max() < 0.8 * max(change)
+    assert np.std(steps[2000:]) < 0.5 * np.std(np.diff(stamps)[2000:])
+
+
+def test_a_short_first_step_is_not_taken_for_the_period_for_ever():
+    stamps = np.concatenate([[0.0, 0.001], 0.011 + jittered(np.random.default_rng(8), 1000, 0.01)])
+    assert np.std(counted(stamps)[300:]) < 0.5 * np.std(np.diff(stamps)[300:])
 
 
 def test_stamps_without_jitter_count_as_they_are():
     stamps = np.cumsum(0.01 + 0.0002 * np.sin(np.arange(500.0)) + 0.04 * (np.arange(500) % 97 == 0))  # with samples lost
     np.testing.assert_allclose(counted(stamps), np.diff(stamps), rtol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.1, 0.2])
+def test_the_share_of_spikes_is_found_also_where_they_are_many(share):
+    rng = np.random.default_rng(11)
+    time = np.arange(2560)[:, None] / 95.2
+    signal = np.sin(2.0 * np.pi * 1.5 * time + [0.0, 1.0, 2.0]) + rng.normal(0.0, 0.01, (len(time), 3))
+    hit = rng.random(len(time)) < share
+    signal[hit] += rng.uniform(2.0, 7.0, (hit.sum(), 3)) * rng.choice([-1.0, 1.0], (hit.sum(), 3))
+    found = np.concatenate([found_spikes(block, 0.15) for block in signal.reshape(10, 256, 3)])
+    # Where many follow each other, some hide others, and a sample between two looks like one.
+    assert 0.5 * hit.mean() <= found.mean() <= 1.2 * hit.mean() + 0.001
+    assert found[~hit].mean() < 0.02
+
+
+@pytest.mark.parametrize("frequency", [10.0, 25.0, 40.0])
+@pytest.mark.parametrize("begin", [60, 128, 240])
+def test_vibration_that_begins_within_a_block_is_no_row_of_spikes(frequency, begin):
+    rng, k = np.random.default_rng(3), np.arange(256)
+    shaken = np.where(k < begin, 0.0, np.sin(2.0 * np.pi * frequency * k / 95.2) * rng.uniform(3.0, 6.0, 256))
+    signal = rng.normal(0.0, 0.01, (256, 3))
+    signal[:, 1] += shaken
+    assert found_spikes(signal, 0.15).sum() <= 1
 
 
 def test_a_counter_that_wraps_is_continued_live():

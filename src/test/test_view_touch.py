@@ -228,6 +228,27 @@ def test_a_wall_is_put_next_to_the_robot_and_dragged_along_its_normal(browsers, 
     assert browsers.page.requests() == [PlaceWall(None)]
 
 
+def test_rings_lie_on_the_wall_until_they_are_turned_and_a_drag_begins_at_the_wall_that_is_there(browsers):
+    wall, page = browsers.wall, browsers.page
+    wall.show_rings(True)
+    for normal in (np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.6, 0.8])):  # two programs have put walls there
+        page._scene.show(snapshot(wall=(-0.02 * normal, normal)))
+        np.testing.assert_allclose(wall._rings.wxyz, wall._patch.wxyz, atol=1e-12)
+    event = {"client": object(), "client_id": 4}
+    asyncio.run(wall._on_turn(types.SimpleNamespace(phase="start", **event)))
+    wall._rings.wxyz = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)  # by the browser: z to x
+    asyncio.run(wall._on_turn(types.SimpleNamespace(phase="update", **event)))
+    np.testing.assert_allclose(page.requests()[0].plane[1], [1.0, 0.0, 0.0], atol=1e-9)
+    page._scene.show(snapshot(wall=(-0.02 * normal, normal)))  # the wall has not turned yet
+    assert wall._rings.wxyz[2] == pytest.approx(math.sqrt(0.5))
+    asyncio.run(wall._on_turn(types.SimpleNamespace(phase="end", **event)))
+    page._scene.show(snapshot(wall=(-0.02 * normal, normal)))
+    np.testing.assert_allclose(wall._rings.wxyz, wall._patch.wxyz, atol=1e-12)
+    browsers.drag(wall, "start", -0.02 * normal, start=-0.02 * normal)
+    browsers.drag(wall, "update", -0.019 * normal)
+    np.testing.assert_allclose(page.requests()[-1].plane[1], normal, atol=1e-9)
+
+
 @pytest.mark.parametrize("side", ["below", "above", "side", "ahead"])
 def test_a_new_wall_is_one_that_the_virtual_robot_takes(browsers, robot, side):
     from gravcomp.virtual.placed_wall import parse_wall
@@ -294,3 +315,18 @@ def test_a_browser_that_sends_nonsense_disturbs_no_other(browsers):
         browsers.page._status.content = "still here"
         assert good.recv(timeout=20.0)
     assert browsers.page.requests() == []
+
+
+def test_a_page_of_another_address_cannot_connect(browsers):
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    own, subprotocols = browsers.page.address, [f"viser-v{viser.__version__}"]
+    address, port = own.replace("http://", "ws://"), own.rpartition(":")[2]
+    with connect(address, subprotocols=subprotocols, max_size=None, origin=own) as connection:
+        assert connection.recv(timeout=20.0)
+    hosts = "https://example.org", "http://localhost", "http://localhost:1", "null", f"http://localhost:{port}.example.org"
+    for foreign in hosts:
+        with pytest.raises(InvalidStatus) as refused:
+            connect(address, subprotocols=subprotocols, max_size=None, origin=foreign)
+        assert refused.value.response.status_code == 403

@@ -3,7 +3,7 @@
 Everything runs on this machine: the C code under sanitizers, and the image in an emulator. Nothing here has run on a chip.
 """
 
-import resource
+import time
 from collections.abc import Callable
 
 from gravcomp.bench import board_standalone
@@ -68,22 +68,16 @@ def run(progress: Callable[[str], None], *, frames: int = 200_000, seed: int = 1
 
 
 def _built_again(progress: Callable[[str], None]) -> tuple[float, bool]:
-    """Return the longest time (s) of the processor for building an image, and whether each image is the same again."""
+    """Return the longest time (s) to build an image, and whether each image is the same again."""
     longest, identical = 0.0, True
     for standalone in (False, True):
         progress(f"building the image again{', with the loop on the board' if standalone else ''}")
         first = build_image(standalone=standalone).path.read_bytes()
-        begin = _time_of_compilers()
+        begin = time.monotonic()
         again = build_image(standalone=standalone, fresh=True)
-        longest = max(longest, _time_of_compilers() - begin)
+        longest = max(longest, time.monotonic() - begin)
         identical = identical and again.path.read_bytes() == first
     return longest, identical
-
-
-def _time_of_compilers() -> float:
-    """Return the time in s for which processes that this one has started have used the processor."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def _loop(progress: Callable[[str], None]) -> dict:

@@ -59,7 +59,7 @@ ROWS = {
         Row("image_differences", "ticks in which image and C code sent different frames", "", 0),
         Row("dead_host_ms", "from the last currents of a dead host to zero current, worst", "ms", 100),
         Row("heater_off_s", "from a failed sensor to the heater off, worst", "s", 2.0),
-        Row("build_s", "building the image with the loop on the board, time of the processor", "s", 30.0),
+        Row("build_s", "building the image, with the loop on the board", "s", 30.0),
         Row("image_identical", "the image is the same twice", "", 1, at_least=True),
         Row("image_flash_kb", "flash of the image", "KB"),
         Row("image_ram_kb", "RAM of the image", "KB"),

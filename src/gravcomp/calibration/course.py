@@ -22,7 +22,7 @@ def course_options(robot: Robot) -> DynamicsOptions:
 def predict_course(robot: Robot, course: Measured, options: DynamicsOptions | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return tip positions (t, 3) in m and directions (t, 3) at the course's times.
 
-    options: default `course_options`. Raises RuntimeError if a time step does not converge.
+    options: default `course_options`. Raises RuntimeError if the start has no equilibrium or a time step does not converge.
     """
     straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
     rows = [
@@ -37,7 +37,10 @@ def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions | No
     """Yield the shapes at the course's times, None for the start at the straight robot; as `predict_course`."""
     simulator = DynamicSimulator(robot, options or course_options(robot))
     if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT * robot.length:
-        yield simulator.settle(course.gravity[0], course.displacement[0])
+        shape = simulator.settle(course.gravity[0], course.displacement[0])
+        if not shape.is_equilibrium:
+            raise RuntimeError(f"the motion has no equilibrium to start from: {shape.message}")
+        yield shape
     else:
         simulator.let_go(course.gravity[0])
         yield None

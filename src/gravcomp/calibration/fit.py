@@ -100,7 +100,8 @@ def fit_statics(
 
     mass: of body and payload in kg, from a balance; creep_times: of the branches of creep in s, for windows with a history.
     predictor: of these windows, the robot's full model where it is not given. Raises MeasurementError if the windows cannot
-    determine the moduli, and if no values describe them better than the robot's description does.
+    determine the moduli, if the described robot has no equilibrium in one of them, and if no values describe them better than the
+    robot's description does. Other values at which a window has no equilibrium only shorten the fit's steps.
     """
     from scipy.stats import t as student
 
@@ -108,7 +109,10 @@ def fit_statics(
     own = predictor is None
     predictor = predictor or StaticPredictor(robot, windows, creep_times)
     initial = starting_parameters(robot, creep_times, usual_creep=groups is None or "creep" in groups)
-    before = predictor.predict(initial)
+    try:
+        before = predictor.predict(initial)
+    except RuntimeError as error:
+        raise _no_start(error) from error
     if own:
         exchanged = functools.cache(lambda: StaticPredictor(with_coarse_elements(robot), windows))  # they show in centimetres
         check_frame(robot, windows, before.tip, lambda displacement: exchanged().tips_of(displacement))
@@ -117,7 +121,10 @@ def fit_statics(
     problem = Problem(predictor, initial, unknowns, prior_rows(unknowns, priors), sigma, progress)
     if mass is not None:
         problem.weigh(mass, *body_mass(robot), noise.balance)
-    bends = problem.bending(np.zeros(len(unknowns)))
+    try:
+        bends = problem.bending(np.zeros(len(unknowns)))
+    except RuntimeError as error:
+        raise _no_start(error) from error
     if bends < noise.bending * sigma[0]:
         raise MeasurementError(
             f"twice the modulus would move the tips by {1e3 * bends:.2f} mm at most: gravity hardly bends the robot in these"
@@ -169,6 +176,14 @@ def fit_statics(
         evaluations=problem.evaluations,
         warnings=tuple(warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any()))),
         creep_times=creep_times,
+    )
+
+
+def _no_start(error: RuntimeError) -> MeasurementError:
+    """Return the error about a described robot that has no shape in a window."""
+    return MeasurementError(
+        f"the fit cannot begin, the described robot has no shape: {error}; check gravity and displacements of the data, and"
+        " modulus, density and limits of the robot file"
     )
 
 

@@ -67,7 +67,8 @@ def fit_motion(
 ) -> MotionFit:
     """Fit to the courses. mapper: as `map`, may compute courses in parallel; modulus, creep: False keeps the robot's values.
 
-    A fitted modulus is that of all segments.
+    A fitted modulus is that of all segments. Values with which a motion cannot be computed are a refused step of the fit; raises
+    RuntimeError where it cannot be computed with those of the robot.
     """
     from scipy.optimize import least_squares
     from scipy.stats import t as student
@@ -90,11 +91,12 @@ def fit_motion(
     short = _Courses(beginnings, beginning.robot_at, steps, mapper, progress)
     whole = _Courses(courses, all_of_them.robot_at, steps, mapper, progress)
     options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}
-    x = least_squares(short.residuals, beginning.start, jac=short.jacobian, bounds=beginning.bounds, **options).x
+    x = least_squares(short.residuals, short.first(beginning.start), jac=short.jacobian, bounds=beginning.bounds, **options).x
     # In the beginning, the stiffness of the creep branch adds to the lasting one.
     x = np.concatenate([x, all_of_them.start[len(x) :]])
     if creep and modulus:
         x[1] -= np.log1p(_CREEP_START[0])
+    x = whole.first(x, all_of_them.start)
     solution = least_squares(whole.residuals, x, jac=whole.jacobian, bounds=all_of_them.bounds, **options)
     x = solution.x
     simulated = [sum(len(course.time) for course in part.courses) * part.count for part in (short, whole)]
@@ -139,13 +141,24 @@ class _Parameters:
 
 
 class _Courses:
-    """Residuals of the courses as functions of x, with a cache of predictions. count: number of predictions."""
+    """Residuals of the courses as functions of x, with a cache of predictions. count: number of predictions.
+
+    They are NaN where a course cannot be computed: least_squares takes a shorter step then.
+    """
 
     def __init__(self, courses: list[Measured], robot_at: Callable, steps: DynamicsOptions, mapper: Callable, progress: Callable):
         self.courses, self.count, self._steps = courses, 0, steps
         self._robot_at, self._mapper, self._progress = robot_at, mapper, progress
         self.measured = np.concatenate([course.tip_position for course in courses])
         self._tips: dict[tuple, list[np.ndarray]] = {}
+
+    def first(self, *points: np.ndarray) -> np.ndarray:
+        """Return the first of the points at which all courses can be computed. Raises RuntimeError."""
+        for x in points:
+            if np.isfinite(self.residuals(x)).all():
+                return x
+        source = self.courses[0].source
+        raise RuntimeError(f"{source}: the motion of the robot as it is described cannot be computed over these courses")
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return the tip errors in mm, as one vector."""
@@ -156,9 +169,14 @@ class _Courses:
         return 1e3 * error.ravel()
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Return the derivative of the residuals by x, by forward differences."""
-        here = self.error(x)
-        return np.column_stack([1e3 * (self.error(x + s) - here).ravel() / _DIFFERENCE for s in _DIFFERENCE * np.eye(len(x))])
+        """Return the derivative of the residuals by x, by forward differences; backward where a course cannot be computed."""
+        here, columns = self.error(x), []
+        for step in _DIFFERENCE * np.eye(len(x)):
+            moved = self.error(x + step) - here
+            if not np.isfinite(moved).all():
+                moved = here - self.error(x - step)
+            columns.append(np.nan_to_num(1e3 * moved.ravel() / _DIFFERENCE))
+        return np.column_stack(columns)
 
     def error(self, x: np.ndarray) -> np.ndarray:
         """Return modelled minus measured tips (t, 3) in m."""
@@ -183,5 +201,8 @@ class _Courses:
 
 
 def _tip_course(job: tuple[Robot, Measured, DynamicsOptions]) -> np.ndarray:
-    """Return the predicted tips (t, 3) of a course. A function of the module, so that it can be sent to another process."""
-    return predict_course(*job)[0]
+    """Return the predicted tips (t, 3) of a course, NaN if it cannot be computed. Other processes import this function."""
+    try:
+        return predict_course(*job)[0]
+    except RuntimeError:
+        return np.full_like(job[1].tip_position, np.nan)

@@ -117,7 +117,11 @@ def fit_poses(
     start: np.ndarray | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
 ) -> PoseFit:
-    """Fit the unknowns to the poses. Raises MeasurementError if the described robot has no equilibrium in a pose."""
+    """Fit the unknowns to the poses. Raises MeasurementError if the described robot has no equilibrium in a pose.
+
+    start: where the fit begins, x of another fit; x = 0, the described robot, where it has no equilibrium. At other points
+    without equilibrium residuals are NaN: least_squares takes a shorter step then.
+    """
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
@@ -149,8 +153,11 @@ def fit_poses(
             columns.append(np.nan_to_num(column))
         return np.column_stack(columns)
 
-    x = np.zeros(len(unknowns)) if start is None else np.asarray(start, dtype=float)
+    described = np.zeros(len(unknowns))
+    x = described if start is None else np.asarray(start, dtype=float)
     before = residuals(x)
+    if start is not None and not np.isfinite(before).all():
+        x, before = described, residuals(described)
     if not np.isfinite(before).all():
         lost = np.flatnonzero(np.isnan(before[: poses.measured.size].reshape(poses.count, -1)).any(axis=1))
         raise MeasurementError(f"{poses.source}: the robot has no equilibrium in pose {poses.name[lost[0]]}")

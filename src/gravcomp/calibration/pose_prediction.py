@@ -15,6 +15,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.mesh import MeshError
 
 _MODELS = 8  # models that are kept
 _PARTS = 64, 16  # a load step of 1 / _PARTS that fails ends the search: at the first prediction of a pose, and later
@@ -48,7 +49,12 @@ class PosePredictor:
         except ValueError:
             return np.full_like(self.poses.measured, np.nan)
         turn = Rotation.from_rotvec(parameters.base_rotation)
-        places = np.array([self._pose(k, robot, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
+        try:
+            places = np.array([self._pose(k, robot, parameters, turn.inv().apply(g)) for k, g in enumerate(self.poses.gravity)])
+        except MeshError:
+            if robot == self.robot:  # the described robot cannot be meshed
+                raise
+            return np.full_like(self.poses.measured, np.nan)
         return turn.apply(places.reshape(-1, 3)).reshape(places.shape) + parameters.base_position
 
     def _pose(self, k: int, robot: Robot, parameters: PoseParameters, gravity: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from gravcomp.calibration.statics import StaticPrediction
 from gravcomp.calibration.unknowns import Unknown, parameters_at
 
 _MOST_STEPS, _SETTLED = 8, 3e-3  # of the search, and the relative gain with which it ends
-_PARTS = (1.0, 0.5, 0.2)  # of a step
+_PARTS = (1.0, 0.5, 0.2)  # of a step, and of the way from the described robot to the first point of a search
 _ROOM = 1e-9  # of the bounds of a step, which must not be empty
 _NEAR = 0.02  # in the moduli's logarithms, over which derivatives hardly change
 
@@ -25,7 +25,7 @@ class Predictor(Protocol):
         """Return the prediction. Raises RuntimeError if there is no equilibrium."""
 
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
-        """Return the derivatives (k, 6, n) of the tips by each of the kinds, at least."""
+        """Return the derivatives (k, 6, n) of the tips by each of the kinds, at least. Raises RuntimeError as `predict`."""
 
 
 class Problem:
@@ -86,14 +86,15 @@ class Problem:
     def solve(self, start: np.ndarray, fitted: np.ndarray) -> np.ndarray:
         """Return the minimum over the entries `fitted` (u,) bool of x; the others keep those of `start`.
 
-        Gauss-Newton's method with bounds; a step that does not help is halved.
+        Gauss-Newton's method with bounds; a step that does not help is halved, and so is one to a point without equilibrium. If
+        `start` has none, the search begins nearer to x = 0, the described robot. Raises RuntimeError if that has none either.
         """
         from scipy.optimize import lsq_linear
 
         low = np.array([unknown.lowest(self._initial) for unknown in self._unknowns])[fitted]
         high = np.array([unknown.highest() for unknown in self._unknowns])[fitted]
-        x = start.copy()
-        cost = float((self.residuals(x) ** 2).sum())
+        x = self._with_equilibrium(start)
+        cost = self._cost(x)
         for _ in range(_MOST_STEPS):
             rows = self.jacobian(x)[:, fitted]
             step = np.zeros(len(x))
@@ -101,10 +102,7 @@ class Problem:
             step[fitted] = np.clip(step[fitted], low - x[fitted], high - x[fitted])
             for part in _PARTS:
                 there = x + part * step
-                try:
-                    new = float((self.residuals(there) ** 2).sum())
-                except RuntimeError:  # no equilibrium with these parameters
-                    continue
+                new = self._cost(there)
                 if new < cost:
                     break
             else:
@@ -113,6 +111,20 @@ class Problem:
             if gained < _SETTLED * cost:
                 return x
         return x
+
+    def _with_equilibrium(self, start: np.ndarray) -> np.ndarray:
+        """Return the first point on the way from `start` to x = 0 that has a prediction, else x = 0."""
+        return next((part * start for part in _PARTS if np.isfinite(self._cost(part * start))), np.zeros_like(start))
+
+    def _cost(self, x: np.ndarray) -> float:
+        """Return the sum of squares, infinite where there is no equilibrium; at x = 0 that raises RuntimeError."""
+        try:
+            return float((self.residuals(x) ** 2).sum())
+        except RuntimeError:
+            if not x.any():
+                raise
+            self._progress(f"evaluation {self.evaluations}: no equilibrium")
+            return np.inf
 
     def errors(self, x: np.ndarray) -> np.ndarray:
         """Return modelled minus measured tips (k, 3 or 6), position in m and direction."""
@@ -155,15 +167,28 @@ class Problem:
         return np.concatenate([np.column_stack(columns), self._prior])
 
     def _by(self, x: np.ndarray) -> np.ndarray:
-        """Return the derivatives (k, 6, u) of the tips by x; those of a point near enough serve as well."""
+        """Return the derivatives (k, 6, u) of the tips by x; those of a point near enough serve as well.
+
+        Where there are none, since shapes next to x have no equilibrium, those of the nearest point serve. Raises RuntimeError
+        if there is none.
+        """
         near = next((slopes for at, slopes in self._slopes if np.abs(at - x)[self._moduli].max() < _NEAR), None)
         if near is None:
-            kinds = {unknown.kind for unknown in self._unknowns}
-            found = self._predictor.differentiate(parameters_at(x, self._unknowns, self._initial), kinds)
-            near = np.stack([unknown.derivative(found) for unknown in self._unknowns], axis=2)
+            near = self._derivatives(x)
             self._slopes.append((x, near))
             self._progress(f"evaluation {self.evaluations}: derivatives")
         return near
+
+    def _derivatives(self, x: np.ndarray) -> np.ndarray:
+        """Return the derivatives as `_by`, computed at x where that is possible."""
+        kinds = {unknown.kind for unknown in self._unknowns}
+        try:
+            found = self._predictor.differentiate(parameters_at(x, self._unknowns, self._initial), kinds)
+        except RuntimeError:
+            if not self._slopes:
+                raise
+            return min(self._slopes, key=lambda known: float(np.linalg.norm(known[0] - x)))[1]
+        return np.stack([unknown.derivative(found) for unknown in self._unknowns], axis=2)
 
     def _scaled(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (k, 3 or 6) of positions and directions over their deviations, by their windows' weights."""

@@ -12,7 +12,8 @@ W_aa^-1, dtip/dc = -dtip/do lambda, dtip/dw = dtip/do u. All others are differen
 """
 
 import dataclasses
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,13 +99,17 @@ class StaticPredictor:
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
         """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.
 
-        They are those of a coarse mesh, which are right within a few per cent.
+        They are those of a coarse mesh, which are right within a few per cent; its own, where the coarse one has no equilibrium.
+        Raises RuntimeError if there is no equilibrium next to these parameters on either side.
         """
         if self._coarse is None:
             coarse = with_coarse_elements(self._robot)
             self._coarse = self if coarse == self._robot else StaticPredictor(coarse, self.windows, self._creep_times)
         if self._coarse is not self:
-            return self._coarse.differentiate(parameters, kinds)
+            try:
+                return self._coarse.differentiate(parameters, kinds)
+            except RuntimeError:
+                pass
         steps = self._walked(parameters)
         shown = [step for step in steps if step.window is not None]
         found = self._by_forces(parameters, shown) if kinds & _FORCES else {}
@@ -153,12 +158,19 @@ class StaticPredictor:
         self._set_tendons(parameters, np.stack([parameters.radius, parameters.angle]))
 
     def _set_tendons(self, parameters: StaticParameters, places: np.ndarray) -> None:
-        """Give the model cables at the places (2, m): radius and angle, as in `StaticParameters`."""
+        """Give the model cables at the places (2, m): radius and angle, as in `StaticParameters`.
+
+        Raises RuntimeError where a cable would leave the body: such a robot has no equilibrium either.
+        """
         key = self._key(places)
         if key not in self._tendons:
-            robot = with_cable_places(self._model.robot, *places)
             mesh = self._model.mesh
-            self._tendons[key] = Tendons(robot.cables, route_cables(robot, mesh), mesh.nodes, self._model.pattern)
+            try:
+                robot = with_cable_places(self._model.robot, *places)
+                routes = route_cables(robot, mesh)
+            except ValueError as error:
+                raise RuntimeError(str(error)) from error
+            self._tendons[key] = Tendons(robot.cables, routes, mesh.nodes, self._model.pattern)
             while len(self._tendons) > 6 * places.shape[1] + 2:
                 self._tendons.pop(next(iter(self._tendons)))
         self._model.tendons = tendons = self._tendons[key]
@@ -195,17 +207,15 @@ class StaticPredictor:
         """Return the difference quotients (k, 6, n) by a field, each from walks of its own near `steps`."""
         here, columns, step = np.array([step.tip for step in shown]), [], _STEPS[kind]
 
-        def moved(index: int, change: float) -> np.ndarray:
+        def quotients(index: int, change: float) -> np.ndarray:
             parameters_there = parameters.changed(kind, (index,), change)
             self._apply(parameters_there)
             walked = self._walk.run(self._inputs(parameters_there), parameters_there.creep, steps)
-            return np.array([one.tip for one in walked if one.window is not None])
+            return (np.array([one.tip for one in walked if one.window is not None]) - here) / change
 
         for index in range(parameters.count(kind)):
-            if kind in _CENTRAL:
-                columns.append((moved(index, step) - moved(index, -step)) / (2.0 * step))
-            else:
-                columns.append((moved(index, step) - here) / step)
+            quotient = functools.partial(quotients, index)
+            columns.append((_on_both_sides if kind in _CENTRAL else _on_either_side)(quotient, step))
         return np.stack(columns, axis=2)
 
     def _by_place(self, parameters: StaticParameters, kind: str, shown: list[Step]) -> np.ndarray:
@@ -216,16 +226,38 @@ class StaticPredictor:
             taut = [k for k, step in enumerate(shown) if step.tension[cable] > 0.0]
             if not taut:
                 continue
-            moved = parameters.changed(kind, (cable,), _STEPS[kind])
-            self._set_tendons(parameters, np.stack([moved.radius, moved.angle]))
-            for k in taut:
-                there = self._walk.near(inputs[k], shown[k])
-                result[k, :, cable] = (there - shown[k].tip) / _STEPS[kind]
+
+            def quotients(change: float, cable: int = cable, taut: list[int] = taut) -> np.ndarray:
+                moved = parameters.changed(kind, (cable,), change)
+                self._set_tendons(parameters, np.stack([moved.radius, moved.angle]))
+                return np.array([(self._walk.near(inputs[k], shown[k]) - shown[k].tip) / change for k in taut])
+
+            result[taut, :, cable] = _on_either_side(quotients, _STEPS[kind])
         return result
 
 
 _FORCES = {"modulus", "density", "payload", "mount"}
 _WALKED = ("modulus", "density", "payload", "mount", "creep", "friction")
+
+
+def _on_either_side(quotient: Callable[[float], np.ndarray], step: float) -> np.ndarray:
+    """Return the difference quotient of a step forwards; backwards, where there is no equilibrium. Raises RuntimeError."""
+    try:
+        return quotient(step)
+    except RuntimeError:
+        return quotient(-step)
+
+
+def _on_both_sides(quotient: Callable[[float], np.ndarray], step: float) -> np.ndarray:
+    """Return the mean of the quotients of both steps; of one, where the other has no equilibrium. Raises RuntimeError."""
+    try:
+        forwards = quotient(step)
+    except RuntimeError:
+        return quotient(-step)
+    try:
+        return 0.5 * (forwards + quotient(-step))
+    except RuntimeError:
+        return forwards
 
 
 def _with_branches(robot: Robot, times: tuple[float, ...]) -> Robot:

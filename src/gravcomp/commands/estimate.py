@@ -63,10 +63,10 @@ def run(args: argparse.Namespace) -> int:
         correction = calibrate_in_motion(recording) if args.calibrate else None
         if correction is not None:
             recording = calibrated(recording, correction)
-        if args.average > 1:
-            recording = without_rate_spikes(recording).averaged(args.average)
-        model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         options, mount = _of_robot(args.robot)
+        if args.average > 1:
+            recording = without_rate_spikes(recording, options.filter.spikes).averaged(args.average)
+        model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
         estimator = GravityEstimator(options, mount, model)
     except (BiasModelError, ValueError) as error:
         raise ConfigError(str(error)) from error

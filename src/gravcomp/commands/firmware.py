@@ -223,15 +223,14 @@ def _parameters(args: argparse.Namespace) -> int:
     from gravcomp.description.hardware import parse_hardware
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_settings import LoopParameters
-    from gravcomp.firmware.settings import settings_alone, settings_of
+    from gravcomp.firmware.settings import WITH_HOST, settings_alone, settings_of
 
     file = load_robot_file(args.robot)
     hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
     if len(hardware.all_buses) == 1:
         hardware = hardware.on(args.interface, args.channel)
     settings = settings_of(hardware, between=not args.one_bus)
-    if args.standalone:
-        settings |= settings_alone(LoopParameters.of(file).estimator.heater)
+    settings |= settings_alone(LoopParameters.of(file).estimator.heater) if args.standalone else WITH_HOST
     with BoardClient(hardware.board_bus, args.number) as client:
         client.configure(settings)
     output.result(

@@ -8,6 +8,9 @@ import yaml
 
 from gravcomp.config.errors import ConfigError
 
+_LARGEST = 10_000
+"""Characters that begin a value in another one, in a document for libyaml: a nesting of 100,000 overflows its stack."""
+
 
 class _StrictLoader(yaml.SafeLoader):
     """Refuses a key that is given twice; PyYAML silently keeps the last value."""
@@ -39,10 +42,13 @@ def load_yaml(path: str | Path) -> Any:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not a UTF-8 text file") from error
-    with contextlib.suppress(yaml.YAMLError):
-        return yaml.load(text, Loader=_FastLoader)
     try:
+        if sum(map(text.count, "[{-?:")) < _LARGEST:
+            with contextlib.suppress(yaml.YAMLError):
+                return yaml.load(text, Loader=_FastLoader)
         return yaml.load(text, Loader=_StrictLoader)
+    except RecursionError as error:
+        raise ConfigError(f"{path}: is nested too deeply") from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""

@@ -124,6 +124,10 @@ def settings_of(hardware: Hardware, *, between: bool) -> dict[str, float]:
     }
 
 
+WITH_HOST = {"at_start": 0, "heater_own": 0}
+"""Parameters of a board whose robot has a host: it does nothing by itself, also where it did before (`settings_alone`)."""
+
+
 def settings_alone(heater: HeaterOptions) -> dict[str, float]:
     """Return the parameters of a board whose robot has no host: it homes, runs its loop, and heats the IMU as the options say."""
     return {

@@ -3,9 +3,9 @@
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
 to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
-direction that loses most error for each unknown it adds is refined, until the sum is within `ACCURACY`; where no direction can be
-refined any more, the mesh with the least error so far is taken. The first direction is along the robot: under coarse layers the
-sections seem to be worse than they are, several times so where the stiffness jumps.
+direction that loses most error for the time that it adds to a step is refined, until the sum is within `ACCURACY`; where no
+direction can be refined any more, the mesh with the least error so far is taken. The first direction is along the robot: under
+coarse layers the sections seem to be worse than they are, several times so where the stiffness jumps.
 
 The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
 
@@ -35,7 +35,7 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 6  # part of the key; to be raised when the choice changes
+_FORMAT = 7  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -130,7 +130,7 @@ def _choose(robot: Robot) -> MeshChoice:
             if flat or tips.unknowns(finer) > _MOST_UNKNOWNS:  # not to be used, but the error has to be known
                 continue
             meshes[direction] = finer
-            gains[direction] = _largest(changes[direction]) / (tips.unknowns(finer) - tips.unknowns(here))
+            gains[direction] = _largest(changes[direction]) / (tips.cost(finer) - tips.cost(here))
             if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
         else:  # all directions are measured
@@ -172,6 +172,10 @@ class _Tips:
         if elements not in self._unknowns:
             self._unknowns[elements] = 3 * len(tube_mesh(dataclasses.replace(self._robot, elements=elements)).nodes)
         return self._unknowns[elements]
+
+    def cost(self, elements: Elements) -> float:
+        """Return a measure of the time of a step: unknowns times the square of those of a layer, as for a band's factor."""
+        return self.unknowns(elements) ** 3 / elements.along**2
 
     def finer(self, elements: Elements, direction: str) -> Elements | None:
         """Return the next mesh in a direction that has more unknowns and a good shape; None where there is none."""

@@ -67,9 +67,8 @@ def estimate_recording(
     )
 
 
-def without_rate_spikes(recording: Recording, options: SpikeOptions | None = None) -> Recording:
+def without_rate_spikes(recording: Recording, options: SpikeOptions) -> Recording:
     """Return the recording without single spikes of the rate, for what takes means of samples: a mean would hide them."""
-    options = options or SpikeOptions()
     review, gyro, longest = SpikeReview(options.gyro, options), recording.gyro.copy(), MISSED_PERIODS / recording.rate
     before = int(recording.stamp_ns[0])
     for i, (stamp_ns, rate, _) in enumerate(recording.samples()):

@@ -4,8 +4,8 @@ import numpy as np
 
 from gravcomp.stream_checks.finding import Block, Finding
 
-RATIO = 4.0  # of the usual change in the block
-USUAL = 90  # percentile: nine of ten changes are no spikes, and vibration that begins within a block is no row of spikes
+RATIO = 4.0  # of the usual change: the median of the changes around
+AROUND = 15  # changes; so few that vibration which begins within a block is no row of spikes
 SHARE = 0.005  # of the samples, from which spikes are a property of the stream
 
 
@@ -42,5 +42,6 @@ def spikes(values: np.ndarray, least: float) -> np.ndarray:
     change = np.diff(values, axis=0)
     into, out = change[:-1], -change[1:]
     peak = np.where(into * out > 0, np.minimum(abs(into), abs(out)), 0.0).max(axis=1)
-    usual = float(np.percentile(np.abs(change).max(axis=1), USUAL))
-    return np.concatenate([[False], peak > max(RATIO * usual, least), [False]])
+    around = np.pad(np.abs(change).max(axis=1), AROUND // 2, mode="edge")
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(around, AROUND), axis=1)
+    return np.concatenate([[False], peak > np.maximum(RATIO * np.maximum(usual[:-1], usual[1:]), least), [False]])

@@ -13,6 +13,7 @@ from gravcomp.view.controls import Controls
 from gravcomp.view.graphics import chosen
 from gravcomp.view.inset import Inset
 from gravcomp.view.options import PageOptions
+from gravcomp.view.origin import own_origin_only
 from gravcomp.view.plots import Plots
 from gravcomp.view.requests import Request
 from gravcomp.view.scene import Scene
@@ -34,7 +35,8 @@ class Page:
     def __init__(self, robot: Robot, options: PageOptions, shapes: "Sequence[ObstacleShape]" = ()) -> None:
         """shapes: of the obstacles around the robot."""
         port = free_port(options.host, options.port)
-        self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
+        with own_origin_only():
+            self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
         shown = "localhost" if options.host in ("127.0.0.1", "0.0.0.0", "::") else options.host
         self.address = f"http://{shown}:{self._server.get_port()}"
         self._names = robot.cable_names

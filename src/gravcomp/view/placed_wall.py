@@ -31,7 +31,6 @@ class WallHandle:
         """length, radius: of the robot, m."""
         self._frame, self._length, self._radius = frame, length, radius
         self.put: Callable[[Request], None] = lambda _: None
-        self._wanted: _Plane | None = None
         self._snapshot: Snapshot | None = None  # live, of a virtual robot
         self._grabbed: tuple[int, np.ndarray, _Plane] | None = None  # browser, place, the wall then
         vertices, faces = plane_patch(patch_side(length))
@@ -47,6 +46,7 @@ class WallHandle:
             "/robot/placed_wall_rings", scale=SCALE * 0.22 * length, disable_axes=True, disable_sliders=True,
             depth_test=False, opacity=0.85, visible=False)  # fmt: skip
         self._turning = False
+        self._turned_by: int | None = None  # browser
         self._patch.on_drag("left")(self._on_drag)
         self._rings.on_update(self._on_turn)
 
@@ -61,7 +61,7 @@ class WallHandle:
 
     def take_away(self) -> None:
         """Take the wall away."""
-        self._wanted = self._grabbed = None
+        self._grabbed = self._turned_by = None
         self.put(PlaceWall(None))
 
     def show_rings(self, visible: bool) -> None:
@@ -69,9 +69,11 @@ class WallHandle:
         self._turning = visible
 
     def let_go(self, browser: int) -> None:
-        """Let go if this browser drags the wall."""
+        """Let go if this browser drags or turns the wall."""
         if self._grabbed is not None and self._grabbed[0] == browser:
             self._grabbed = None
+        if self._turned_by == browser:
+            self._turned_by = None
 
     def show(self, snapshot: Snapshot, live: bool) -> None:
         """Draw the wall of a snapshot; live: it can be moved."""
@@ -79,14 +81,15 @@ class WallHandle:
         plane = snapshot.wall
         self._patch.visible = plane is not None
         self._rings.visible = plane is not None and self._turning and self._snapshot is not None
+        if not self._rings.visible:
+            self._turned_by = None
         if plane is None:
             return
         foot = plane_foot(plane[1], plane[0], np.array([0.0, 0.0, self._length / 2]))
         self._patch.position, self._patch.wxyz = SCALE * foot, _turned(plane[1])
-        if self._wanted is None:  # put there by another program
-            self._wanted = plane
-        if not self._rings.visible or self._grabbed is None:
-            self._rings.position = SCALE * foot
+        self._rings.position = SCALE * foot
+        if self._turned_by is None:  # else the wall follows the rings, at its own speed
+            self._rings.wxyz = _turned(plane[1])
 
     def _normal(self, side: str, snapshot: Snapshot) -> np.ndarray:
         axis, up = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -104,24 +107,29 @@ class WallHandle:
         if np.isfinite(point).all() and np.isfinite(normal).all():
             largest = -self._radius * float(np.hypot(normal[0], normal[1]))
             point = point + min(0.0, largest - float(normal @ point)) * normal
-        self._wanted = point, normal
         self.put(PlaceWall((_triple(point), _triple(normal))))
 
     async def _on_drag(self, event: viser.SceneNodeDragEvent) -> None:
         # Not a plain function: viser calls these in order.
         if event.phase == "end":
             self.let_go(event.client_id)
-        elif self._snapshot is None or self._wanted is None:
+        elif self._snapshot is None or self._snapshot.wall is None:
             return
         elif event.phase == "start" and self._grabbed is None:
-            self._grabbed = event.client_id, self._frame.place(event.start_position), self._wanted
+            self._grabbed = event.client_id, self._frame.place(event.start_position), self._snapshot.wall
         if self._grabbed is not None and self._grabbed[0] == event.client_id:
             _, start, (point, normal) = self._grabbed
             way = float((self._frame.place(event.end_position) - start) @ normal)
             self._want(point + way * normal, normal)
 
-    def _on_turn(self, event: viser.TransformControlsEvent) -> None:
-        if event.client is None or event.phase != "update" or self._snapshot is None or self._wanted is None:
+    async def _on_turn(self, event: viser.TransformControlsEvent) -> None:
+        # Not a plain function, as above.
+        if event.phase == "end" and event.client_id is not None:
+            self.let_go(event.client_id)
+        if event.client is None or event.phase == "end" or self._snapshot is None or self._snapshot.wall is None:
+            return
+        self._turned_by = event.client_id
+        if event.phase == "start":
             return
         w, x, y, z = np.asarray(self._rings.wxyz, dtype=float)
         self._want(np.asarray(self._rings.position, dtype=float) / SCALE, rotations(np.array([[x, y, z, w]]))[0][:, 2])
