@@ -11,13 +11,23 @@ import pytest
 from test_estimate_command import write_trial
 
 from gravcomp import __version__
-from gravcomp.commands import COMMANDS
+from gravcomp.commands import COMMANDS, output
 from gravcomp.commands.__main__ import main
 from gravcomp.commands.completion import script
 from gravcomp.commands.parsers import EXIT_CODES, parser_of
 from gravcomp.commands.version import version_text
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def own_options():
+    """Each test begins without the options of another's command."""
+    output.configure(json=False, quiet=False)
+    yield
+    output.configure(json=False, quiet=False)
+
+
 PACKAGES = ("src", "gravcomp_msgs", "gravcomp_node", "gravcomp_hw", "gravcomp_estimation", "gravcomp_fem")
 
 
