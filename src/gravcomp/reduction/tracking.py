@@ -59,11 +59,13 @@ class ReducedTracker:
         """Start from the straight robot of `length` m.
 
         tolerance, longest_step, near (largest step whose factor may decide on convergence) and calm (largest step that leads near
-        enough to an equilibrium for the stiffness there) are displacements of the tip as fractions of the length.
+        enough to an equilibrium for the stiffness there) are displacements of the tip as fractions of the length. A body whose
+        elasticity is quadratic in the strain is always calm: its strains leave out the stretch of a straight step.
         """
         self.model = model
-        self._limits = longest_step * length, near * length, tolerance * length, calm * length
         self._body = body_of(model)
+        calm = calm * length if len(self._body.deviation.weight) else np.inf
+        self._limits = longest_step * length, near * length, tolerance * length, calm
         self._kept = kept_stiffness(model)
         self._has_friction = bool(model.cables.friction.any())
         self._no_offset = np.zeros(model.elasticity.linear.shape[1])
