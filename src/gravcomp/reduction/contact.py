@@ -201,8 +201,6 @@ def tracked_touching(
         sections = rest + (change @ q).reshape(stations, 3, 3)
         before = share * size
         reuse = not rough and before < _SHORT * longest_step
-        if rough:
-            forget(kept)
         if rough or not settled or size >= near:
             continue
         out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
@@ -220,6 +218,7 @@ def tracked_touching(
         break
     if not converged:
         point = start
+        forget(kept)
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     touched = pressed_places(touching.scene, touching.surface, places, forces, sections)
     return converged, point, q, tension, displacement, compliance, answer, residual, places, forces, held, pressing, touched

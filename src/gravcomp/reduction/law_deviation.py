@@ -51,7 +51,7 @@ class KeptStiffness(NamedTuple):
 
     The deviation is a small part of the stiffness and changes little over such a distance, and so do Newton's steps and the
     compliance. The force, and with it the equilibrium, does not depend on it. lower (r, r): triangle; q (r,): where it was
-    computed, NaN: nowhere yet. Both are written by `near_stiffness`.
+    computed, NaN: nowhere. Both are written by `near_stiffness`; `forget` empties it.
     """
 
     lower: np.ndarray

@@ -188,8 +188,6 @@ def _tracked(
         if iteration:  # with that of another shape the steps may not come to an end
             forget(kept)
         matrix = elastic_stiffness(body, point, q, stress, scale, kept)
-        if before > calm:
-            forget(kept)
         add_stiffness(cables, point.tendons, tension, matrix)
         definite, factor = factorise(matrix)
         if not definite:
@@ -226,5 +224,6 @@ def _tracked(
         before = share * size
     if not converged:
         point = start
+        forget(kept)  # it may be that of a shape without meaning
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     return converged, point, q, tension, displacement, compliance, answer, residual
