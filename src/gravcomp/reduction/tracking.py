@@ -26,6 +26,10 @@ from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
 
+# Displacements of the tip as fractions of the length: the longest step, the largest one whose factor may decide on convergence,
+# what may be left then, and the largest step that leads near enough to an equilibrium for the stiffness there.
+_LONGEST_STEP, _NEAR, _TOLERANCE, _CALM = 0.05, 0.02, 5e-5, 5e-4
+
 
 @dataclass
 class ReducedState:
@@ -47,25 +51,13 @@ class ReducedState:
 class ReducedTracker:
     """Tracks the equilibrium of a reduced model. Owns the current `state`, and the `sliding` of the cables."""
 
-    def __init__(
-        self,
-        model: ReducedModel,
-        length: float,
-        tolerance: float = 5e-5,
-        longest_step: float = 0.05,
-        near: float = 0.02,
-        calm: float = 5e-4,
-    ):
-        """Start from the straight robot of `length` m.
-
-        tolerance, longest_step, near (largest step whose factor may decide on convergence) and calm (largest step that leads near
-        enough to an equilibrium for the stiffness there) are displacements of the tip as fractions of the length. A body whose
-        elasticity is quadratic in the strain is always calm: its strains leave out the stretch of a straight step.
-        """
+    def __init__(self, model: ReducedModel, length: float):
+        """Start from the straight robot of `length` m."""
         self.model = model
         self._body = body_of(model)
-        calm = calm * length if len(self._body.deviation.weight) else np.inf
-        self._limits = longest_step * length, near * length, tolerance * length, calm
+        # A body whose elasticity is quadratic in the strain is always calm: its strains leave out the stretch of a straight step.
+        calm = _CALM * length if len(self._body.deviation.weight) else np.inf
+        self._limits = _LONGEST_STEP * length, _NEAR * length, _TOLERANCE * length, calm
         self._kept = kept_stiffness(model)
         self._has_friction = bool(model.cables.friction.any())
         self._no_offset = np.zeros(model.elasticity.linear.shape[1])
