@@ -55,23 +55,35 @@ def installed() -> str | None:
 
 
 def solve(mesh: Mesh, inclination: float) -> np.ndarray:
-    """Return the displacement (3,) in m of the end face of a 'hex20' mesh of one material, on the axis.
+    """Return the displacement (3,) in m of the end face of a 'hex20' mesh of one material, see `end_face`.
 
-    It is that of the plane fitted to the face's nodes; with a symmetric section it is the nodes' mean. Raises RuntimeError, and
-    ValueError for a law that CalculiX does not have in the same form.
+    Raises RuntimeError, and ValueError for a law that CalculiX does not have in the same form.
     """
+    return end_face(mesh, printed(deck(mesh, inclination)))
+
+
+def printed(text: str) -> str:
+    """Return what CalculiX prints to its .dat file for an input file. Raises RuntimeError."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "tube.inp").write_text(deck(mesh, inclination), encoding="ascii")
+        (Path(folder) / "case.inp").write_text(text, encoding="ascii")
         try:
-            done = subprocess.run([installed() or "ccx", "-i", "tube"], cwd=folder, capture_output=True, text=True, timeout=600)
+            done = subprocess.run([installed() or "ccx", "-i", "case"], cwd=folder, capture_output=True, text=True, timeout=600)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise RuntimeError(f"CalculiX did not run: {error}") from error
-        output = Path(folder) / "tube.dat"
+        output = Path(folder) / "case.dat"
         if done.returncode != 0 or not output.exists():
             raise RuntimeError(f"CalculiX ended with code {done.returncode}: {done.stdout.strip()[-200:]}")
-        tip = np.sort(mesh.tip)  # CalculiX prints a set in the order of the numbers
-        moved = last_displacements(output.read_text())
-        return np.linalg.lstsq(np.column_stack([np.ones(len(tip)), mesh.nodes[tip, :2]]), moved, rcond=None)[0][0]
+        return output.read_text()
+
+
+def end_face(mesh: Mesh, output: str) -> np.ndarray:
+    """Return the last displacement (3,) in m of the end face on the axis. Raises RuntimeError if there is none.
+
+    It is that of the plane fitted to the face's nodes; with a symmetric section it is the nodes' mean.
+    """
+    tip = np.sort(mesh.tip)  # CalculiX prints a set in the order of the numbers
+    moved = last_displacements(output)
+    return np.linalg.lstsq(np.column_stack([np.ones(len(tip)), mesh.nodes[tip, :2]]), moved, rcond=None)[0][0]
 
 
 def deck(mesh: Mesh, inclination: float) -> str:
