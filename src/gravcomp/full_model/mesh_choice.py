@@ -27,8 +27,7 @@ from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, me
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.mesh.layers import least_layers, softest
 from gravcomp.mesh.mesh import MeshError
-from gravcomp.mesh.quality import mesh_quality
-from gravcomp.mesh.refusal import LEAST_JACOBIAN_RATIO, well_shaped
+from gravcomp.mesh.refusal import is_well_shaped, well_shaped
 from gravcomp.mesh.tube import coarse_elements, tube_mesh
 from gravcomp.whole_file import write_whole
 
@@ -182,7 +181,7 @@ class _Tips:
         here = elements
         while (finer := _finer(self._robot, here, direction)) != here:
             if self.unknowns(finer) > self.unknowns(elements):
-                return finer if _is_well_shaped(self._robot, finer) else None
+                return finer if is_well_shaped(self._robot, finer) else None
             here = finer
         return None
 
@@ -230,15 +229,9 @@ def _graded(robot: Robot, elements: Elements) -> Elements:
     """The well-shaped elements with the grading that suits them, where needed more along the robot; else without it."""
     for more in (1.0, 1.5, 2.0, 3.0):
         graded = with_grading(robot, dataclasses.replace(elements, along=min(round(more * elements.along), 500)))
-        if _is_well_shaped(robot, graded):
+        if is_well_shaped(robot, graded):
             return graded
     return elements
-
-
-def _is_well_shaped(robot: Robot, elements: Elements) -> bool:
-    """Whether a mesh with these elements would not be refused."""
-    mesh = tube_mesh(dataclasses.replace(robot, elements=elements))
-    return mesh_quality(mesh).jacobian_ratio >= LEAST_JACOBIAN_RATIO
 
 
 def _softness(robot: Robot) -> float:

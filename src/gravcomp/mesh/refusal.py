@@ -8,19 +8,19 @@ from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.quality import mesh_quality
 from gravcomp.mesh.tube import tube_mesh
 
-LEAST_JACOBIAN_RATIO = 0.2
+_LEAST_RATIO = 0.2
 
 
 def require_well_shaped(robot: Robot, elements: Elements, mesh: Mesh) -> None:
     """Raise MeshError when the smallest Jacobian ratio of the mesh, made with `elements`, is below 0.2."""
     ratio = mesh_quality(mesh).jacobian_ratio
-    if ratio >= LEAST_JACOBIAN_RATIO:
+    if ratio >= _LEAST_RATIO:
         return
     better = well_shaped(robot, elements)
     advice = f"{_text(better)} would do" if better else "no number of elements up to 4 x as fine does better"
     raise MeshError(
         f"robot '{robot.name}': elements {_text(elements)} have a smallest Jacobian ratio of {ratio:.2g}; allowed: at least"
-        f" {LEAST_JACOBIAN_RATIO:g}. {advice[0].upper()}{advice[1:]}; without `elements` well-shaped ones are used"
+        f" {_LEAST_RATIO:g}. {advice[0].upper()}{advice[1:]}; without `elements` well-shaped ones are used"
     )
 
 
@@ -34,9 +34,14 @@ def well_shaped(robot: Robot, elements: Elements) -> Elements | None:
             radial=min(elements.radial + radial, 8),
             around=min(around * elements.around, 48),
         )
-        if mesh_quality(tube_mesh(dataclasses.replace(robot, elements=candidate))).jacobian_ratio >= LEAST_JACOBIAN_RATIO:
+        if is_well_shaped(robot, candidate):
             return candidate
     return None
+
+
+def is_well_shaped(robot: Robot, elements: Elements) -> bool:
+    """Return whether the mesh of the robot with these elements is not refused."""
+    return mesh_quality(tube_mesh(dataclasses.replace(robot, elements=elements))).jacobian_ratio >= _LEAST_RATIO
 
 
 def _text(elements: Elements) -> str:
