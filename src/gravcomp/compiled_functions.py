@@ -111,23 +111,19 @@ def _origin(module: str, name: str, sources: dict[str, Source]) -> str | None:
     return module
 
 
+@functools.cache
 def _sources() -> dict[str, Source]:
     """Return all modules of the package by name, remembered as long as the files do not change."""
-    return _read_sources(PACKAGE)
-
-
-@functools.lru_cache(maxsize=1)
-def _read_sources(package: Path) -> dict[str, Source]:
-    memory = cache_folder("numba") / f"modules-{content_key(str(package))}.json"
+    memory = cache_folder("numba") / f"modules-{content_key(str(PACKAGE))}.json"
     try:
         known = {name: Source(**entry) for name, entry in json.loads(memory.read_text()).items()}
     except (OSError, ValueError, TypeError):
         known = {}
     current = {}
-    for path in package.rglob("*.py"):
+    for path in PACKAGE.rglob("*.py"):
         status = path.stat()
         stamp = [status.st_mtime_ns, status.st_size]
-        parts = ["gravcomp", *path.relative_to(package).with_suffix("").parts]
+        parts = ["gravcomp", *path.relative_to(PACKAGE).with_suffix("").parts]
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
         before = known.get(name)
         current[name] = before if before and before.stamp == stamp else _read(path.read_bytes(), stamp)
@@ -145,7 +141,7 @@ def _read(source: bytes, stamp: list[int]) -> Source:
     return Source(stamp, digest(source, compiled), compiled, b"NamedTuple" in source, imported)
 
 
-def digest(source: bytes, compiled: bool = True) -> str:
+def digest(source: bytes, compiled: bool) -> str:
     """Return a digest of the code in a module; comments, docstrings and the layout of a compiled one do not count."""
     if not compiled:
         return content_key(source)

@@ -36,7 +36,7 @@ def package(tmp_path, monkeypatch):
         path = tmp_path / "package" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-        compiled_functions._read_sources.cache_clear()
+        compiled_functions._sources.cache_clear()
         return compiled_functions.module_folder(
             "gravcomp.compiled" if (tmp_path / "package/compiled.py").exists() else "gravcomp"
         )
@@ -44,7 +44,7 @@ def package(tmp_path, monkeypatch):
     (tmp_path / "package").mkdir()
     write("", "__init__")
     yield write
-    compiled_functions._read_sources.cache_clear()
+    compiled_functions._sources.cache_clear()
 
 
 BEFORE = "import numba\nfrom gravcomp.parts import LIMIT, called\ndef f(x):\n    return x + 1"
@@ -138,8 +138,8 @@ def targets(assignment):
 def test_the_digests_of_unchanged_files_are_remembered(tmp_path, monkeypatch):
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    compiled_functions._read_sources.cache_clear()
+    compiled_functions._sources.cache_clear()
     folder = compiled_functions.compiled_folder()
-    compiled_functions._read_sources.cache_clear()
+    compiled_functions._sources.cache_clear()
     monkeypatch.setattr(compiled_functions, "digest", lambda *source: pytest.fail("a file was read again"))
     assert compiled_functions.compiled_folder() == folder
