@@ -62,7 +62,6 @@ def build(
     """
     options = options or BuildOptions()
     started = time.perf_counter()
-    _require_reducible(model)
     kept = path_of(model).with_suffix(".training") / content_key(options.training)
     reduction = trained(model, options, progress, kept)
     unseen = samples(model, options.test, lambda share: progress("testing", share))
@@ -87,7 +86,9 @@ def trained(
 
     kept: folder in which the samples of each path are stored until the end. Raises MeshError as `build` does.
     """
-    _require_reducible(model)
+    reason = why_not(model)
+    if reason:
+        raise MeshError(reason)
     found = samples(model, options.training, lambda share: progress("training", share), kept)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     if len(found) < modes:
@@ -121,12 +122,6 @@ def trained(
         error_median=np.nan,
         error_worst=np.nan,
     )
-
-
-def _require_reducible(model: RobotModel) -> None:
-    reason = why_not(model)
-    if reason:
-        raise MeshError(reason)
 
 
 def evenly(rows: np.ndarray, count: int) -> np.ndarray:
