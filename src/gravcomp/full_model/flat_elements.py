@@ -24,10 +24,9 @@ def with_grading(robot: Robot, elements: Elements) -> Elements:
 
     A slender body gets a first layer as thick as that, as its layers stay thicker whatever their grading.
     """
-    if _first(robot, dataclasses.replace(elements, along=_SLENDER), _STRONGEST) > _FLATTEST * _width(robot, _COARSE):
-        thickness = float(f"{_FLATTEST * _width(robot, elements):.3g}")
-        return dataclasses.replace(elements, grading=1.0, first_layer=thickness)
     thinnest = _FLATTEST * _width(robot, elements)
+    if _first(robot, dataclasses.replace(elements, along=_SLENDER), _STRONGEST) > _FLATTEST * _width(robot, _COARSE):
+        return dataclasses.replace(elements, grading=1.0, first_layer=float(f"{thinnest:.3g}"))
     low, high = 1.0, _STRONGEST
     if _first(robot, elements, high) >= thinnest:
         return dataclasses.replace(elements, grading=high)
