@@ -106,7 +106,7 @@ class Segment:
         return Outline(s.shape, width / 2, height / 2)
 
     def hole_of_disks(self, part: float) -> Outline:
-        """Return the outline of the backbone where a disk holds it."""
+        """Return the outline of the backbone where a disk holds it, at `part` of the length: of a spring its own."""
         return Outline.circle(self.outer_diameter) if self.spring is not None else self.outline(part)
 
     def lumen_outlines(self, part: float) -> tuple[Outline, ...]:
