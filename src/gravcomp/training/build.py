@@ -82,7 +82,7 @@ def trained(
     progress: Callable[[str, float], None] = lambda stage, share: None,
     kept: Path | None = None,
 ) -> Reduction:
-    """Return the model's reduction from shapes of the full model, without its errors; nothing is stored.
+    """Return the model's reduction from shapes of the full model, without its errors; it is not stored.
 
     kept: folder in which the samples of each path are stored until the end. Raises MeshError as `build` does.
     """
