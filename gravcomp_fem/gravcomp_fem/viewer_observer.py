@@ -4,7 +4,7 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseArray, PoseStamped, Vector3
+from geometry_msgs.msg import PoseArray, PoseStamped
 from gravcomp_node.polled import Polled, Received
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -14,7 +14,7 @@ from gravcomp.inverse import Holdable, TargetError
 from gravcomp.view.backbone import arc_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
-from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target
+from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target, vector_of
 from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, LATCHED
 
@@ -76,15 +76,15 @@ class GraphObserver:
         if deformation:
             d = deformation.message
             shown.update(
-                backbone=backbone_of(d), gravity=np.array([d.gravity.x, d.gravity.y, d.gravity.z]),
+                backbone=backbone_of(d), gravity=vector_of(d.gravity),
                 tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
                 model=d.model, model_time=d.solve_time)  # fmt: skip
             shown.update(model_touches=self._model_touches(d))
         forces, load = self._current("forces"), self._current("load")
         if forces:
             shown.update(virtual_touches=_touches(forces.message), wall=_wall(forces.message))
-        if load and deformation and np.isfinite(_vector(load.message.wrench.force)).all():
-            place, force = shown["backbone"].tip, _vector(load.message.wrench.force)
+        if load and deformation and np.isfinite(vector_of(load.message.wrench.force)).all():
+            place, force = shown["backbone"].tip, vector_of(load.message.wrench.force)
             variance = np.trace(np.reshape(load.message.covariance, (6, 6))[:3, :3])
             shown.update(load=Touch("estimated", place, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
         if motors:
@@ -125,7 +125,7 @@ class GraphObserver:
         if self._walls is None or not message.contact_obstacle:
             return ()
         places = np.array(message.contact_position).reshape(-1, 3)
-        return model_touches(self._walls, _vector(message.gravity), message.contact_obstacle, message.contact_force, places)
+        return model_touches(self._walls, vector_of(message.gravity), message.contact_obstacle, message.contact_force, places)
 
     def _delays(self) -> dict[str, float]:
         """Return s from the IMU sample to the message of each stage."""
@@ -164,19 +164,15 @@ class GraphObserver:
             return  # the controller refuses it and reports it
 
 
-def _vector(message: Point | Vector3) -> np.ndarray:
-    return np.array([message.x, message.y, message.z])
-
-
 def _touches(message: VirtualForces) -> tuple[Touch, ...]:
     return tuple(
-        Touch(source, _vector(place), _vector(force))
+        Touch(source, vector_of(place), vector_of(force))
         for source, place, force in zip(message.source, message.position, message.force)
     )
 
 
 def _wall(message: VirtualForces) -> tuple[np.ndarray, np.ndarray] | None:
-    return (_vector(message.wall_point), _vector(message.wall_normal)) if message.has_wall else None
+    return (vector_of(message.wall_point), vector_of(message.wall_normal)) if message.has_wall else None
 
 
 def _status_text(status: ControllerStatus) -> str:
