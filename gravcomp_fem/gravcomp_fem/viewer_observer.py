@@ -39,9 +39,9 @@ _CLOCK_TOLERANCE = 10.0  # s
 
 
 class GraphObserver:
-    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it."""
+    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it; None: it has none."""
 
-    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None" = None):
+    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None"):
         self._node, self._length, self._walls = node, length, walls
         self._streams = {
             "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
