@@ -14,7 +14,7 @@ from gravcomp.inverse import Holdable, TargetError
 from gravcomp.view.backbone import arc_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
-from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target, vector_of
+from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
 from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, LATCHED
 
@@ -83,10 +83,10 @@ class GraphObserver:
         forces, load = self._current("forces"), self._current("load")
         if forces:
             shown.update(virtual_touches=_touches(forces.message), wall=_wall(forces.message))
-        if load and deformation and np.isfinite(vector_of(load.message.wrench.force)).all():
-            place, force = shown["backbone"].tip, vector_of(load.message.wrench.force)
+        backbone = shown.get("backbone")  # None also where that of a message is not valid
+        if load and backbone and np.isfinite(force := vector_of(load.message.wrench.force)).all():
             variance = np.trace(np.reshape(load.message.covariance, (6, 6))[:3, :3])
-            shown.update(load=Touch("estimated", place, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
+            shown.update(load=Touch("estimated", backbone.tip, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
         if motors:
             m = motors.message
             shown.update(
@@ -121,11 +121,14 @@ class GraphObserver:
         return received if name == "status" or time.time_ns() - received.sent < _STALE * 1e9 else None
 
     def _model_touches(self, message: Deformation) -> tuple[Touch, ...]:
-        """Return the forces of walls on the model; none where this node does not know the walls."""
+        """Return the forces of walls on the model; none where this node does not know the walls, or the message is not valid."""
         if self._walls is None or not message.contact_obstacle:
             return ()
-        places = np.array(message.contact_position).reshape(-1, 3)
-        return model_touches(self._walls, vector_of(message.gravity), message.contact_obstacle, message.contact_force, places)
+        try:
+            contact = contact_of(message)
+        except ValueError:
+            return ()  # the controller refuses it and reports it
+        return model_touches(self._walls, vector_of(message.gravity), contact.names, contact.force, contact.position)
 
     def _delays(self) -> dict[str, float]:
         """Return s from the IMU sample to the message of each stage."""
