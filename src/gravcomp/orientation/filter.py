@@ -10,7 +10,6 @@ velocity is about zero', because the sensor moves but stays near one place; at r
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,10 +19,9 @@ from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.guard import REJECTED, RESTARTED, Problem, SampleGuard, Verdict
+from gravcomp.orientation.last_steps import LastSteps, Step
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector, agrees
-from gravcomp.orientation.spike_review import AHEAD, SpikeReview
-from gravcomp.orientation.spikes import SpikeGate
 
 START_TILT_STD = math.radians(5.0)  # of one accelerometer sample taken for gravity; larger where |a| differs from g
 START_YAW_STD = math.radians(0.1)  # yaw is zero by definition
@@ -34,10 +32,6 @@ UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer measures nothing
 CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those of a stuck sensor, not of a sensor at rest
 # Between the mean specific force at rest and the filter's gravity: a larger angle is more than a calibration error explains.
 CONTRADICTED_TILT = math.radians(2.0)
-# Of the threshold of a spike: an angle lacks for good what a wrong spike removes, a velocity is corrected all the time.
-SURE_GYRO, SURE_ACCEL = 1.5, 1.0
-PATIENCE_GYRO = 2.0  # its review finds what the gate overlooks; a wrong suspicion costs samples in fast motion
-_RATE, _FORCE = 2, 3  # places in a step
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -55,12 +49,7 @@ class OrientationFilter:
         self._guard = SampleGuard(self.options.sensor)
         self._even = EvenSteps()
         self._rest = RestDetector(self.options.rest)
-        spikes = self.options.spikes
-        self._gyro_gate = SpikeGate(spikes.gyro, spikes, SURE_GYRO, PATIENCE_GYRO)
-        self._accel_gate = SpikeGate(spikes.accel, spikes, SURE_ACCEL)
-        self._review = SpikeReview(spikes.gyro, spikes)
-        # The last steps, which a decision about a spike may change: state before the step, and its arguments.
-        self._steps: deque[list] = deque(maxlen=max(AHEAD, spikes.longest))
+        self._steps = LastSteps(self.options.spikes)
         self._errors = ErrorCovariance()
         self.reset()
 
@@ -77,7 +66,7 @@ class OrientationFilter:
         self._gravity_norm = self.options.gravity
         self._accel_norm_at_rest: float | None = None
         self._errors.reset(np.zeros((9, 9)))
-        self._forget_suspects()
+        self._steps.reset()
         self.reset_bias()
 
     def reset_bias(self, bias: Sequence[float] = (0.0, 0.0, 0.0), std: float | None = None) -> None:
@@ -87,14 +76,14 @@ class OrientationFilter:
         """
         self._bias = (float(bias[0]), float(bias[1]), float(bias[2]))
         self._bias_given = std is not None
-        self._steps.clear()
+        self._steps.forget()
         self._rest.reset()
         self._errors.set_bias_std(self.options.bias_initial if std is None else std)
 
     def set_bias_estimation(self, on: bool) -> None:
         """Switch the estimation of the bias on or off while running; off, the bias keeps its value and its uncertainty."""
         self.bias_estimation = on
-        self._steps.clear()
+        self._steps.forget()
         self._errors.decouple_bias()
 
     def update(self, stamp_ns: int, gyro: Sequence[float], accel: Sequence[float]) -> Estimate | Problem:
@@ -111,22 +100,27 @@ class OrientationFilter:
         if not self._started or verdict.problem in RESTARTED:
             self._start(rate, force, verdict.dt)
             self._even.reset()
-            self._forget_suspects()
+            self._steps.reset()
             return self._estimate(stamp_ns, rate, False, verdict.problem)
 
-        dt = self._even.take(verdict.dt)
-        gyro_usable, accel_usable = self._usable(verdict)
-        rate, force = self._without_spikes(dt, rate, force, gyro_usable, accel_usable)
-        self._steps.append([self._saved(), dt, rate, force, gyro_usable, accel_usable])
-        resting = self._advance(dt, rate, force, gyro_usable, accel_usable)
+        step = Step(self._even.take(verdict.dt), rate, force, *self._usable(verdict))
+        repeated = self._steps.take(step, gap=self._period > 0.0 and step.dt > MISSED_PERIODS * self._period)
+        if repeated:
+            self._restore(repeated[0][0])
+            for _, earlier in repeated:
+                self._steps.keep(self._saved(), earlier)
+                self._advance(earlier)
+        self._steps.keep(self._saved(), step)
+        resting = self._advance(step)
         if resting is None:
-            self._forget_suspects()
-            return self._estimate(stamp_ns, rate, False, Problem.CONTRADICTED)
-        return self._estimate(stamp_ns, rate if gyro_usable else self._bias, resting, verdict.problem)
+            self._steps.reset()
+            return self._estimate(stamp_ns, step.rate, False, Problem.CONTRADICTED)
+        return self._estimate(stamp_ns, step.rate if step.gyro_usable else self._bias, resting, verdict.problem)
 
-    def _advance(self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool) -> bool | None:
-        """Take a sample into the state. Return whether the sensor rests, None where its rest contradicts the inclination."""
-        if gyro_usable and accel_usable:
+    def _advance(self, step: Step) -> bool | None:
+        """Take a step into the state. Return whether the sensor rests, None where its rest contradicts the inclination."""
+        dt, rate, force = step.dt, step.rate, step.force
+        if step.gyro_usable and step.accel_usable:
             deviation = self._errors.bias_std()
             if self._bias_given:
                 resting = self._first_rest(dt, rate, force, deviation)
@@ -141,57 +135,12 @@ class OrientationFilter:
         else:
             self._rest.reset()
             resting = False
-        self._predict(dt, rate, force, gyro_usable, accel_usable)
-        if accel_usable:
+        self._predict(dt, rate, force, step.gyro_usable, step.accel_usable)
+        if step.accel_usable:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
             self._learn_gravity(dt)
         return resting
-
-    def _without_spikes(
-        self, dt: float, rate: quat.Vector, force: quat.Vector, gyro_usable: bool, accel_usable: bool
-    ) -> tuple[quat.Vector, quat.Vector]:
-        """Return rate and specific force without spikes; repeat the steps since the first one for which another value counts."""
-        changed = 0  # number of the steps to repeat
-        used_rate, used_force = rate, force
-        if gyro_usable:
-            used_rate, counted = self._gyro_gate.take(dt, rate)
-            for age in range(1, min(len(counted), AHEAD - 1) + 1):  # older ones are decided by the review
-                changed = max(changed, self._count(age, _RATE, counted[-age]))
-            if self._period and dt > MISSED_PERIODS * self._period:
-                self._review.reset()
-            decided = self._review.take(dt, rate)
-            if decided is not None:
-                changed = max(changed, self._count(AHEAD, _RATE, decided))
-        else:
-            self._gyro_gate.reset()
-            self._review.reset()
-        if accel_usable:
-            used_force, counted = self._accel_gate.take(dt, force)
-            for age, value in enumerate(reversed(counted), 1):
-                changed = max(changed, self._count(age, _FORCE, value))
-        else:
-            self._accel_gate.reset()
-        if changed:
-            steps = [self._steps.pop() for _ in range(changed)]
-            self._restore(steps[-1][0])
-            for _, *arguments in reversed(steps):
-                self._steps.append([self._saved(), *arguments])
-                self._advance(*arguments)
-        return used_rate, used_force
-
-    def _count(self, age: int, place: int, value: quat.Vector) -> int:
-        """Let the value count in the step `age` samples ago. Return how many steps have to be repeated."""
-        if age > len(self._steps) or self._steps[-age][place] == value:
-            return 0
-        self._steps[-age][place] = value
-        return age
-
-    def _forget_suspects(self) -> None:
-        self._gyro_gate.reset()
-        self._accel_gate.reset()
-        self._review.reset()
-        self._steps.clear()
 
     def _saved(self) -> tuple:
         """Return the state that steps change, for `_restore`."""
