@@ -9,11 +9,8 @@ import numpy as np
 
 from gravcomp.contact.condensed import SLIDING, contact_forces
 from gravcomp.contact.contacts import Contacts
-from gravcomp.contact.places import (
-    Places,
+from gravcomp.contact.place_forces import (
     Pressed,
-    all_gaps,
-    find_places,
     forces_at,
     pressed_places,
     remember,
@@ -22,6 +19,7 @@ from gravcomp.contact.places import (
     turning,
     yielding,
 )
+from gravcomp.contact.places import Places, all_gaps, find_places
 from gravcomp.contact.surface import contact_surface
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium

@@ -12,11 +12,8 @@ from numba import njit
 
 from gravcomp.contact.condensed import contact_forces
 from gravcomp.contact.contacts import Contacts
-from gravcomp.contact.places import (
-    Places,
+from gravcomp.contact.place_forces import (
     Pressed,
-    empty_places,
-    find_places,
     forces_at,
     missed,
     pressed_places,
@@ -26,6 +23,7 @@ from gravcomp.contact.places import (
     turning,
     yielding,
 )
+from gravcomp.contact.places import Places, empty_places, find_places
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import TOUCHED, FullContact
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at

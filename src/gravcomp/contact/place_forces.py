@@ -1,0 +1,128 @@
+"""What presses at places: how far they are off their walls, how they rub, yield and turn, and their forces; compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from gravcomp.contact.places import Places, positions
+from gravcomp.contact.surface import ContactSurface
+from gravcomp.scene.distance import SceneArrays, gap_to
+
+
+class Pressed(NamedTuple):
+    """The p places that are pressed: numbers (p,) of them; along (p,): m along the robot; position (p, 3) and gap (p,) in m."""
+
+    numbers: np.ndarray
+    along: np.ndarray
+    position: np.ndarray
+    gap: np.ndarray
+
+
+@njit(cache=True)
+def missed(scene: SceneArrays, places: Places, softness: np.ndarray, pressed: np.ndarray, sections: np.ndarray) -> float:
+    """Return by how much in m the places are off the wall that presses them, or in one that does not, at most.
+
+    softness (c,): m/N of walls that yield; pressed (c,): normal forces in N; sections (s, 3, 3): of the stations now.
+    """
+    point, normal, worst = positions(places, sections), np.empty(3), 0.0
+    for i in range(len(point)):
+        gap = gap_to(scene, places.row[i], point[i], normal) + softness[i] * pressed[i]
+        worst = max(worst, abs(gap) if pressed[i] > 0.0 else -gap)
+    return worst
+
+
+@njit(cache=True)
+def pressed_places(
+    scene: SceneArrays, surface: ContactSurface, places: Places, forces: np.ndarray, sections: np.ndarray
+) -> Pressed:
+    """Return the places that are pressed by the forces (c, 3), where the stations are now at `sections` (s, 3, 3)."""
+    point, normal = positions(places, sections), np.empty(3)
+    chosen, count = np.empty(len(point), dtype=np.int64), 0
+    for i in range(len(point)):
+        if forces[i] @ places.normal[i] > 0.0:
+            chosen[count] = i
+            count += 1
+    chosen = chosen[:count]
+    along, gap, position = np.zeros(count), np.empty(count), np.empty((count, 3))
+    for k in range(count):
+        i = chosen[k]
+        for n in range(3):
+            along[k] += places.share[i, n] * surface.place[places.first[i] + n]
+        position[k] = point[i]
+        gap[k] = gap_to(scene, places.row[i], point[i], normal)
+    return Pressed(chosen, along, position, gap)
+
+
+@njit(cache=True)
+def rubbing(
+    scene: SceneArrays, surface: ContactSurface, places: Places, start: np.ndarray, sections: np.ndarray, touched: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the coefficients of friction (c,), and how far the places have slid since the last equilibrium (2 c,) in m.
+
+    start and sections (s, 3, 3): then and now. Only places rub that touched then: whose gap was below `touched` radii. The
+    motions are along the tangents `around` and `along` of each place.
+    """
+    before, now = positions(places, start), positions(places, sections)
+    friction, slid, normal = np.zeros(len(before)), np.empty(2 * len(before)), np.empty(3)
+    for i in range(len(before)):
+        if gap_to(scene, places.row[i], before[i], normal) < touched * surface.radius[places.station[i]]:
+            friction[i] = scene.friction[places.row[i]]
+        slid[2 * i] = places.around[i] @ (now[i] - before[i])
+        slid[2 * i + 1] = places.along[i] @ (now[i] - before[i])
+    return friction, slid
+
+
+@njit(cache=True)
+def yielding(scene: SceneArrays, surface: ContactSurface, places: Places) -> np.ndarray:
+    """Return the compliance (c,) of the walls at the places in m/N; 0 where they are rigid."""
+    result = np.zeros(len(places.row))
+    for i in range(len(result)):
+        if np.isfinite(scene.stiffness[places.row[i]]):
+            parts = len(surface.rim) if places.slot[i] >= len(surface.place) else 1
+            result[i] = parts / (scene.stiffness[places.row[i]] * surface.length[places.station[i]])
+    return result
+
+
+@njit(cache=True)
+def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray:
+    """Return the forces (c, 3) at the places from those along the normals (c,) and along both tangents (2 c,), or (0,)."""
+    result = np.empty((len(normal), 3))
+    for i in range(len(normal)):
+        for j in range(3):
+            result[i, j] = normal[i] * places.normal[i, j]
+            if len(rub):
+                result[i, j] += rub[2 * i] * places.around[i, j] + rub[2 * i + 1] * places.along[i, j]
+    return result
+
+
+@njit(cache=True)
+def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, slots, 3) in N: of `remember`."""
+    count = len(places.row)
+    pressed, rub = np.empty(count), np.empty((count, 2))
+    for i in range(count):
+        last = force[places.row[i], places.slot[i]]
+        pressed[i] = max(places.normal[i] @ last, 0.0)
+        rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
+    return pressed, rub
+
+
+@njit(cache=True)
+def remember(places: Places, forces: np.ndarray, force: np.ndarray) -> None:
+    """Write the forces (c, 3) of the places to force (k, slots, 3), by obstacle and slot; 0 elsewhere."""
+    force[:] = 0.0
+    for i in range(len(places.row)):
+        force[places.row[i], places.slot[i]] = forces[i]
+
+
+@njit(cache=True)
+def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the places whose forces turn, those whose forces move, and their stiffness D (turns + moves,) in N/m.
+
+    pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts. A force of 0
+    does neither, nor does that of a plane turn.
+    """
+    stiffness, moving = pressed * places.curvature, pressed * places.rocking
+    turns, moves = np.flatnonzero(stiffness), np.flatnonzero(moving)
+    return turns, moves, np.concatenate((stiffness[turns], moving[moves]))
