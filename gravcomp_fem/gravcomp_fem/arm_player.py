@@ -27,6 +27,7 @@ from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
 from gravcomp.virtual.motion import quaternion
 from gravcomp.whole_file import write_whole
+from gravcomp_fem.conversion import vector_of
 from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
@@ -158,8 +159,7 @@ class ArmPlayer(ManagedNode):
     def _read_polled(self) -> None:
         """Read the newest messages of tip and bridge."""
         if truth := self._truth.take():
-            p = truth.message.pose.position
-            self._tip = np.array([p.x, p.y, p.z])
+            self._tip = vector_of(truth.message.pose.position)
         if state := self._bridge_states.take():
             self._bridge = state.message
 

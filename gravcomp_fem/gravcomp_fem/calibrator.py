@@ -22,7 +22,7 @@ from gravcomp.calibration.plan_file import load_plan
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.calibrator import CalibratorParameters
 from gravcomp.whole_file import write_whole
-from gravcomp_fem.conversion import seconds
+from gravcomp_fem.conversion import seconds, vector_of
 from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
@@ -79,8 +79,7 @@ class Calibrator(ManagedNode):
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
         time = seconds(message.header)
-        vector = message.vector
-        self._session.on_gravity(time, np.array([vector.x, vector.y, vector.z]))
+        self._session.on_gravity(time, vector_of(message.vector))
         if self._present is None or not self._stopped:
             return
         displacement = self._session.command(time, self._present)

@@ -3,7 +3,7 @@
 from array import array
 
 import numpy as np
-from geometry_msgs.msg import Point, Pose, PoseArray
+from geometry_msgs.msg import Point, Pose, PoseArray, Vector3
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
@@ -17,6 +17,11 @@ from gravcomp_msgs.msg import Deformation, ShapeTarget
 def seconds(header: Header) -> float:
     """Return the stamp of a header in s."""
     return (header.stamp.sec * 1_000_000_000 + header.stamp.nanosec) * 1e-9
+
+
+def vector_of(message: Point | Vector3) -> np.ndarray:
+    """Return x, y, z (3,) of a message."""
+    return np.array([message.x, message.y, message.z])
 
 
 def deformation_message(shape: Shape, header: Header) -> Deformation:
@@ -57,7 +62,7 @@ def contact_of(message: Deformation) -> ObstacleForces:
 
 def gravity_of(message: Deformation) -> np.ndarray:
     """Return the gravity (3,) in m/s^2 of a message. Raises ValueError when it is not finite."""
-    return _matrix(array("d", [message.gravity.x, message.gravity.y, message.gravity.z]), 1, 3, "gravity")[0]
+    return _matrix(vector_of(message.gravity), 1, 3, "gravity")[0]
 
 
 def response_of(message: Deformation) -> Response:
@@ -146,10 +151,10 @@ def shape_target(message: ShapeTarget, length: float) -> Target:
             backbone_station=stations,
             backbone_weight=weights,
         )
-    direction = np.array([message.tip_direction.x, message.tip_direction.y, message.tip_direction.z])
+    direction = vector_of(message.tip_direction)
     points = np.array([[p.x, p.y, p.z] for p in message.backbone_position], dtype=float).reshape(-1, 3)
     return Target(
-        tip_position=np.array([message.tip_position.x, message.tip_position.y, message.tip_position.z]),
+        tip_position=vector_of(message.tip_position),
         tip_position_weight=message.tip_position_weight,
         # A message has no None: a direction of length zero means that none is given.
         tip_direction=direction if direction.any() or message.tip_direction_weight > 0.0 else None,
@@ -167,7 +172,7 @@ def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> 
     if not abs(norm - 1.0) < 1e-2:
         raise TargetError(f"the target's orientation has the norm {norm:g}; a unit quaternion is needed")
     return Target(
-        tip_position=np.array([pose.position.x, pose.position.y, pose.position.z]),
+        tip_position=vector_of(pose.position),
         tip_position_weight=position_weight,
         tip_direction=Rotation.from_quat(q).apply((0.0, 0.0, 1.0)),
         tip_direction_weight=direction_weight,
@@ -181,7 +186,7 @@ def doubles(values: np.ndarray) -> array:
     return result
 
 
-def _matrix(field: array, rows: int, columns: int, name: str) -> np.ndarray:
+def _matrix(field: array | np.ndarray, rows: int, columns: int, name: str) -> np.ndarray:
     values = np.frombuffer(field, dtype=np.float64)
     if values.size != rows * columns:
         raise ValueError(f"{name} has {values.size} numbers; {rows} x {columns} are needed")

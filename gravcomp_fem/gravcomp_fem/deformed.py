@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 
 from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.simulation import Response, Shape
-from gravcomp_fem.conversion import check_compliance, contact_of, deformation_message, gravity_of, response_of
+from gravcomp_fem.conversion import check_compliance, contact_of, deformation_message, gravity_of, response_of, vector_of
 from gravcomp_msgs.msg import Deformation
 
 
@@ -49,11 +49,11 @@ class Deformed:
 def from_message(message: Deformation) -> Deformed:
     """Return what is in a message. Raises ValueError for arrays that do not match or numbers that are not finite."""
     response, contact, gravity = response_of(message), contact_of(message), gravity_of(message)
-    p, q = message.tip.position, message.tip.orientation
+    q = message.tip.orientation
     return Deformed(
         header=message.header,
         status=message.status,
-        tip_position=np.array([p.x, p.y, p.z]),
+        tip_position=vector_of(message.tip.position),
         tip_orientation=np.array([q.x, q.y, q.z, q.w]),
         backbone_station=np.array(message.backbone_station),
         cable_tension=np.array(message.cable_tension),

@@ -31,7 +31,7 @@ from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
-from gravcomp_fem.conversion import pose_message, seconds
+from gravcomp_fem.conversion import pose_message, seconds, vector_of
 from gravcomp_fem.deformed import PublishedShape
 from gravcomp_fem.load_inputs import LoadInputs
 from gravcomp_fem.markers import RobotMarkers
@@ -174,8 +174,7 @@ class FemSimulator(ManagedNode):
         if self._turn is None:
             return np.zeros(3)
         for received in self._imu_topic.take_all():
-            rate = received.message.angular_velocity
-            in_base = self.robot_file.robot.imu_mount.rotation @ np.array([rate.x, rate.y, rate.z])
+            in_base = self.robot_file.robot.imu_mount.rotation @ vector_of(received.message.angular_velocity)
             self._turn.add(seconds(received.message.header), in_base)
         return self._turn.acceleration(stamp)
 
@@ -188,7 +187,7 @@ class FemSimulator(ManagedNode):
 
     def _on_gravity(self, message: Vector3Stamped) -> None:
         self._read_cables()
-        gravity = np.array([message.vector.x, message.vector.y, message.vector.z])
+        gravity = vector_of(message.vector)
         if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
             self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
             return

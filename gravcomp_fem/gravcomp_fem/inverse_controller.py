@@ -9,7 +9,6 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -134,19 +133,19 @@ class InverseController(ManagedNode):
     # The loop.
 
     def _on_deformation(self, message: Deformation) -> None:
-        self._take(message, message.status, message.message, message.header, from_message)
+        self._take(message.status, message.message, message.header, lambda: from_message(message))
 
     def _on_published_shape(self, published: PublishedShape) -> None:
-        self._take(published, published.shape.status, published.shape.message, published.header, from_shape)
+        self._take(published.shape.status, published.shape.message, published.header, lambda: from_shape(published))
 
-    def _take(self, given: Any, status: int, sentence: str, header: Header, read: Callable[[Any], Deformed]) -> None:
-        """Follow a deformation that `read` takes from what was given."""
+    def _take(self, status: int, sentence: str, header: Header, read: Callable[[], Deformed]) -> None:
+        """Follow the deformation that `read` returns, which raises ValueError for one that is not valid."""
         self._last_arrival = self.get_clock().now()
         if status == Deformation.FAILED:
             self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {sentence}", header)
             return
         try:
-            deformed = read(given)
+            deformed = read()
         except ValueError as error:
             self._publish_code(ControllerCode.REFUSED, f"robot/deformation refused: {error}", header)
             return

@@ -20,7 +20,7 @@ from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.load_estimation import LoadEstimate, LoadObserver
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.simulation import DynamicSimulator, Shape, Simulator
-from gravcomp_fem.conversion import doubles, seconds
+from gravcomp_fem.conversion import doubles, seconds, vector_of
 from gravcomp_msgs.msg import WrenchEstimate
 from gravcomp_node import SENSOR
 
@@ -131,13 +131,12 @@ class LoadInputs:
         return self._node.get_clock().now().nanoseconds * 1e-9
 
     def _on_wrench(self, message: WrenchStamped) -> None:
-        force, moment = message.wrench.force, message.wrench.torque
         used = self._wrenches.take(
             seconds(message.header),
             self._now(),
             message.header.frame_id,
-            np.array([force.x, force.y, force.z]),
-            np.array([moment.x, moment.y, moment.z]),
+            vector_of(message.wrench.force),
+            vector_of(message.wrench.torque),
         )
         if not used:
             self._refuse("external/wrench", self._wrenches.refusal)
@@ -148,8 +147,7 @@ class LoadInputs:
         if message.header.frame_id != self._frames[0]:
             self._refuse("measured/tip", f"its frame is '{message.header.frame_id}'; '{self._frames[0]}' is needed")
             return
-        p = message.pose.position
-        self._observer.measure_tip(seconds(message.header), np.array([p.x, p.y, p.z]))
+        self._observer.measure_tip(seconds(message.header), vector_of(message.pose.position))
 
     def _on_tension(self, message: JointState) -> None:
         if self._observer is None:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.lifecycle import LifecycleNode
 from rclpy.subscription import Subscription
@@ -11,7 +10,7 @@ from std_msgs.msg import Header
 from gravcomp.description import Robot
 from gravcomp.inverse import Target
 from gravcomp.tip_observer import TipObserver, TipObserverOptions
-from gravcomp_fem.conversion import seconds
+from gravcomp_fem.conversion import seconds, vector_of
 from gravcomp_fem.deformed import Deformed
 from gravcomp_node import SENSOR
 
@@ -63,9 +62,9 @@ class TrackerInput:
         return self._node.get_clock().now().nanoseconds * 1e-9
 
     def _on_measured(self, message: PoseStamped) -> None:
-        p, now = message.pose.position, self._now()
+        now = self._now()
         before = self._observer.status(now).state
-        self._observer.measure(seconds(message.header), now, message.header.frame_id, np.array([p.x, p.y, p.z]))
+        self._observer.measure(seconds(message.header), now, message.header.frame_id, vector_of(message.pose.position))
         after = self._observer.status(now)
         if after.state == before:
             return

@@ -16,6 +16,7 @@ from gravcomp_fem.viewer_requests import RequestSender
 from gravcomp_node import ManagedNode, run
 
 if TYPE_CHECKING:
+    from gravcomp.scene.scene import Scene
     from gravcomp.view.obstacle_shapes import ObstacleShape
 
 
@@ -27,20 +28,20 @@ class Viewer(ManagedNode):
 
     def configure(self) -> None:
         """Start to serve the page; create publishers and clients."""
-        self._page = Page(self.robot_file.robot, self.parameters, self._shapes())
+        self._walls, shapes = self._surroundings()
+        self._page = Page(self.robot_file.robot, self.parameters, shapes)
         bridge = "joint_bridge" if self.robot_file.has_joints else "can_bridge"
         self.sender = RequestSender(self, self.parameters, self.robot_file.robot.length, self._page.notify, bridge)
         self.get_logger().info(f"the page is at {self._page.address}")
 
-    def _shapes(self) -> "list[ObstacleShape]":
-        """Return the obstacles to draw. Raises ConfigError for a file of the scene that cannot be read."""
-        self._walls = None
+    def _surroundings(self) -> "tuple[Scene | None, list[ObstacleShape]]":
+        """Return the walls and the obstacles to draw. Raises ConfigError for a file of the scene that cannot be read."""
         if not self.robot_file.section("scene"):
-            return []
+            return None, []
         from gravcomp.view.obstacle_shapes import obstacle_shapes  # imports Numba
 
-        self._walls, length = self.robot_file.scene, self.robot_file.robot.length
-        return obstacle_shapes(self._walls, length) + obstacle_shapes(self.robot_file.zones, length, forbidden=True)
+        walls, length = self.robot_file.scene, self.robot_file.robot.length
+        return walls, obstacle_shapes(walls, length) + obstacle_shapes(self.robot_file.zones, length, forbidden=True)
 
     def activate(self) -> None:
         """Subscribe, and update the page from now on."""

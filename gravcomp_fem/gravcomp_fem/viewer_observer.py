@@ -4,7 +4,7 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from geometry_msgs.msg import Point, PoseArray, PoseStamped, Vector3
+from geometry_msgs.msg import PoseArray, PoseStamped
 from gravcomp_node.polled import Polled, Received
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -14,7 +14,7 @@ from gravcomp.inverse import Holdable, TargetError
 from gravcomp.view.backbone import arc_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
-from gravcomp_fem.conversion import backbone_of, backbone_of_poses, pose_target, shape_target
+from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
 from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, LATCHED
 
@@ -39,9 +39,9 @@ _CLOCK_TOLERANCE = 10.0  # s
 
 
 class GraphObserver:
-    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it."""
+    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it; None: it has none."""
 
-    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None" = None):
+    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None"):
         self._node, self._length, self._walls = node, length, walls
         self._streams = {
             "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
@@ -76,17 +76,17 @@ class GraphObserver:
         if deformation:
             d = deformation.message
             shown.update(
-                backbone=backbone_of(d), gravity=np.array([d.gravity.x, d.gravity.y, d.gravity.z]),
+                backbone=backbone_of(d), gravity=vector_of(d.gravity),
                 tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
                 model=d.model, model_time=d.solve_time)  # fmt: skip
             shown.update(model_touches=self._model_touches(d))
         forces, load = self._current("forces"), self._current("load")
         if forces:
             shown.update(virtual_touches=_touches(forces.message), wall=_wall(forces.message))
-        if load and deformation and np.isfinite(_vector(load.message.wrench.force)).all():
-            place, force = shown["backbone"].tip, _vector(load.message.wrench.force)
+        backbone = shown.get("backbone")  # None also where that of a message is not valid
+        if load and backbone and np.isfinite(force := vector_of(load.message.wrench.force)).all():
             variance = np.trace(np.reshape(load.message.covariance, (6, 6))[:3, :3])
-            shown.update(load=Touch("estimated", place, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
+            shown.update(load=Touch("estimated", backbone.tip, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
         if motors:
             m = motors.message
             shown.update(
@@ -121,11 +121,14 @@ class GraphObserver:
         return received if name == "status" or time.time_ns() - received.sent < _STALE * 1e9 else None
 
     def _model_touches(self, message: Deformation) -> tuple[Touch, ...]:
-        """Return the forces of walls on the model; none where this node does not know the walls."""
+        """Return the forces of walls on the model; none where this node does not know the walls, or the message is not valid."""
         if self._walls is None or not message.contact_obstacle:
             return ()
-        places = np.array(message.contact_position).reshape(-1, 3)
-        return model_touches(self._walls, _vector(message.gravity), message.contact_obstacle, message.contact_force, places)
+        try:
+            contact = contact_of(message)
+        except ValueError:
+            return ()  # the controller refuses it and reports it
+        return model_touches(self._walls, vector_of(message.gravity), contact.names, contact.force, contact.position)
 
     def _delays(self) -> dict[str, float]:
         """Return s from the IMU sample to the message of each stage."""
@@ -164,19 +167,15 @@ class GraphObserver:
             return  # the controller refuses it and reports it
 
 
-def _vector(message: Point | Vector3) -> np.ndarray:
-    return np.array([message.x, message.y, message.z])
-
-
 def _touches(message: VirtualForces) -> tuple[Touch, ...]:
     return tuple(
-        Touch(source, _vector(place), _vector(force))
+        Touch(source, vector_of(place), vector_of(force))
         for source, place, force in zip(message.source, message.position, message.force)
     )
 
 
 def _wall(message: VirtualForces) -> tuple[np.ndarray, np.ndarray] | None:
-    return (_vector(message.wall_point), _vector(message.wall_normal)) if message.has_wall else None
+    return (vector_of(message.wall_point), vector_of(message.wall_normal)) if message.has_wall else None
 
 
 def _status_text(status: ControllerStatus) -> str:

@@ -24,7 +24,6 @@ _SERVICES = {
     "inverse_controller/enable": SetBool,
     "inverse_controller/relax": Trigger,
 }
-_BRIDGE_SERVICES = ("home", "stop", "release")  # each a Trigger
 
 
 class Notify(Protocol):
@@ -53,7 +52,7 @@ class RequestSender:
         self.hand = node.create_publisher(String, "virtual/hand", COMMAND)
         self.wall = node.create_publisher(String, "virtual/wall", COMMAND)
         self._bridge = bridge
-        kinds = {**_SERVICES, **{f"{bridge}/{name}": Trigger for name in _BRIDGE_SERVICES}}
+        kinds = {**_SERVICES, **{f"{bridge}/{name}": Trigger for name in requests.SERVICES}}
         self.services = {name: node.create_client(kind, name) for name, kind in kinds.items()}
         self.recorder: NodeProcess | None = None
         self._bag = ""

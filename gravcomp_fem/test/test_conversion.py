@@ -12,36 +12,8 @@ from std_msgs.msg import Header
 
 from gravcomp.contact.contacts import Contacts
 from gravcomp.inverse import TargetError
-from gravcomp.simulation import Response, Shape, ShapeStatus
+from gravcomp.simulation import Response
 from gravcomp_msgs.msg import ShapeTarget
-
-
-@pytest.fixture
-def shape() -> Shape:
-    random = np.random.default_rng(1)
-    points, cables = 5, 6
-    return Shape(
-        tip_position=random.normal(size=3),
-        tip_orientation=np.array([0.0, 0.0, 0.0, 1.0]),
-        backbone_station=np.linspace(0, 1, points),
-        backbone_position=random.normal(size=(points, 3)),
-        backbone_orientation=np.tile([0.0, 0.0, 0.0, 1.0], (points, 1)),
-        cable_displacement=random.normal(size=cables),
-        cable_tension=random.uniform(size=cables),
-        gravity=np.array([0.0, 0.0, -9.81]),
-        response=Response(
-            random.normal(size=(cables, cables)) + 5.0 * np.eye(cables),
-            random.normal(size=(6 + 3 * points, cables)),
-            random.normal(size=cables),
-            random.normal(size=6 + 3 * points),
-        ),
-        residual=1e-9,
-        error_estimate=2e-5,
-        solve_time=1e-3,
-        model="reduced",
-        status=ShapeStatus.FALLBACK,
-        message="beyond its range",
-    )
 
 
 def test_the_response_survives_its_message_bit_for_bit(shape):

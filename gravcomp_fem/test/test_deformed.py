@@ -8,40 +8,18 @@ from gravcomp_fem.deformed import PublishedShape, from_message, from_shape
 from std_msgs.msg import Header
 
 from gravcomp.contact.contacts import Contacts
-from gravcomp.simulation import Response, Shape, ShapeStatus
+from gravcomp.simulation import ShapeStatus
 
 
 @pytest.fixture
-def published() -> PublishedShape:
-    rng, points, cables = np.random.default_rng(3), 4, 5
+def published(shape) -> PublishedShape:
+    rng, cables = np.random.default_rng(3), len(shape.cable_tension)
     contacts = Contacts(
         obstacle=np.array([0, 1]), station=np.array([0.3, 0.9]), position=rng.normal(size=(2, 3)), normal=np.eye(3)[:2],
         force=rng.normal(size=(2, 3)), gap=np.zeros(2), sliding=np.zeros(2, bool), by_tension=rng.normal(size=(2, cables)),
         names=("table", "ball"),
     )  # fmt: skip
-    shape = Shape(
-        tip_position=rng.normal(size=3),
-        tip_orientation=np.array([0.0, 0.6, 0.0, 0.8]),
-        backbone_station=np.linspace(0, 1, points),
-        backbone_position=rng.normal(size=(points, 3)),
-        backbone_orientation=np.tile([0.0, 0.0, 0.0, 1.0], (points, 1)),
-        cable_displacement=rng.normal(size=cables),
-        cable_tension=rng.uniform(size=cables),
-        gravity=rng.normal(size=3),
-        response=Response(
-            rng.normal(size=(cables, cables)) + 5.0 * np.eye(cables),
-            rng.normal(size=(6 + 3 * points, cables)),
-            rng.normal(size=cables),
-            rng.normal(size=6 + 3 * points),
-        ),
-        residual=0.0,
-        error_estimate=0.0,
-        solve_time=0.0,
-        model="reduced",
-        status=ShapeStatus.FALLBACK,
-        contacts=contacts,
-    )
-    return PublishedShape(shape, Header(frame_id="soft_base"))
+    return PublishedShape(dataclasses.replace(shape, contacts=contacts), Header(frame_id="soft_base"))
 
 
 def test_a_shape_and_its_message_say_the_same(published):

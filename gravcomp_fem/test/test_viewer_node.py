@@ -20,7 +20,7 @@ from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Place
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion
 from gravcomp.virtual.placed_wall import parse_wall
-from gravcomp_msgs.msg import ShapeTarget, VirtualForces
+from gravcomp_msgs.msg import Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, SENSOR
 
 
@@ -170,6 +170,29 @@ def test_forces_on_the_virtual_robot_are_shown(stand):
     (touch,) = snapshot.virtual_touches
     assert touch.source == "slab" and touch.force[0] == 0.02 and touch.place[2] == 0.1
     assert snapshot.wall is not None and snapshot.wall[1][0] == 1.0
+
+
+def test_a_load_is_shown_at_the_tip_and_nowhere_without_a_valid_backbone(stand):
+    shapes = stand.other.create_publisher(Deformation, "robot/deformation", SENSOR)
+    loads = stand.other.create_publisher(WrenchEstimate, "estimated/wrench", SENSOR)
+    load, shape = WrenchEstimate(), Deformation(model="full", backbone_station=[0.0])
+    load.wrench.force.x = 0.03
+    shape.cable_tension = shape.cable_displacement = [0.0] * len(stand.viewer.robot_file.robot.cables)
+
+    def is_shown(is_done):
+        shapes.publish(shape)
+        loads.publish(load)
+        return is_done(stand.viewer.observer.snapshot())
+
+    stand.until(lambda: is_shown(lambda shown: shown.model == "full"), "no shape")
+    for _ in range(5):
+        assert is_shown(lambda shown: shown.backbone is None and shown.load is None)
+        stand.executor.spin_once(timeout_sec=0.05)
+    shape.backbone_station, shape.backbone_position = [0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.1]
+    shape.backbone_orientation = [0.0, 0.0, 0.0, 1.0] * 2
+    stand.until(lambda: is_shown(lambda shown: shown.load is not None), "no load")
+    touch = stand.viewer.observer.snapshot().load
+    assert touch.place.tolist() == [0.0, 0.0, 0.1] and touch.force.tolist() == [0.03, 0.0, 0.0]
 
 
 def test_the_button_records_a_bag(stand, tmp_path):

@@ -73,7 +73,8 @@ class ImuTopics:
         self._node, self._count = node, 0
         self._imu = node.create_publisher(Imu, "imu/data_raw", SENSOR)
         self._temperature = node.create_publisher(Temperature, "imu/temperature", SENSOR)
-        # One message for all samples, because making it takes longer than to publish it: it is serialised before the next one.
+        # One message for all samples, because making it takes longer than to publish it. It is serialised before the next one,
+        # since its node is alone in its process; gravcomp_node.local_topics would hand on the message itself, and its header.
         self._message = Imu()
         self._message.header.frame_id = frame
         self._message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation

@@ -154,19 +154,14 @@ class VirtualRobotNode(ManagedNode):
 
     def _inject(self, message: String) -> None:
         """`{kind: drop, frames: imu, duration: 2}` starts a fault, `clear` ends all faults."""
-        try:
-            if message.data.strip() == "clear":
-                with self._live.lock:
-                    self._live.robot.clear_faults()
-                self.get_logger().info("faults cleared")
-                return
-            fault = Fault.parse(yaml.safe_load(message.data), "virtual/fault")
-            with self._live.lock:
-                self._live.robot.inject(fault)
-        except (ConfigError, yaml.YAMLError) as error:
-            self.get_logger().error(str(error))
-            return
-        self.get_logger().info(f"fault: {message.data}")
+        if self._obey(message, "virtual/fault", self._order_fault):
+            self.get_logger().info(f"fault: {message.data}")
+
+    def _order_fault(self, order: Any, source: str) -> None:
+        if order == "clear":
+            self._live.robot.clear_faults()
+        else:
+            self._live.robot.inject(Fault.parse(order, source))
 
     def _hold(self, message: String) -> None:
         """`{place_mm: [10, 0, 95]}` pulls the tip there by a spring, `release` lets go."""
@@ -177,14 +172,16 @@ class VirtualRobotNode(ManagedNode):
         """A plane in the keys of `scene.planes` puts the wall there, `clear` takes it away."""
         self._obey(message, "virtual/wall", self._live.robot.bystander.order_wall)
 
-    def _obey(self, message: String, topic: str, order: Callable[[Any, str], None]) -> None:
-        """Carry out an order in YAML; an order that is refused is named in the log and changes nothing."""
+    def _obey(self, message: String, topic: str, order: Callable[[Any, str], None]) -> bool:
+        """Carry out an order in YAML and return True; one that is refused is named in the log and changes nothing."""
         try:
             wanted = yaml.safe_load(message.data)
             with self._live.lock:
                 order(wanted, topic)
         except (ConfigError, yaml.YAMLError) as error:
             self.get_logger().error(str(error))
+            return False
+        return True
 
     def _report(self) -> None:
         live = self._live

@@ -42,6 +42,15 @@ class Graph:
         self.node.start()
         return self
 
+    def bystander(self, what):
+        """Start; return the publisher of a user's orders for `what` when shape and forces arrive."""
+        self.start()
+        self.listener.create_subscription(VirtualForces, "truth/forces", lambda m: self.received.update(forces=m), SENSOR)
+        orders = self.listener.create_publisher(String, f"virtual/{what}", COMMAND)
+        here = {"truth/tip", "forces"}
+        self.until(lambda: orders.get_subscription_count() == 1 and here <= set(self.received), f"no virtual/{what}")
+        return orders
+
     def until(self, condition, what):
         deadline = time.monotonic() + 120.0
         while not condition():
@@ -106,10 +115,7 @@ def test_faults_begin_and_end_and_wrong_ones_are_refused():
 
 def test_a_hand_pulls_the_tip_until_it_lets_go_or_is_not_heard_of():
     with Graph() as graph:
-        graph.start()
-        graph.listener.create_subscription(VirtualForces, "truth/forces", lambda m: graph.received.update(forces=m), SENSOR)
-        hand = graph.listener.create_publisher(String, "virtual/hand", COMMAND)
-        graph.until(lambda: hand.get_subscription_count() == 1 and "truth/tip" in graph.received, "no virtual/hand")
+        hand = graph.bystander("hand")
         rest = height(graph)
 
         def pulled():
@@ -129,10 +135,7 @@ def test_a_hand_pulls_the_tip_until_it_lets_go_or_is_not_heard_of():
 
 def test_a_wall_can_be_put_next_to_the_robot_and_taken_away():
     with Graph() as graph:
-        graph.start()
-        graph.listener.create_subscription(VirtualForces, "truth/forces", lambda m: graph.received.update(forces=m), SENSOR)
-        wall = graph.listener.create_publisher(String, "virtual/wall", COMMAND)
-        graph.until(lambda: wall.get_subscription_count() == 1 and "forces" in graph.received, "no virtual/wall")
+        wall = graph.bystander("wall")
         below = 1e3 * height(graph) + 1.0  # the robot's radius is 4.5 mm
         wall.publish(String(data=f"{{name: slab, normal: [1, 0, 0], point_mm: [{below}, 0, 0]}}"))
         graph.until(lambda: graph.received["forces"].source[:1] == ["slab"], "the wall does not push")

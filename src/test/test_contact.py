@@ -9,7 +9,7 @@ from gravcomp.bench.contact import scene_of, slender_rod
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file
-from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target
+from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target, direction_weight, straight_target
 from gravcomp.mesh import tube_mesh
 from gravcomp.references import calculix_contact
 from gravcomp.references.calculix_contact import cylinder, stored_rests
@@ -228,3 +228,19 @@ def test_a_target_behind_a_wall_gives_the_nearest_shape_and_its_force_is_bounded
     assert distances[-1] < 1.05 * min(distances)  # the cables do not pull the robot together to come nearer across it
     assert forces[-1] < 1.02 * controller.options.max_contact_force
     assert "the force on 'table' is held; max_contact_force is" in command.message
+
+
+def test_a_robot_that_lies_on_a_wall_is_lifted_to_a_target_in_free_space(model):
+    """What touches goes on touching in the response, which has no motion off the wall."""
+    simulator = in_scene(model, planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
+    controller, shape = InverseController(model.robot, scene=simulator.scene), simulator.solve(G)
+    target = straight_target(model.length, tip_direction_weight=direction_weight(model.length))
+    assert len(shape.contacts) and shape.tip_position[0] < -5e-3
+    for _ in range(40):
+        command = controller.step(
+            shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=0.02,
+            followed=shape.is_equilibrium, contact=shape.contacts.by_obstacle(),
+        )  # fmt: skip
+        shape = simulator.step(G, command.displacement)
+    assert not len(shape.contacts) and np.hypot(*shape.tip_position[:2]) < 0.3e-3
+    assert command.code == ControllerCode.OK

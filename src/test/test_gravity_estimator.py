@@ -51,7 +51,7 @@ def test_the_order_in_which_temperatures_arrive_between_samples_does_not_matter(
     waiting = list(readings)
     for reading in readings:  # all arrive before the first sample
         early.add_temperature(*reading)
-    for stamp, gyro, accel in zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist()):
+    for stamp, gyro, accel in recording.samples():
         while waiting and waiting[0][0] <= stamp - 9 * STEP:  # 0.09 s after the sample of their stamp
             late.add_temperature(*waiting.pop(0))
         a, b = early.update(stamp, gyro, accel), late.update(stamp, gyro, accel)

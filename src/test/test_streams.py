@@ -94,7 +94,7 @@ def test_a_wrong_unit_is_refused_unless_it_is_to_be_converted(short):
 def test_the_live_checks_find_what_the_offline_checks_find(short):
     faulty = FAULTS["gyro_spikes"].apply(short, np.random.default_rng(1))
     monitor = StreamMonitor(memory=120.0)
-    for sample in zip(faulty.stamp_ns.tolist(), faulty.gyro.tolist(), faulty.accel.tolist()):
+    for sample in faulty.samples():
         monitor.add(*sample)
     assert [finding.kind for finding in monitor.findings()] == ["gyro_spikes"]
 

@@ -28,6 +28,7 @@ from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.status import touches_html
 from gravcomp.view.tip_camera import HALF_VIEW, TipCamera, place
 from gravcomp.view.touches import Touch, force_text, model_touches, resultants
+from gravcomp.virtual.placed_wall import parse_wall
 
 LENGTH = 0.1
 SECTION = SceneSection(
@@ -211,7 +212,7 @@ def test_an_earlier_state_has_no_handles(browsers):
     assert browsers.page.requests() == [] and not browsers.hand._ball.visible
 
 
-def test_a_wall_is_put_next_to_the_robot_and_dragged_along_its_normal(browsers, robot):
+def test_a_wall_is_put_next_to_the_robot_and_dragged_along_its_normal(browsers):
     browsers.wall.put_up("below")
     (placed,) = browsers.page.requests()
     point, normal = (np.array(vector) for vector in placed.plane)
@@ -250,9 +251,7 @@ def test_rings_lie_on_the_wall_until_they_are_turned_and_a_drag_begins_at_the_wa
 
 
 @pytest.mark.parametrize("side", ["below", "above", "side", "ahead"])
-def test_a_new_wall_is_one_that_the_virtual_robot_takes(browsers, robot, side):
-    from gravcomp.virtual.placed_wall import parse_wall
-
+def test_a_new_wall_is_one_that_the_virtual_robot_takes(browsers, side):
     for gravity in ([-9.81, 0.0, 0.0], [0.0, 0.0, -9.81], [0.0, 0.0, 9.81], [3.0, -4.0, 1.0]):
         browsers.page._scene.show(snapshot(gravity=np.array(gravity)))
         browsers.wall.put_up(side)

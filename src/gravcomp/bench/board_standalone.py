@@ -174,8 +174,7 @@ def gravity_difference(recording: Recording, file: RobotFile, blob: bytes) -> fl
     host = estimate_recording(recording, GravityEstimator(parameters.estimator.estimator, mount)).gravity
     loop = StandaloneLoop(blob)
     board = np.full_like(host, np.nan)
-    samples = zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist())
-    for row, (stamp, gyro, accel) in enumerate(samples):
+    for row, (stamp, gyro, accel) in enumerate(recording.samples()):
         loop.weigh((stamp + 500) // 1000, gyro, accel)
         board[row] = loop.gravity
     apart = _unit(board) - _unit(host)

@@ -74,7 +74,7 @@ def outcome(fault: Fault, recording: Recording, seed: int) -> tuple[list[str], f
 
 def _cost(recording: Recording) -> float:
     """Return the CPU time of a sample in us."""
-    samples = list(zip(recording.stamp_ns.tolist(), recording.gyro.tolist(), recording.accel.tolist()))
+    samples = list(recording.samples())
     monitor = StreamMonitor(memory=120.0)
     begin = time.process_time()
     for sample in samples:

@@ -5,8 +5,9 @@
 over positions p and, where they are measured, directions d of the tip. R is the prior (`unknowns.Priors`); w_k is the share of a
 window in its rest; `weighed` holds the robot's mass to that of a balance, if one is given. The deviations sigma_p and sigma_d
 begin at declared values; a second round takes them from the residuals of the first. What the data do not determine is not fitted,
-and says why (`estimates.unfit`); it keeps the described value. Creep that is not described begins, and stays where the data do
-not tell it, at what is usual for the class of the material: every polymer creeps, and without it the moduli would stand for it.
+and says why (`estimates.unfit`); it keeps the described value. Creep that is not described begins at what is usual for the class
+of the material, and stays there where the data do not show it: every polymer creeps, and without it the moduli would stand for
+it.
 
 Intervals are at 95 %: cov = (J^T J + R^T R)^-1, with J scaled by those sigmas and with every unknown, those that are not fitted
 as well: what is not known of them widens the intervals of the others. Those of moduli contain in addition what the model lacks
@@ -144,9 +145,9 @@ def fit_statics(
     fitted = np.array([not reason for reason in reasons])
     x = problem.solve(np.where(fitted, x, 0.0), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
-    deviation = np.sqrt(np.diag(problem.covariance(x)))
+    covariance = problem.covariance(x)
     after, parameters = problem.predict(x), parameters_at(x, unknowns, initial)
-    deviation = np.hypot(deviation, _unseen(problem.covariance(x), unknowns, parameters, initial, noise))
+    deviation = np.hypot(np.sqrt(np.diag(covariance)), _unseen(covariance, unknowns, parameters, initial, noise))
     estimates = tuple(
         estimate(robot, unknown, initial, parameters, quantile * half, half, reason, creep_times)
         for unknown, half, reason in zip(unknowns, deviation, reasons)

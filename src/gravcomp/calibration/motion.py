@@ -169,7 +169,10 @@ class _Courses:
         return 1e3 * error.ravel()
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Return the derivative of the residuals by x, by forward differences; backward where a course cannot be computed."""
+        """Return the derivative of the residuals by x, by forward differences.
+
+        Where a course cannot be computed they are backward, and 0 where it cannot on that side either.
+        """
         here, columns = self.error(x), []
         for step in _DIFFERENCE * np.eye(len(x)):
             moved = self.error(x + step) - here
@@ -190,11 +193,9 @@ class _Courses:
     def _predict(self, points: list[np.ndarray]) -> None:
         """Predict the courses at those points that are not in the cache."""
         new = [x for x in points if tuple(x) not in self._tips]
-        tips = (
-            self._mapper(_tip_course, [(self._robot_at(x), course, self._steps) for x in new for course in self.courses])
-            if new
-            else []
-        )
+        if not new:
+            return
+        tips = self._mapper(_tip_course, [(self._robot_at(x), course, self._steps) for x in new for course in self.courses])
         for index, x in enumerate(new):
             self._tips[tuple(x)] = tips[index * len(self.courses) : (index + 1) * len(self.courses)]
         self.count += len(new)

@@ -140,7 +140,7 @@ def _typed(args: argparse.Namespace, command: str) -> str:
     for option, (default, _) in OPTIONS.get(args.benchmark, {}).items():
         given = getattr(args, option)
         if given != default and option not in (*KINDS, "again"):
-            words += [f"--{option}", str(given)]
+            words += [f"--{option}"] if given is True else [f"--{option}", str(given)]
     for argument in LISTS.get(args.benchmark, {}):
         given = getattr(args, argument.lstrip("-"))
         words += [argument, *given] if given and argument.startswith("--") else given

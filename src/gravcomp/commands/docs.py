@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
 
 CONFIGURATION = Path("src/doc/api")
 """Folder of Sphinx's conf.py and of the index page, relative to the repository."""
@@ -39,13 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="take the pictures of the live page in which a user touches the virtual robot again, and build nothing",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository) or the pictures"
+        "--out", metavar="DIR", help="folder for the HTML pages (default: build/docs in the repository), or --page's pictures"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Build. Returns 0: built without warnings, 1: not. Raises ConfigError, and SetupError when Sphinx cannot be installed."""
-    from gravcomp.config import ConfigError
     from gravcomp.environment.packages import provide_extra
 
     root = Path(os.environ["GRAVCOMP_ROOT"])
@@ -54,11 +54,7 @@ def run(args: argparse.Namespace) -> int:
     if args.page:
         return _take_pictures(root, Path(args.out).expanduser().resolve() if args.out else root / TOUCHES)
     provide_extra("development")
-    out = Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out is {out}: cannot be created: {error.strerror}") from error
+    out = made_folder("--out", Path(args.out).expanduser().resolve() if args.out else root / "build" / "docs")
     output.note("sphinx ...")
     built, text = build(root, out)
     if not built:
@@ -88,13 +84,8 @@ def _draw_pictures(root: Path) -> int:
 def _take_pictures(root: Path, folder: Path) -> int:
     """Take the pictures of the live page. Raises ConfigError."""
     from gravcomp.commands.touch_pictures import draw_touches
-    from gravcomp.config import ConfigError
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out is {folder}: cannot be created: {error.strerror}") from error
-    pictures = [str(path) for path in draw_touches(root, folder)]
+    pictures = [str(path) for path in draw_touches(root, made_folder("--out", folder))]
     output.result({"pictures": pictures}, f"{folder}: {len(pictures)} pictures")
     return 0
 

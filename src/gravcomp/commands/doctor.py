@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -51,11 +52,12 @@ def run(args: argparse.Namespace) -> int:
     if args.board and not args.interface:
         raise ConfigError("--board needs the bus of the board: --interface and --channel")
     if args.board:
+        folder = made_folder("--out", Path(args.out).expanduser()) if args.out else None
         channel = args.channel.split(",")[0].strip()
         found = board.examine(args.interface, channel, motor=args.motor, current=args.current)
         findings += found
-        if args.out:
-            page = board_page.write_page(found, args.interface, channel, Path(args.out))
+        if folder:
+            page = board_page.write_page(found, args.interface, channel, folder)
             output.note(f"The page of the bench test is {page}")
     if args.graph:
         findings += running_graph.examine(args.namespace)

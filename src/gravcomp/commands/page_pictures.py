@@ -6,6 +6,7 @@ Without a graphics card a browser uses a whole processor. After the run it neith
 from pathlib import Path
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
 from gravcomp.config import ConfigError
 from gravcomp.view.browser import Browser, BrowserError, find_chromium
 
@@ -22,10 +23,7 @@ class PagePictures:
         self._times: dict[str, float] = {}
         if find_chromium() is None:
             raise ConfigError("--screenshots: no Chromium on this machine: apt-get install chromium")
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigError(f"--screenshots {folder}: cannot be created: {error.strerror}") from error
+        made_folder("--screenshots", folder)
 
     def follow(self, elapsed: float, now: float) -> None:
         """Record the moments that are reached: `elapsed` s of the run at the time `now` (s, monotonic)."""

@@ -2,54 +2,51 @@
 
 import contextlib
 import subprocess
+from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.launcher import compilation
 from gravcomp.launcher.model_builder import ModelBuilder
 from gravcomp.launcher.robot_graph import check_robot_file
 
+if TYPE_CHECKING:
+    from gravcomp.description import Robot
+
 
 def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
     """Check the robot's file and compile what its nodes run, where that is not done yet. Raises ConfigError.
 
     virtual: with the virtual robot, whose seed and drawn values are shown; seed: in place of the file's. Returns the builder of
-    the reduced model, a context manager. From its `start` on a process of
-    low priority builds the model if it is missing, and the nodes use it as soon as it is stored.
+    the reduced model, a context manager. From its `start` on a process of low priority builds the model if it is missing, and the
+    nodes use it as soon as it is stored.
     """
+    from gravcomp.description import load_robot_file
+
     summary = check_robot_file(robot, seed)
     if virtual:
         output.note(summary)
+    file = load_robot_file(robot)
     parts = compilation.LOOP + (compilation.VIRTUAL if virtual else ())
-    compile_parts(parts + (compilation.SURROUNDED if _is_surrounded(robot) else ()))
-    _choose_mesh(robot)
+    compile_parts(parts + (compilation.SURROUNDED if file.scene or file.zones else ()))
+    _choose_mesh(file.robot)
     return ModelBuilder(robot)
 
 
-def _choose_mesh(robot: str) -> None:
+def _choose_mesh(described: "Robot") -> None:
     """Choose the robot's mesh, once for a robot, where its file gives none: the simulator would do it without a word.
 
     A robot without a mesh is left to the nodes, which report the error.
     """
-    from gravcomp.description import load_robot_file
     from gravcomp.full_model.mesh_choice import with_chosen_elements
     from gravcomp.mesh.mesh import MeshError
 
-    described = load_robot_file(robot).robot
     what = f"choosing the mesh of {described.name}, once for this robot (up to half a minute)"
     with output.console().status(what), contextlib.suppress(MeshError):
         with_chosen_elements(described)
 
 
-def _is_surrounded(robot: str) -> bool:
-    """Return whether the robot's file has obstacles or forbidden zones."""
-    from gravcomp.description import load_robot_file
-
-    file = load_robot_file(robot)
-    return bool(file.scene or file.zones)
-
-
 def compile_parts(parts: tuple[str, ...]) -> None:
-    """Wait until these parts are compiled, with a note. A part that fails is left to the nodes, which report the error."""
+    """Wait until these parts are compiled, with a note. A part that fails is left to what needs it, which reports the error."""
     missing = compilation.missing(parts)
     if not missing:
         return

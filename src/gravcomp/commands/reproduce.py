@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.experiments import ALSO, EXPERIMENTS, MEASURED, experiment
 
@@ -91,11 +92,7 @@ def run(args: argparse.Namespace) -> int:
     if args.write:
         for name in names:
             figures_table.check_place(Path(args.write), f"reproduce {name}")
-    folder = Path(args.out).expanduser()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out is {folder}: cannot be created: {error.strerror}") from error
+    folder = made_folder("--out", Path(args.out).expanduser())
     if args.name == "measured":
         return _measured(args, folder)
     file = load_robot_file(args.robot)

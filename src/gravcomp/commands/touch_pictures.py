@@ -20,7 +20,7 @@ from gravcomp.view.obstacle_shapes import obstacle_shapes
 from gravcomp.view.options import PageOptions
 from gravcomp.view.page import Page
 from gravcomp.view.snapshot import Snapshot, TargetView
-from gravcomp.view.touches import HAND, Touch
+from gravcomp.view.touches import HAND, Touch, model_touches
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 ROBOT = Path("src/examples/lumen_robot.yaml")
@@ -84,8 +84,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
         truth.contact_obstacle, truth.contact_place, truth.contact_force)]  # fmt: skip
     if truth.hand_force.any():
         touched.append(Touch(HAND, truth.tip_position, truth.hand_force))
-    contacts = shape.contacts
-    model = [Touch(name, place, force) for name, place, force in zip(contacts.names, contacts.position, contacts.force)]
+    walls, pressed = loop.setup.modelled_scene, shape.contacts.by_obstacle()
     return Snapshot(
         time=loop.time,
         backbone=Backbone(shape.backbone_station, shape.backbone_position, shape.backbone_orientation),
@@ -98,7 +97,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
         status=command.message if command is not None else "",
         status_level="ok" if command is not None and command.code == ControllerCode.OK else "warn",
         virtual=True,
-        model_touches=tuple(model),
+        model_touches=model_touches(walls, shape.gravity, pressed.names, pressed.force, pressed.position) if walls else (),
         virtual_touches=tuple(touched),
         wall=truth.wall,
     )

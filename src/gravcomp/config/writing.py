@@ -37,9 +37,9 @@ def to_mapping(value: "DataclassInstance") -> dict:
     return result
 
 
-def declared_parameters(cls: "type[DataclassInstance]", prefix: str = "") -> list[DeclaredParameter]:
+def declared_parameters(cls: "type[DataclassInstance]") -> list[DeclaredParameter]:
     """Return every parameter of a data class; those of nested data classes have dotted keys."""
-    return list(_declared(cls, prefix))
+    return list(_declared(cls, ""))
 
 
 @functools.cache

@@ -26,7 +26,6 @@ class DelayListener:
         self.delays: list[float] = []
         self.failure: str | None = None
         self._settings = settings
-        self._ids = [codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id, *c610.COMMAND_IDS]
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bus delay", daemon=True)
 
@@ -42,7 +41,7 @@ class DelayListener:
     def _run(self) -> None:
         while not self._end.wait(_PAUSE):
             try:
-                bus = open_bus(self._settings, self._ids)
+                bus = open_bus(self._settings, _frame_ids())
             except BusError as error:
                 self.failure = str(error)
                 return
@@ -58,8 +57,7 @@ class DelayListener:
 
 def delays_during(settings: CanInterface, duration: float) -> list[float]:
     """Listen to a bus for `duration` (s) and return the latencies (s). Raises BusError when it cannot be opened."""
-    ids = [codec.layout(name).frame_id for name in ("ImuTime", "CommandTrace", *c610.COMMANDS)]
-    link, frames, end = CanLink(settings, ids), [], time.monotonic() + duration
+    link, frames, end = CanLink(settings, _frame_ids()), [], time.monotonic() + duration
     link.open()
     while time.monotonic() < end:
         frames += link.receive(0.05)
@@ -88,3 +86,8 @@ def delays_of(frames: list[can.Message]) -> list[float]:
             if begin is not None and last_current >= begin:
                 delays.append(last_current - begin)
     return delays
+
+
+def _frame_ids() -> list[int]:
+    """Return the ids of the frames from which latencies follow."""
+    return [codec.layout("ImuTime").frame_id, codec.layout("CommandTrace").frame_id, *c610.COMMAND_IDS]

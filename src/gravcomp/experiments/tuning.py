@@ -15,7 +15,7 @@ from gravcomp.description import Robot
 from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
-from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.free_fall import BRIEF_FALL, FALL, free_fall
 from gravcomp.trials.known_robot import Recovered, recover
 
 TITLE = "Tuning: grid against calibration"
@@ -25,7 +25,6 @@ _MODULUS = 0.80  # MPa, described for the article's robot
 RAYLEIGH = (0.10, 0.30, 0.50, 0.70, 1.00)  # C: alpha in 1/s and beta in s have the same value, as in the article
 _PERIOD = 0.28  # s, first period of the article's robot; another robot's alpha and beta are as large for its own period
 POSES = ((0.0, 0.0), (45.0, 0.0), (-45.0, 90.0))  # inclination, roll in deg
-_FALL, _BRIEF_FALL = 5.4, 1.3  # first periods of the robot
 
 
 def run(context: Context) -> Result:
@@ -33,10 +32,10 @@ def run(context: Context) -> Result:
     setup = context.setup
     poses = POSES[:1] if context.brief else POSES
     factor = 1e-6 * setup.robot.materials[0].youngs_modulus / _MODULUS
-    ratios, dampings = (MODULI[1:3], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
-    moduli = tuple(factor * modulus for modulus in ratios)
+    of_article, dampings = (MODULI[1:3], RAYLEIGH[:2]) if context.brief else (MODULI, RAYLEIGH)
+    moduli = tuple(factor * modulus for modulus in of_article)
     slower = setup.first_period / _PERIOD
-    duration = (_BRIEF_FALL if context.brief else _FALL) * setup.first_period
+    duration = (BRIEF_FALL if context.brief else FALL) * setup.first_period
     falls = context.map(free_fall, [(setup, *pose, duration, trial) for trial, pose in enumerate(poses)], "free falls for tuning")
     pairs = [(m, c) for m in moduli for c in dampings]
     errors = dict(zip(pairs, context.map(_pair, [(setup.robot, falls, m, c, slower) for m, c in pairs], "grid")))

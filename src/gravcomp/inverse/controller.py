@@ -24,6 +24,7 @@ from gravcomp.inverse.limits import within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.outcome import outcome
 from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.release import Release, ReleaseErrors
 from gravcomp.inverse.retreat import Move, Retreat
 from gravcomp.inverse.scaling import NO_BOUND, UNCOUPLED, Couplings
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
@@ -73,6 +74,7 @@ class InverseController:
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length, robot.limits.tension_max)
+        self._release = Release()
         self.reset()
 
     def reset(self, displacement: np.ndarray | None = None) -> None:
@@ -83,6 +85,7 @@ class InverseController:
         self._solver.reset()
         self._damping = StepDamping(self.robot.length)
         self._retreat.reset()
+        self._release.forget()
         self._displacement: np.ndarray | None = None if displacement is None else np.array(displacement, dtype=float)
         self._tension = self._change = np.zeros(len(self.robot.cables))
         self._missed, self._held = 0.0, False
@@ -141,6 +144,7 @@ class InverseController:
         if move != Move.ONWARD:
             return self._recovery_command(move, followed, response, target, previous, tension, interval, started)
         forces = ObstacleForces.none() if contact is None else contact
+        release = self._release_from(target, forces, tension, _tip(response, tension), gravity)
         demands = self._surroundings.demands(response, tension, backbone_station, gravity, forces, options.max_contact_force)
         try:
             programme = build_programme(
@@ -152,10 +156,11 @@ class InverseController:
                 backbone_station=backbone_station,
                 interval=interval,
                 damping=self._damping.factor,
-                options=self._options_at(len(forces) > 0 or self._held),
+                options=self._options_at(release is None and (len(forces) > 0 or self._held)),
                 least_tension=self._least_tension(),
                 couplings=self._couplings,
                 around=rows_of(demands),
+                release=release,
             )
             solution = self._solver.solve(programme)
         except SolverFailed as error:
@@ -218,6 +223,20 @@ class InverseController:
             forces=forces,
             solve_time=time.perf_counter() - started,
         )
+
+    def _release_from(
+        self, target: Target, forces: ObstacleForces, tension: np.ndarray, tip: np.ndarray, gravity: np.ndarray | None
+    ) -> ReleaseErrors | None:
+        """Return what lets the robot go from the obstacles that keep it from its target; None: none does.
+
+        tension (m,) in N, tip (3,) in m and gravity (3,) in m/s^2: present ones.
+        """
+        scene = self._surroundings.scene
+        if scene is None or not len(forces) or self._missed <= self.options.tolerance_of(self.robot.length):
+            self._release.forget()
+            return None
+        errors = self._release.errors(scene, forces, tension, target.tip_position - tip, gravity)
+        return errors if len(errors.offset) else None
 
     def _options_at(self, held: bool) -> InverseOptions:
         """Return the options of a step; held: what is around the robot may keep it from its target.

@@ -38,6 +38,7 @@ from numba import njit
 from gravcomp.description import Limits
 from gravcomp.inverse.limits import step_bounds
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.release import ReleaseErrors
 from gravcomp.inverse.scaling import NO_ROWS, UNCOUPLED, Couplings, Programme, ScaledProgramme, TensionRows, scaled
 from gravcomp.inverse.target import Target
 
@@ -59,13 +60,14 @@ def build_programme(
     least_tension: np.ndarray | None = None,
     couplings: Couplings = UNCOUPLED,
     around: TensionRows = NO_ROWS,
+    release: ReleaseErrors | None = None,
 ) -> ScaledProgramme:
     """Return the programme at the present state, for the next `interval` s.
 
     tension (m,): present tensions in N, reference of the proximal term; displacement (m,): last command in m; backbone_station
     (n,): stations of the effector's backbone rows; damping: factor of the proximal term; least_tension (m,) in N: lower bound of
     each cable's tension, that of options and limits when not given; couplings: of cables that share motors;
-    around: of `surroundings`.
+    around: of `surroundings`; release: of `release.Release`, default none.
     """
     if least_tension is None:
         least_tension = np.full(len(tension), max(options.pretension, limits.tension_min))
@@ -97,6 +99,7 @@ def build_programme(
         damping * options.proximal_weight,
         couplings,
         around,
+        ReleaseErrors.none(len(tension)) if release is None else release,
     )
 
 
@@ -121,13 +124,16 @@ def _built(
     change: np.ndarray, free: np.ndarray, compliance_aa: np.ndarray, displacement_free: np.ndarray, tension: np.ndarray,
     displacement: np.ndarray, limits: tuple, tip: np.ndarray, tip_weight: float, direction: np.ndarray, direction_weight: float,
     stations: np.ndarray, points: np.ndarray, weights: np.ndarray, backbone_station: np.ndarray, less: float, energy: float,
-    proximal: float, couplings: Couplings, around: TensionRows,
+    proximal: float, couplings: Couplings, around: TensionRows, release: ReleaseErrors,
 ) -> ScaledProgramme:  # fmt: skip
     """Compiled `build_programme`; limits: the last six arguments of `step_bounds`; `less` as in `_weighted_errors`."""
     jacobian, offset = _weighted_errors(
         change, free, compliance_aa, tension, tip, tip_weight, direction, direction_weight, stations, points, weights,
         backbone_station, less,
     )  # fmt: skip
+    if len(release.offset):
+        root = np.sqrt(tip_weight)
+        jacobian, offset = np.vstack((jacobian, root * release.change)), np.concatenate((offset, root * release.offset))
     hessian, gradient, compliance = _quadratic(jacobian, offset, compliance_aa, tension, energy, proximal)
     bounds = step_bounds(displacement, tension, compliance_aa @ tension + displacement_free, *limits)
     return scaled(Programme(hessian, gradient, compliance, displacement_free, bounds, couplings, around))

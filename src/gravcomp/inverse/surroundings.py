@@ -66,13 +66,13 @@ NOTHING = Met()
 
 
 class Surroundings:
-    """Obstacles and zones around one robot."""
+    """Obstacles and zones around one robot. Attribute scene: the obstacles, if any."""
 
     def __init__(self, robot: Robot, scene: Scene | None, zones: Scene | None):
         """Raise ConfigError for a robot that has no outlines along its axis, or whose base is inside a zone or an obstacle."""
-        self._length, self._scene, self._zones = robot.length, scene or None, zones or None
+        self._length, self.scene, self._zones = robot.length, scene or None, zones or None
         self._strongest = robot.limits.tension_max
-        for around in (self._zones, self._scene):
+        for around in (self._zones, self.scene):
             if around is not None:
                 try:
                     surface = contact_surface(robot)
@@ -106,11 +106,11 @@ class Surroundings:
             near = self._nearby(self._zones, response, tension, station, gravity)
             names = tuple(self._zones.names[self._zones.arrays.obstacle[row]] for row in near.row)
             blocks.append((near.change, margin - near.gap + near.change @ tension, np.full(len(near.gap), np.inf)))
-        if largest_force is not None and self._scene is not None:
-            wall = self._nearby(self._scene, response, tension, station, gravity)
+        if largest_force is not None and self.scene is not None:
+            wall = self._nearby(self.scene, response, tension, station, gravity)
             least = np.minimum(-margin, wall.gap)
-            arrays = self._scene.arrays
-            touched = np.array([self._scene.names[k] in forces.names for k in arrays.obstacle[wall.row]], dtype=bool)
+            arrays = self.scene.arrays
+            touched = np.array([self.scene.names[k] in forces.names for k in arrays.obstacle[wall.row]], dtype=bool)
             # The depth in a compliant obstacle is its force, which has a row of its own.
             least[touched & np.isfinite(arrays.stiffness[wall.row])] = -np.inf
             blocks.append((wall.change, least - wall.gap + wall.change @ tension, np.full(len(wall.gap), np.inf)))

@@ -52,11 +52,6 @@ class SpikeGate:
         self._last, self._slope, self._mean = None, (0.0, 0.0, 0.0), 0.0
         self._pending.clear()
 
-    @property
-    def suspects(self) -> int:
-        """Number of the last samples that are not decided yet."""
-        return len(self._pending)
-
     def take(self, dt: float, value: Vector) -> tuple[Vector, list[Vector]]:
         """Return the value (3,) to use for a sample `dt` s after the last one, and what counts for the suspects before it.
 

@@ -15,6 +15,7 @@ from gravcomp.virtual.equilibrium import RodShape
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 SAMPLE = 0.010  # s
+FALL, BRIEF_FALL = 5.4, 1.3  # first periods of the robot: falls to which a motion is fitted
 _STEP = 0.002  # s
 _RELEASED = -0.3  # of the length: paid out so far that the cables stay slack
 _IMU_TIME = 1.5  # s of IMU samples from which gravity is estimated

@@ -12,7 +12,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.context import Context
-from gravcomp.trials.free_fall import free_fall
+from gravcomp.trials.free_fall import BRIEF_FALL, FALL, free_fall
 from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import equilibrium
@@ -25,7 +25,6 @@ _OFFSETS = (3e-3, -2e-3, 1e-3, -1.5e-3, 2.5e-3, 0.5e-3)  # of the robot's length
 _PULLS = (6e-3, 18e-3)
 _RELEASED = -0.3  # of the length
 _POSES = ((0.0, 0.0), (0.0, 90.0), (-45.0, 45.0))  # inclination, roll, deg, of the robot at rest
-_FALL, _BRIEF_FALL = 5.4, 1.3  # first periods of a free fall
 _FITTED = {"offsets", "compliance", "winding"}
 _IMAGES = 100  # that are averaged, as of a camera in some seconds: the direction is then known to 0.05 degrees
 
@@ -67,7 +66,7 @@ def recover(context: Context) -> list[Recovered]:
                 Recovered(estimate.name, "mm", 1e3 * offsets(context.setup.robot)[cable], estimate.value, estimate.interval)
             )
     setup = known_setup(context.setup, moduli[0])
-    inclinations, periods = ((0.0,), _BRIEF_FALL) if context.brief else ((0.0, 30.0), _FALL)
+    inclinations, periods = ((0.0,), BRIEF_FALL) if context.brief else ((0.0, 30.0), FALL)
     duration = periods * context.setup.first_period
     falls = context.map(
         free_fall, [(setup, i, 0.0, duration, trial) for trial, i in enumerate(inclinations)], "free falls of the known robot"

@@ -5,6 +5,7 @@ Quaternions are interpolated linearly and normalised, which is exact enough for 
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -77,3 +78,8 @@ def rotations(q: np.ndarray) -> np.ndarray:
         ],
         axis=-2,
     )
+
+
+def rotation_from_wxyz(q: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the rotation (3, 3) of a unit quaternion (4,), w x y z, as viser has it."""
+    return rotations(np.roll(np.asarray(q, dtype=float), -1)[None])[0]

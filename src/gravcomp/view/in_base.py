@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from gravcomp.view.backbone import rotations
+from gravcomp.view.backbone import rotation_from_wxyz
 from gravcomp.view.scale import SCALE
 
 
@@ -18,8 +18,7 @@ class BaseFrame:
     @property
     def rotation(self) -> np.ndarray:
         """Rotation (3, 3) from soft_base to the drawn scene."""
-        w, x, y, z = self._root.wxyz
-        return rotations(np.array([[x, y, z, w]]))[0]
+        return rotation_from_wxyz(self._root.wxyz)
 
     def place(self, point: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return a point (3,) of the drawn scene in soft_base, m; NaN for what is no point, as a browser may send it."""

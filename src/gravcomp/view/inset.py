@@ -7,7 +7,8 @@ import numpy as np
 import viser
 
 from gravcomp.view import colours
-from gravcomp.view.plane_patch import patch_side, plane_foot, plane_patch
+from gravcomp.view.backbone import rotation_from_wxyz
+from gravcomp.view.plane_patch import patch_side, plane_foot, plane_patch, plane_wxyz
 from gravcomp.view.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -68,9 +69,7 @@ class Inset:
         if snapshot.wall is not None:
             point, normal = snapshot.wall
             vertices, faces = plane_patch(patch_side(self._length))
-            x = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-            x /= np.linalg.norm(x)
-            middle = np.array([0.0, 0.0, self._length / 2])
-            vertices = vertices @ np.stack([x, np.cross(normal, x), normal]) + plane_foot(normal, point, middle)
+            foot = plane_foot(normal, point, np.array([0.0, 0.0, self._length / 2]))
+            vertices = vertices @ rotation_from_wxyz(plane_wxyz(normal)).T + foot
             surfaces.append((vertices, faces, colours.PLACED))
         return surfaces

@@ -35,13 +35,8 @@ class Obstacles:
                 )
             )
 
-    @property
-    def visible(self) -> bool:
-        """Whether the obstacles are shown."""
-        return self._world.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide the obstacles."""
         for handle in (self._world, *self._handles):
             handle.visible = visible
 

@@ -13,7 +13,6 @@ from gravcomp.view.controls import Controls
 from gravcomp.view.graphics import chosen
 from gravcomp.view.inset import Inset
 from gravcomp.view.options import PageOptions
-from gravcomp.view.origin import own_origin_only
 from gravcomp.view.plots import Plots
 from gravcomp.view.requests import Request
 from gravcomp.view.scene import Scene
@@ -21,6 +20,7 @@ from gravcomp.view.skin import half_width
 from gravcomp.view.snapshot import Snapshot
 from gravcomp.view.status import cables_html, legend_html, status_html, touches_html
 from gravcomp.view.timeline import Timeline
+from gravcomp.view.web_origin import own_origin_only
 
 if TYPE_CHECKING:
     from gravcomp.view.obstacle_shapes import ObstacleShape

@@ -10,9 +10,9 @@ import numpy as np
 import viser
 
 from gravcomp.view import colours
-from gravcomp.view.backbone import rotations
+from gravcomp.view.backbone import rotation_from_wxyz
 from gravcomp.view.in_base import BaseFrame
-from gravcomp.view.plane_patch import patch_side, plane_foot, plane_patch
+from gravcomp.view.plane_patch import patch_side, plane_foot, plane_patch, plane_wxyz
 from gravcomp.view.requests import PlaceWall, Request
 from gravcomp.view.scale import SCALE, scaled
 from gravcomp.view.snapshot import Snapshot
@@ -86,10 +86,10 @@ class WallHandle:
         if plane is None:
             return
         foot = plane_foot(plane[1], plane[0], np.array([0.0, 0.0, self._length / 2]))
-        self._patch.position, self._patch.wxyz = SCALE * foot, _turned(plane[1])
+        self._patch.position, self._patch.wxyz = SCALE * foot, plane_wxyz(plane[1])
         self._rings.position = SCALE * foot
         if self._turned_by is None:  # else the wall follows the rings, at its own speed
-            self._rings.wxyz = _turned(plane[1])
+            self._rings.wxyz = plane_wxyz(plane[1])
 
     def _normal(self, side: str, snapshot: Snapshot) -> np.ndarray:
         axis, up = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -131,17 +131,7 @@ class WallHandle:
         self._turned_by = event.client_id
         if event.phase == "start":
             return
-        w, x, y, z = np.asarray(self._rings.wxyz, dtype=float)
-        self._want(np.asarray(self._rings.position, dtype=float) / SCALE, rotations(np.array([[x, y, z, w]]))[0][:, 2])
-
-
-def _turned(normal: np.ndarray) -> np.ndarray:
-    """Quaternion (4,), w x y z, of the smallest rotation from z to a unit vector (3,)."""
-    x, y, z = normal
-    if z < -1.0 + 1e-9:
-        return np.array([0.0, 1.0, 0.0, 0.0])
-    q = np.array([1.0 + z, -y, x, 0.0])
-    return q / np.linalg.norm(q)
+        self._want(np.asarray(self._rings.position, dtype=float) / SCALE, rotation_from_wxyz(self._rings.wxyz)[:, 2])
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:

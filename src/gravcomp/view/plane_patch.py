@@ -24,3 +24,12 @@ def patch_side(length: float) -> float:
 def plane_foot(normal: np.ndarray, point: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """Return the place (3,) m on a plane next to `middle` (3,) m, where its drawn part has its middle."""
     return middle - normal @ (middle - point) * normal
+
+
+def plane_wxyz(normal: np.ndarray) -> np.ndarray:
+    """Return the quaternion (4,), w x y z, of the smallest rotation from z to a unit vector (3,): it turns the drawn part."""
+    x, y, z = normal
+    if z < -1.0 + 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    q = np.array([1.0 + z, -y, x, 0.0])
+    return q / np.linalg.norm(q)

@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 MODES = ("compensate", "hold", "relax")
-SERVICES = ("home", "stop", "release")
+SERVICES = ("home", "stop", "release")  # of the bridge, each a Trigger
 
 Triple = tuple[float, float, float]
 

@@ -82,7 +82,7 @@ class Scene:
     def set_visible(self, what: str, visible: bool) -> None:
         """Show or hide 'rest', 'truth', 'target', 'obstacles' or 'forces'."""
         self._hidden = (self._hidden - {what}) | (set() if visible else {what})
-        self._obstacles.visible = "obstacles" not in self._hidden
+        self._obstacles.set_visible("obstacles" not in self._hidden)
         for ghost in self._ghosts:
             ghost.visible = "rest" not in self._hidden
 

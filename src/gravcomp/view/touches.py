@@ -28,7 +28,7 @@ class Touch:
 
 
 def model_touches(
-    scene: "Scene", gravity: np.ndarray, obstacles: Sequence[str], sizes: Sequence[float], places: np.ndarray
+    scene: "Scene", gravity: np.ndarray, obstacles: Sequence[str], sizes: Sequence[float] | np.ndarray, places: np.ndarray
 ) -> tuple[Touch, ...]:
     """Return the normal forces of obstacles on the model.
 

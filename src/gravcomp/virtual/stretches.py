@@ -30,11 +30,6 @@ class Stretch:
             return slice_of(self.source, (s - self.start) / self.length)
         return cross_section(*self.source.section(s))
 
-    @property
-    def axial_modulus(self) -> float:
-        """Young's modulus along the axis (Pa)."""
-        return self.material.axial_modulus
-
 
 def stretch_at(stretches: list[Stretch], s: float) -> Stretch:
     """Return the stretch at the arc length s (m); beyond the tip the last one."""

@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer
@@ -21,6 +22,9 @@ from gravcomp.recordings.bags.cut_mcap import CutMcap
 from gravcomp.recordings.bags.cut_sqlite import repaired
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
 
 _REPORTED = 200  # messages between two reports of progress
 
@@ -62,11 +66,15 @@ def _read_through(path: Path, progress: Callable[[float], None] | None = None) -
     """Read every message once and return their number."""
     count = 0
     with Reader(path) as reader:
-        begin, duration = reader.start_time, max(reader.duration, 1)
         for count, (_, received, _) in enumerate(reader.messages(), 1):
             if progress is not None and count % _REPORTED == 0:
-                progress(min(1.0, (received - begin) / duration))
+                progress(share_read(reader, received))
     return count
+
+
+def share_read(reader: "Reader | AnyReader", received: int) -> float:
+    """Return the share of a bag's time that is read with a message received at `received` ns."""
+    return min(1.0, (received - reader.start_time) / max(reader.duration, 1))
 
 
 def _save(path: Path, files: list[Path], saved: Path, problem: str) -> int:

@@ -16,6 +16,7 @@ CABLE_STATE = "gravcomp_msgs/msg/CableState"
 CABLE_COMMAND = "gravcomp_msgs/msg/CableCommand"
 CONTROLLER_STATUS = "gravcomp_msgs/msg/ControllerStatus"
 SHAPE_TARGET = "gravcomp_msgs/msg/ShapeTarget"
+_LEAST = 2  # messages of a topic that is needed
 
 
 @dataclass(frozen=True)
@@ -60,11 +61,11 @@ class _Rows:
         self.numbers.extend((stamp, received, *values))
 
 
-def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int = 2) -> dict[str, Stream | None]:
+def read_streams(path: str | Path, wanted: Mapping[str, Wanted]) -> dict[str, Stream | None]:
     """Return the topics by the keys of `wanted`, None for an optional one that is missing or empty. A damaged bag is recovered.
 
     Raises BagError for a bag that cannot be read, for a topic that is missing, of another type or not unique, and for a topic
-    that is not optional and has fewer than `least` messages.
+    that is not optional and has fewer than two messages.
     """
     from rosbags.highlevel import AnyReader, AnyReaderError
     from rosbags.rosbag2 import ReaderError
@@ -89,8 +90,8 @@ def read_streams(path: str | Path, wanted: Mapping[str, Wanted], *, least: int =
         if topic is None or (wanted[key].optional and not rows[topic].count):
             streams[key] = None
             continue
-        if not wanted[key].optional and rows[topic].count < least:
-            raise BagError(f"{path}: '{topic}' has {rows[topic].count} messages; at least {least} are needed")
+        if not wanted[key].optional and rows[topic].count < _LEAST:
+            raise BagError(f"{path}: '{topic}' has {rows[topic].count} messages; at least {_LEAST} are needed")
         streams[key] = _stream(path, topic, rows[topic])
     return streams
 

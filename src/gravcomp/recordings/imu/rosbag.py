@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 IMU = "sensor_msgs/msg/Imu"
 TEMPERATURE = "sensor_msgs/msg/Temperature"
+TRUTH = "geometry_msgs/msg/QuaternionStamped"
 _CHECKED = 0.5  # share of the search for damage in the time to read a bag
 _REPORTED = 1000  # messages between two reports of progress
-TRUTH = "geometry_msgs/msg/QuaternionStamped"
 
 
 class _Rows:
@@ -57,7 +57,7 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
     from rosbags.typesys import Stores, get_typestore
 
     from gravcomp.recordings.bags import BagError
-    from gravcomp.recordings.bags.recovery import readable
+    from gravcomp.recordings.bags.recovery import readable, share_read
 
     path = Path(path)
     try:
@@ -74,10 +74,9 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
             rows = {t: _Rows(width) for t, width in ((name, 6), *((t, 1) for t in temperatures[:1]), *((t, 4) for t in truths))}
-            begin, duration = reader.start_time, max(reader.duration, 1)
             for i, (connection, received, raw) in enumerate(reader.messages([c for c in reader.connections if c.topic in rows])):
                 if progress is not None and i % _REPORTED == 0:
-                    progress(_CHECKED + (1.0 - _CHECKED) * min(1.0, (received - begin) / duration))
+                    progress(_CHECKED + (1.0 - _CHECKED) * share_read(reader, received))
                 message: Any = reader.deserialize(raw, connection.msgtype)
                 stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
                 rows[connection.topic].append(stamp, received, _values(message))
