@@ -62,8 +62,8 @@ def pack(
     """Return the blob.
 
     model: with a multiple of four modes; settings (n,): of `model_settings.settings`; least_tension (m,) in N; branches: of
-    `description.Material`, the same in the whole robot. Raises ValueError for a model that the blob cannot hold, which `model_fit`
-    finds out before.
+    `description.Material`, the same in the whole robot. Raises ValueError for a model that the blob cannot hold, which
+    `model_fit` finds out before.
     """
     modes, cables = model.size, model.cables
     linear, quadratic = model.elasticity.linear, model.elasticity.quadratic
