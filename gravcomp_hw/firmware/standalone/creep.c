@@ -46,7 +46,7 @@ void gc_creep_begin(gc_creep *creep, const gc_model *model, float interval) {
 }
 
 void gc_creep_end(gc_creep *creep, const gc_model *model, const float *strain) {
-  for (uint32_t k = 0; model->branches > 0u && k < model->strains; ++k) {
+  for (uint32_t k = 0; k < model->strains; ++k) {
     const float change = strain[k] - creep->strain[k];
     for (uint32_t b = 0; b < model->branches; ++b) {
       creep->held[b][k] = creep->decay[b] * creep->held[b][k] + creep->gain[b] * change;

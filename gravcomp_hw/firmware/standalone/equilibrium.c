@@ -285,7 +285,7 @@ static bool inside(const gc_model *model, const float *q, const float *correctio
 static void remember(gc_equilibrium *state) {
   const gc_model *model = state->model;
   float strain[GC_STRAINS_MAX];
-  for (uint32_t k = 0; model->branches > 0u && k < model->strains; ++k) {
+  for (uint32_t k = 0; k < model->strains; ++k) {
     const float(*jacobian)[GC_TILE] = (const float(*)[GC_TILE])state->elasticity.jacobian[k / GC_TILE];
     strain[k] = state->elasticity.strain[k];
     for (uint32_t a = 0; a < model->modes; ++a) {
@@ -329,7 +329,9 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
     observe(state, shape);
     observe_length(state, shape);
     describe_cables(state, tension, shape);
-    remember(state);
+    if (model->branches > 0u) {
+      remember(state);
+    }
     for (uint32_t a = 0; a < model->modes; ++a) {
       state->safe_q[a] = state->q[a] + state->correction[a];
     }

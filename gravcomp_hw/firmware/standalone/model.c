@@ -17,7 +17,8 @@ static size_t float_count(const gc_model_header *h) {
          (size_t)h->branches * GC_BRANCH_FLOATS + GC_SETTINGS_FLOATS;
 }
 
-size_t gc_model_bytes(const gc_model_header *header) {
+// Number of bytes of a blob with the counts of a header, all of them within the maxima.
+static size_t byte_count(const gc_model_header *header) {
   const size_t numbers = ((size_t)header->pieces + 3u) / 4u * 4u;
   return sizeof(gc_model_header) + sizeof(float) * float_count(header) + numbers;
 }
@@ -83,7 +84,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   if (size < header->size) {
     return GC_MODEL_CUT_OFF;
   }
-  if (header->size != gc_model_bytes(header)) {
+  if (header->size != byte_count(header)) {
     return GC_MODEL_WRONG_SIZE;
   }
   const size_t before = offsetof(gc_model_header, robot);

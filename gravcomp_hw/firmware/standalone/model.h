@@ -103,7 +103,4 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
 // Return the first word of a blob of `size` bytes, 0 where there is none.
 uint32_t gc_model_magic(const uint8_t *blob, size_t size);
 
-// Return the number of bytes of a blob with the counts of a header, all of them within the maxima.
-size_t gc_model_bytes(const gc_model_header *header);
-
 #endif

@@ -14,6 +14,7 @@
 #define GC_CONTRADICTED_TILT 0.0349065850f  // rad
 #define GC_SURE_GYRO 1.5f
 #define GC_SURE_ACCEL 1.0f
+#define GC_PATIENCE_GYRO 2.0f
 #define GC_MISSED_PERIODS 2.5f
 #define GC_GRAVITY_TIME 1.0f  // s
 #define GC_LARGEST_SCALE 0.1f
@@ -29,8 +30,8 @@ static float distance(const float *a, const float *b) {
 static void forget_suspects(gc_orientation *filter) {
   gc_spike_gate_reset(&filter->gyro_gate);
   gc_spike_gate_reset(&filter->accel_gate);
-  filter->suspecting = false;
-  filter->undecided_count = 0;
+  gc_spike_review_reset(&filter->review);
+  filter->kept_count = 0;
 }
 
 void gc_orientation_reset(gc_orientation *filter, const gc_settings *settings) {
@@ -40,8 +41,11 @@ void gc_orientation_reset(gc_orientation *filter, const gc_settings *settings) {
   filter->state.gravity_norm = settings->gravity;
   filter->gyro_gate.floor = settings->spike_gyro;
   filter->gyro_gate.sure = GC_SURE_GYRO;
+  filter->gyro_gate.patience = GC_PATIENCE_GYRO;
   filter->accel_gate.floor = settings->spike_accel;
   filter->accel_gate.sure = GC_SURE_ACCEL;
+  filter->accel_gate.patience = 1.0f;
+  filter->review.floor = settings->spike_gyro;
   gc_sample_check_reset(&filter->check);
   gc_covariance_set_bias(&filter->state.errors, settings->bias_initial);
   forget_suspects(filter);
@@ -199,66 +203,80 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
   return true;
 }
 
-// Take a sensor's value through its gate; write what is decided into the undecided steps. Returns whether anything is.
-static bool gate(gc_orientation *filter, gc_spike_gate *of, gc_filter_step *step, bool accelerometer) {
+// Return the step `age` samples ago.
+static gc_kept_step *kept_step(gc_orientation *filter, uint32_t age) {
+  return &filter->kept[(filter->kept_next + GC_STEPS_MAX - age) % GC_STEPS_MAX];
+}
+
+static void keep(gc_orientation *filter, const gc_filter_step *step) {
+  gc_kept_step *kept = &filter->kept[filter->kept_next];
+  kept->before = filter->state;
+  kept->step = *step;
+  filter->kept_next = (filter->kept_next + 1u) % GC_STEPS_MAX;
+  filter->kept_count += filter->kept_count < GC_STEPS_MAX ? 1u : 0u;
+}
+
+// Let a sensor's value (3,) count in the step `age` samples ago. Returns how many steps have to be repeated.
+static uint32_t count_in(gc_orientation *filter, uint32_t age, bool accelerometer, const float *value) {
+  if (age > filter->kept_count) {
+    return 0;
+  }
+  gc_filter_step *step = &kept_step(filter, age)->step;
+  float *used = accelerometer ? step->accel : step->gyro;
+  bool changed = false;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    changed = changed || used[i] < value[i] || used[i] > value[i];
+    used[i] = value[i];
+  }
+  return changed ? age : 0u;
+}
+
+static uint32_t larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
+
+// Take a sensor's value through its gate, and let what is decided count in the last `oldest` steps. Returns how many steps have to
+// be repeated.
+static uint32_t gate(gc_orientation *filter, gc_spike_gate *of, gc_filter_step *step, bool accelerometer, uint32_t oldest) {
   float counted[GC_SUSPECTS_MAX][3];
   const uint32_t count = gc_spike_gate_take(of, filter->settings, step->dt, accelerometer ? step->accel : step->gyro, counted);
-  for (uint32_t k = 0; k < count && k < filter->undecided_count; ++k) {
-    gc_filter_step *earlier = &filter->undecided[filter->undecided_count - 1u - k];
-    gc_copy(accelerometer ? earlier->accel : earlier->gyro, counted[count - 1u - k], sizeof(float[3]));
+  uint32_t changed = 0;
+  for (uint32_t age = 1; age <= count && age <= oldest; ++age) {
+    changed = larger(changed, count_in(filter, age, accelerometer, counted[count - age]));
   }
-  return count > 0u;
+  return changed;
 }
 
-static uint32_t suspects(const gc_orientation *filter) {
-  const uint32_t gyro = filter->gyro_gate.suspects, accel = filter->accel_gate.suspects;
-  return gyro > accel ? gyro : accel;
+// Look again at the rate of GC_REVIEW_AHEAD samples ago, from a sample as it came. Returns how many steps have to be repeated.
+static uint32_t review(gc_orientation *filter, const gc_filter_step *step) {
+  float counted[3];
+  if (filter->state.period > 0.0f && step->dt > GC_MISSED_PERIODS * filter->state.period) {
+    gc_spike_review_reset(&filter->review);
+  }
+  const bool decided = gc_spike_review_take(&filter->review, filter->settings, step->dt, step->gyro, counted);
+  return decided ? count_in(filter, GC_REVIEW_AHEAD, false, counted) : 0u;
 }
 
-// Repeat the steps of the suspects that the present sample decides; those that remain open are repeated as they stand.
-static void repeat(gc_orientation *filter, uint32_t suspects_before) {
-  const uint32_t now = suspects(filter), open = now > 0u ? now - 1u : 0u;
-  const uint32_t kept = open < suspects_before ? open : suspects_before, count = filter->undecided_count;
-  const uint32_t decided = count > kept ? count - kept : 0u;
-  filter->state = filter->before;
-  for (uint32_t k = 0; k < count; ++k) {
-    if (k == decided) {
-      filter->before = filter->state;
-    }
-    (void)advance(filter, &filter->undecided[k]);
-  }
-  if (decided == count) {
-    filter->before = filter->state;
-  }
-  for (uint32_t k = decided; k < count; ++k) {
-    filter->undecided[k - decided] = filter->undecided[k];
-  }
-  filter->undecided_count = count - decided;
-}
-
-// Remove spikes from a sample.
+// Remove spikes from a sample, and repeat the steps since the first one for which another value counts.
 static void without_spikes(gc_orientation *filter, gc_filter_step *step) {
-  const uint32_t before = suspects(filter);
-  bool decided = false;
+  uint32_t changed = 0;
   if (step->gyro_usable) {
-    decided = gate(filter, &filter->gyro_gate, step, false);
+    changed = review(filter, step);  // decides what is older than the values of the gate that count
+    changed = larger(changed, gate(filter, &filter->gyro_gate, step, false, GC_REVIEW_AHEAD - 1u));
   } else {
     gc_spike_gate_reset(&filter->gyro_gate);
+    gc_spike_review_reset(&filter->review);
   }
   if (step->accel_usable) {
-    decided = gate(filter, &filter->accel_gate, step, true) || decided;
+    changed = larger(changed, gate(filter, &filter->accel_gate, step, true, GC_STEPS_MAX));
   } else {
     gc_spike_gate_reset(&filter->accel_gate);
   }
-  if (decided && filter->suspecting) {
-    repeat(filter, before);
+  if (changed > 0u) {
+    filter->state = kept_step(filter, changed)->before;
   }
-  if (suspects(filter) == 0u) {
-    filter->suspecting = false;
-    filter->undecided_count = 0;
-  } else if (!filter->suspecting) {
-    filter->suspecting = true;
-    filter->before = filter->state;
+  for (uint32_t age = changed; age > 0u; --age) {
+    gc_kept_step *kept = kept_step(filter, age);
+    kept->before = filter->state;
+    (void)advance(filter, &kept->step);
   }
 }
 
@@ -289,27 +307,22 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
   }
   if (!filter->started || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
     start(filter, gyro, accel, verdict.dt);
+    gc_zero(&filter->even, sizeof filter->even);
     forget_suspects(filter);
     estimate_of(filter, gyro, estimate);
     return true;
   }
   gc_filter_step step;
-  step.dt = verdict.dt;
+  step.dt = gc_even_steps_take(&filter->even, verdict.dt);
   gc_copy(step.gyro, gyro, sizeof step.gyro);
   gc_copy(step.accel, accel, sizeof step.accel);
   set_usable(filter, &verdict, &step);
   without_spikes(filter, &step);
+  keep(filter, &step);
   if (!advance(filter, &step)) {
     forget_suspects(filter);
     estimate_of(filter, step.gyro, estimate);
     return true;
-  }
-  if (filter->suspecting) {
-    if (filter->undecided_count == GC_UNDECIDED_MAX) {
-      forget_suspects(filter);  // the gates decide long before
-    } else {
-      filter->undecided[filter->undecided_count++] = step;
-    }
   }
   estimate_of(filter, step.gyro_usable ? step.gyro : filter->state.bias, estimate);
   return true;

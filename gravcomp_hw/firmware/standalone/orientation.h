@@ -3,11 +3,13 @@
 #define GC_ORIENTATION_H
 
 #include "error_covariance.h"
+#include "even_steps.h"
 #include "rest.h"
 #include "sample_check.h"
+#include "spike_review.h"
 #include "spikes.h"
 
-#define GC_UNDECIDED_MAX (2u * GC_SUSPECTS_MAX + 2u)
+#define GC_STEPS_MAX GC_SUSPECTS_MAX // last steps that a decision about a spike may change; at least GC_REVIEW_AHEAD
 
 // What a sample changes.
 typedef struct {
@@ -22,22 +24,28 @@ typedef struct {
   gc_rest rest;
 } gc_filter_state;
 
-// A sample whose spikes are not decided yet.
+// What the filter takes of a sample.
 typedef struct {
   float dt, gyro[3], accel[3];
   bool gyro_usable, accel_usable;
 } gc_filter_step;
+
+// A step that a later sample may change.
+typedef struct {
+  gc_filter_state before;
+  gc_filter_step step;
+} gc_kept_step;
 
 typedef struct {
   const gc_settings *settings;
   bool started, contradicted, temperature_stable;
   gc_filter_state state;
   gc_sample_check check;
+  gc_even_steps even;
   gc_spike_gate gyro_gate, accel_gate;
-  bool suspecting;        // `before` is the state before the first sample that is not decided
-  gc_filter_state before;
-  uint32_t undecided_count;
-  gc_filter_step undecided[GC_UNDECIDED_MAX];
+  gc_spike_review review;  // of the rates
+  uint32_t kept_count, kept_next;
+  gc_kept_step kept[GC_STEPS_MAX];  // a ring: the last one is before kept_next
 } gc_orientation;
 
 // Result of a sample.

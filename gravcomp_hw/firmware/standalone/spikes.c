@@ -63,8 +63,9 @@ uint32_t gc_spike_gate_take(gc_spike_gate *gate, const gc_settings *settings, fl
     const float difference = value[i] - gate->last[i];
     jump = gc_max(jump, gc_min(gc_abs(difference), gc_abs(difference - steps * gate->slope[i])));
   }
-  const float threshold = gc_max(gate->floor, settings->spike_ratio * gate->mean);
-  gate->mean += dt / (settings->spike_time_constant + dt) * (gc_min(jump, GC_BOUND * threshold) - gate->mean);
+  const float threshold = gc_max(gate->floor, gate->patience * settings->spike_ratio * gate->mean);
+  const float bounded = gc_min(jump, GC_BOUND / gate->patience * threshold);
+  gate->mean += dt / (settings->spike_time_constant + dt) * (bounded - gate->mean);
   if (gate->suspects == 0u) {
     if (jump <= threshold) {
       for (uint32_t i = 0; i < 3u; ++i) {

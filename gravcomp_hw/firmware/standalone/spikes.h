@@ -10,8 +10,9 @@
 #define GC_SUSPECTS_MAX 10u  // largest value of the option `longest`
 
 typedef struct {
-  float floor;  // a smaller jump is no spike
-  float sure;   // of the threshold: what is nearer to the straight line counts as it is
+  float floor;     // a smaller jump is no spike
+  float sure;      // of the threshold: what is nearer to the straight line counts as it is
+  float patience;  // factor of the option `ratio`: more where a later look finds what is overlooked here
   bool started;
   float last[3], slope[3];
   float mean;

@@ -57,14 +57,13 @@ def pack(
     robot: Robot,
     settings: np.ndarray,
     least_tension: np.ndarray,
-    branches: Sequence[tuple[float, float]] = (),
-    period: float = SAMPLE_PERIOD,
+    branches: Sequence[tuple[float, float]],
 ) -> bytes:
     """Return the blob.
 
     model: with a multiple of four modes; settings (n,): of `model_settings.settings`; least_tension (m,) in N; branches: of
-    `description.Material`, the same in the whole robot; period: s between two steps. Raises ValueError for a model that the blob
-    cannot hold; `model_fit` finds that out before.
+    `description.Material`, the same in the whole robot. Raises ValueError for a model that the blob cannot hold, which
+    `model_fit` finds out before.
     """
     modes, cables = model.size, model.cables
     linear, quadratic = model.elasticity.linear, model.elasticity.quadratic
@@ -89,7 +88,7 @@ def pack(
         least_tension,
         model.deviation.gradient.reshape(modes, 9, -1).transpose(2, 0, 1),
         law_constants(model.deviation),
-        _branch_table(branches, period),
+        _branch_table(branches),
         settings,
     )
     count = len(cables.cable)
@@ -130,7 +129,7 @@ def with_crc(blob: bytes) -> bytes:
     return blob[:12] + struct.pack("<I", zlib.crc32(blob[16:])) + blob[16:]
 
 
-def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int, law_points: int = 0, branches: int = 0) -> int:
+def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int, law_points: int, branches: int) -> int:
     """Return the number of bytes of a blob with these counts."""
     floats = modes * (modes + 1) // 2 * (strains + cables) + 3 * pieces * modes + 12 * modes + 9 + 3 * pieces
     floats += 3 * points * (modes + 1) + 6 * cables + SETTINGS
@@ -138,10 +137,10 @@ def blob_bytes(modes: int, strains: int, cables: int, pieces: int, points: int, 
     return _HEADER.size + 4 * floats + -(-pieces // 4) * 4
 
 
-def _branch_table(branches: Sequence[tuple[float, float]], period: float) -> np.ndarray:
-    """Return ratio, decay and gain (b, 3) of the branches over a period in s."""
+def _branch_table(branches: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Return ratio, decay and gain (b, 3) of the branches over the time between two steps."""
     ratio, time = np.array(branches, dtype=float).reshape(-1, 2).T
-    return np.column_stack([ratio, *branch(period, time)])
+    return np.column_stack([ratio, *branch(SAMPLE_PERIOD, time)])
 
 
 def _cable_stiffness(model: ReducedModel) -> np.ndarray:

@@ -12,8 +12,8 @@ from gravcomp.firmware.model_settings import CABLES_MAX
 
 REFUSALS = (
     "", "it is cut off", "it is no blob of a model", "it is of another version of the firmware",
-    "it has more modes, strains, cables or pieces of cables than the firmware has room for", "its size is not that of its tables",
-    "its CRC is wrong", "it belongs to another robot", "it has a number that is not finite",
+    "it has more modes, strains, cables, pieces of cables, points or branches than the firmware has room for",
+    "its size is not that of its tables", "its CRC is wrong", "it belongs to another robot", "it has a number that is not finite",
 )  # fmt: skip
 """Why the firmware refuses a blob, by gc_model_status of standalone/model.h; the first is that of a blob that is taken."""
 

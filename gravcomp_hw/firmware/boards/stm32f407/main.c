@@ -31,7 +31,7 @@ static uint32_t turns_seen;
 static uint32_t ticks_without_turn;
 
 #ifdef GC_WITH_STANDALONE
-__attribute__((section(".ccm"))) static gc_standalone standalone;
+static gc_standalone standalone;
 __attribute__((section(".ccm"))) static gc_model_store store;
 #endif
 
