@@ -3,8 +3,11 @@
 It takes half a minute on a new machine. During this time the motors would get only stale commands.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
 from gravcomp.full_model.shape import Response
@@ -39,3 +42,9 @@ def warm_up(
         plane = PlaneWall(name="far", normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -10.0 * robot.length), forbidden=True)
         zones = Scene(SceneSection(planes=(plane,)), forbidden=True)
         InverseController(robot, options, transmission, zones=zones).step(response, target, backbone_station=stations)
+        wall = replace(plane, forbidden=False)
+        touching = InverseController(robot, options, transmission, scene=Scene(SceneSection(planes=(wall,))))
+        pressed = ObstacleForces(("far",), np.ones(1), np.zeros((1, 3)), np.full((1, m), 0.1))
+        beyond = straight_target(2.0 * robot.length)
+        for _ in range(2):  # the first command misses the target, so that the second one lets the robot go
+            touching.step(response, beyond, backbone_station=stations, contact=pressed)
