@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse_article import built_once, cache_of_the_run, coarse
+from coarse_article import built_once, cache_of_the_run, coarse, keep_compiled
 
 from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Robot
@@ -36,6 +36,7 @@ def built(tmp_path_factory) -> Path:
 @pytest.fixture
 def robot(tmp_path, monkeypatch) -> Robot:
     """The robot, and a cache without its reduced model."""
+    keep_compiled(tmp_path)
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
     return coarse()
 
