@@ -220,13 +220,12 @@ def _test(args: argparse.Namespace) -> int:
 
 def _parameters(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
-    from gravcomp.description.hardware import parse_hardware
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_settings import LoopParameters
     from gravcomp.firmware.settings import WITH_HOST, settings_alone, settings_of
 
     file = load_robot_file(args.robot)
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     if len(hardware.all_buses) == 1:
         hardware = hardware.on(args.interface, args.channel)
     settings = settings_of(hardware, between=not args.one_bus)

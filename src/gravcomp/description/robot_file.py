@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.default_hardware import has_motors, with_motors
+from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.overlay import on_base, with_whole_path
+from gravcomp.description.pairs import check_pairs
 from gravcomp.description.robot import Robot
 from gravcomp.scene import SceneSection
 
@@ -41,6 +43,13 @@ class RobotFile:
             raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
         section = dict(self.sections.get(name) or {})
         return section if name != "hardware" or has_motors(section) else with_motors(section, self.robot)
+
+    @functools.cached_property
+    def hardware(self) -> Hardware:
+        """The section `hardware`, checked against the robot's cables. Raises ConfigError."""
+        hardware = parse_hardware(self.section("hardware"), source=self.source, cables=self.robot.cable_names)
+        check_pairs(hardware, self.robot, self.source)
+        return hardware
 
     @functools.cached_property
     def scene(self) -> "Scene":
