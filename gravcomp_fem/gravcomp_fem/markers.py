@@ -27,8 +27,8 @@ class RobotMarkers:
         self._lines = [cable_line(robot, cable) for cable in robot.cables]
         self._cable_width = 0.15 * half_width(robot)
 
-    def of(self, shape: Shape, header: Header) -> MarkerArray:
-        """Return the body's surface, one line per cable and the gravity arrow, all in `header.frame_id`."""
+    def of(self, shape: Shape, header: Header, gravity: np.ndarray) -> MarkerArray:
+        """Return the body's surface, one line per cable and the arrow of gravity (3,) in m/s^2, all in `header.frame_id`."""
         backbone = Backbone(shape.backbone_station, shape.backbone_position, shape.backbone_orientation)
         body = _marker(header, "body", 0, Marker.TRIANGLE_LIST, _BODY, 1.0)
         body.scale.y = body.scale.z = 1.0
@@ -37,7 +37,7 @@ class RobotMarkers:
         cables = [self._cable(header, i, shape, backbone) for i in range(len(self._robot.cables))]
         arrow = _marker(header, "gravity", 0, Marker.ARROW, _GRAVITY, 0.002)
         arrow.scale.y, arrow.scale.z = 0.005, 0.008
-        arrow.points = [_point(np.zeros(3)), _point(shape.gravity / 9.81 * _GRAVITY_LENGTH)]
+        arrow.points = [_point(np.zeros(3)), _point(gravity / 9.81 * _GRAVITY_LENGTH)]
         return MarkerArray(markers=[body, *cables, arrow])
 
     def _cable(self, header: Header, index: int, shape: Shape, backbone: Backbone) -> Marker:
