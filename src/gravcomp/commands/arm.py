@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher.domain import private_domain
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
+    given_logs = made_logs(args.logs)
     builder = prepare(args.robot, virtual=True)
     xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
@@ -81,7 +83,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         stops = {"hold": args.hold, "travel": args.travel}
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), result_file=str(result), **stops)
-        logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
+        logs, domain = given_logs or Path(scratch) / "logs", private_domain()
         with builder, Graph([*specs, player], logs, {**domain, **builder.environment}, host) as processes:
             if args.viewer:
                 processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))

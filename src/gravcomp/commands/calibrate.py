@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target, made_folder
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 
 if TYPE_CHECKING:
@@ -116,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
     file = load_robot_file(args.robot)
     if args.plan:
         return _plan(args, file)
+    made_folder("--out", Path(args.out).expanduser())
     if args.live:
         found = _measured_live(args, file)
         if found is None:
@@ -129,14 +131,10 @@ def run(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace, file: "RobotFile") -> int:
     """Print the plan, and write the table. Returns 0. Raises ConfigError."""
     from gravcomp.calibration.plan_table import instruction, pulls, write_plan_table
-    from gravcomp.config import ConfigError
 
-    target = Path(args.write or f"{file.robot.name}-plan.csv").expanduser()
+    target = checked_target("--write", Path(args.write or f"{file.robot.name}-plan.csv").expanduser())
     plan = _planned(args, file)
-    try:
-        write_plan_table(plan, file.robot, target)
-    except OSError as error:
-        raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
+    write_plan_table(plan, file.robot, target)
     lines = [f"{len(plan.poses)} poses, {plan.duration:.0f} s of robot time, {plan.rest:.1f} s at rest in each:"]
     steps = [{"do": instruction(pose), "cables": pulls(file.robot, pose)} for pose in plan.poses]
     lines += [f"{number:3d}  {step['do']}: {step['cables']}" for number, step in enumerate(steps, start=1)]
@@ -177,7 +175,7 @@ def _measured_live(args: argparse.Namespace, file: "RobotFile") -> Path | None:
 
 def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
     """Fit to resting tips and to motion, and write. Returns 0. Raises ConfigError."""
-    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, overlay_path, with_behaviour, write_calibrated
+    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, with_behaviour, write_calibrated
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError
     from gravcomp.calibration.motion import fit_motion
@@ -195,7 +193,7 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
     setup = Setup.of(file, seed_of(args))
     if args.data == "virtual":
         output.note(setup.true_robot.summary())
-    target = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
+    target = _target(args, file)
     started = time.perf_counter()
     with Sweep(args.workers) as sweep, _progress("reading") as show:
         try:
@@ -225,7 +223,7 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
                     )
                 except RuntimeError as error:  # what was found at rest still counts
                     lost = str(error)
-                if motion is not None and motion.rms_after > motion.rms_before:
+                if motion is not None and motion.rms_before is not None and motion.rms_after > motion.rms_before:
                     before, after = 1e3 * motion.rms_before, 1e3 * motion.rms_after
                     lost, motion = f"the fit to the motion is worse: {before:.2f} mm before, {after:.2f} mm after", None
                 if motion is not None and motion.damping_seen:
@@ -256,7 +254,7 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
 
 def _poses(args: argparse.Namespace, file: "RobotFile") -> int:
     """Fit to a table of poses, and write. Returns 0. Raises ConfigError."""
-    from gravcomp.calibration.apply import overlay_path, robot_of_poses, write_calibrated
+    from gravcomp.calibration.apply import robot_of_poses, write_calibrated
     from gravcomp.calibration.mapping import load_mapping
     from gravcomp.calibration.measured import MeasurementError
     from gravcomp.calibration.pose_fit import fit_poses
@@ -268,7 +266,7 @@ def _poses(args: argparse.Namespace, file: "RobotFile") -> int:
     from gravcomp.report.page import write_report
 
     mapping = load_mapping(args.mapping)
-    target = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
+    target = _target(args, file)
     started = time.perf_counter()
     with _progress("reading") as show:
         try:
@@ -293,9 +291,17 @@ def _material(args: argparse.Namespace, file: "RobotFile") -> int:
     """Fit to a test of the material, and write. Returns 0. Raises ConfigError."""
     from gravcomp.commands.material_calibration import fit_material
 
-    result, target, page = fit_material(args, file)
+    target = _target(args, file)
+    result, page = fit_material(args, file, target)
     output.result({**result.to_mapping(), "written": str(target)}, _readable(result, target, page))
     return 0
+
+
+def _target(args: argparse.Namespace, file: "RobotFile") -> Path:
+    """Return the robot file to write. Raises ConfigError."""
+    from gravcomp.calibration.apply import overlay_path
+
+    return checked_target("--write", Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name))
 
 
 def _data(args: argparse.Namespace, setup: "Setup", still: "Standstill", sweep: "Sweep", show: "Callable[[str], None]") -> "Data":

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.composition import add_composed_argument
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
@@ -88,9 +89,10 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         raise ConfigError(
             f"--screenshots looks back over the run: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
         )
-    builder = prepare(args.robot, virtual=True, seed=seed_of(args))
+    given_logs = made_logs(args.logs)
     relax_time = min(8.0, 0.3 * args.duration)
     start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
+    builder = prepare(args.robot, virtual=True, seed=seed_of(args))
     compensate_until = relax_time + 0.45 * (args.duration - relax_time)
     # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
     motion: dict[str, Any] = {
@@ -127,7 +129,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         )  # fmt: skip
         specs = [*loop, judge]
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
-        logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
+        logs = given_logs or Path(scratch) / "logs"
         domain = private_domain()
         with builder, Graph(specs, logs, {**domain, **builder.environment}, host) as processes:
             if not args.headless:

@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
 from gravcomp.commands.parsers import add_subcommand
 
 _TESTS = tuple(
@@ -87,9 +88,8 @@ def _built(args: argparse.Namespace) -> tuple[dict, str]:
     from gravcomp.firmware.image import build_image
     from gravcomp.firmware.stack import largest_stack
 
+    folder = made_folder("--output", Path(args.output).expanduser())
     image = build_image(standalone=args.standalone)
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
     for name, data in (("image.elf", image.path.read_bytes()), ("boot.bin", image.boot), ("code.bin", image.code)):
         (folder / name).write_bytes(data)
     stack = largest_stack(image)
@@ -121,10 +121,9 @@ def _model(args: argparse.Namespace) -> int:
     if not 0.0 < args.joystick_bend <= 180.0:
         raise ConfigError(f"--joystick-bend is {args.joystick_bend:g}; allowed: above 0 to 180 deg")
     file = load_robot_file(args.robot)
+    path = made_folder("--output", Path(args.output).expanduser()) / f"{file.robot.name}.model"
     model, reduction, _ = prepare(args.robot)
     found = fit(model, reduction, LoopParameters.of(file), math.radians(args.joystick_bend))
-    path = Path(args.output) / f"{file.robot.name}.model"
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(found.blob)
     figures = {
         "robot": file.robot.name,
@@ -155,7 +154,7 @@ def _send(args: argparse.Namespace) -> int:
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_transfer import forgetting, sending
 
-    path = Path(args.model)
+    path = Path(args.model).expanduser()
     try:
         blob = path.read_bytes()
     except OSError as error:
@@ -177,7 +176,7 @@ def _flash(args: argparse.Namespace) -> int:
 
     figures, sentence = _built(args)
     output.note(sentence)
-    lines = commands_for(Path(args.output), args.tool, needed=not args.show)
+    lines = commands_for(Path(args.output).expanduser(), args.tool, needed=not args.show)
     for line in lines:
         output.note(" ".join(line))
         if not args.show and subprocess.run(line).returncode != 0:

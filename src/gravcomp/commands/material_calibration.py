@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from gravcomp.report.result import Result
 
 
-def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result", Path, Path]:
-    """Fit, and write robot file and page. Returns the result, the robot file and the page. Raises ConfigError."""
-    from gravcomp.calibration.apply import overlay_path, write_calibrated
+def fit_material(args: argparse.Namespace, file: "RobotFile", target: Path) -> tuple["Result", Path]:
+    """Fit, and write the robot file `target` and the page. Returns the result and the page. Raises ConfigError."""
+    from gravcomp.calibration.apply import write_calibrated
     from gravcomp.calibration.material_recording import read_material_recording
     from gravcomp.calibration.material_report import material_result
     from gravcomp.calibration.measured import MeasurementError
@@ -20,7 +20,6 @@ def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result",
     from gravcomp.config import ConfigError
     from gravcomp.report.page import write_report
 
-    target = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
     started = time.perf_counter()
     try:
         test = read_material_recording(args.data)
@@ -30,4 +29,4 @@ def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result",
     write_calibrated(file.source, target, file.robot, file.robot.with_material(prony=fit.prony, creep_ratio=0.0), None)
     result = material_result(test, fit, str(target))
     result.seconds = time.perf_counter() - started
-    return result, target, write_report(result, Path(args.out).expanduser())
+    return result, write_report(result, Path(args.out).expanduser())

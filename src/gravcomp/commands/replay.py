@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as the graph processes it) to 1000")
     if args.out and Path(args.out).exists():
         raise ConfigError(f"{args.out}: exists and is not overwritten; name another folder")
+    logs = made_logs(args.logs)
     bag = _whole(args.bag)
     with output.progress(f"reading {args.bag}") as progress:
         recording = read_recording(bag, args.topic or None, progress=progress)
@@ -85,7 +87,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
         wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
-    with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment, host) as processes:
+    with builder, Graph([*specs, replay], logs, builder.environment, host) as processes:
         if viewer:
             processes.start_one(viewer[0])
         processes.start()
