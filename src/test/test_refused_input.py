@@ -90,6 +90,10 @@ def test_what_is_no_robot_file_is_refused(capsys, line, robot, said):
         ("up --virtual --logs empty.yaml", "--logs is empty.yaml: is a file"),
         ("arm --logs empty.yaml", "--logs is empty.yaml: is a file"),
         ("replay TRIAL --logs empty.yaml", "--logs is empty.yaml: is a file"),
+        ("replay TRIAL --out empty.yaml/bag", "--out is empty.yaml: is a file"),
+        ("record --out empty.yaml/bag", "empty.yaml: is a file"),
+        ("bench robots nobody", "nobody: does not exist; give the path of a robot file"),
+        ("bench track article folder", "folder: is a folder; give the path of a robot file"),
         ("estimate TRIAL --bias-model folder", "folder: cannot be read: Is a directory"),
         ("estimate TRIAL --bias-model binary.yaml", "binary.yaml: is not a bias model: it is not a UTF-8 text file"),
         ("estimate TRIAL --topic imu/data", "TRIAL.npz: is no bag, so that it has no topic 'imu/data' to choose"),
@@ -112,6 +116,31 @@ def test_a_place_that_cannot_be_used_is_named(capsys, line, said):
 def test_numbers_out_of_range_are_refused_before_the_model_is_built(capsys, monkeypatch, line, said):
     monkeypatch.setattr("gravcomp.simulation.Simulator.__init__", lambda *_, **__: pytest.fail("a model is built"))
     refused(capsys, line, said)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("demo --port 99999999", "--port: is 99999999; allowed: 1 to 65535"),
+        ("up --port x", "--port: is 'x'; allowed: 1 to 65535, whole numbers"),
+        ("arm --hold nan", "--hold: is nan; allowed: 1 to 600 s"),
+        ("arm --travel 0", "--travel: is 0; allowed: 0.5 to 600 s"),
+        ("record --duration nan", "--duration: is nan; allowed: 0.1 to 1000000 s"),
+        ("calibrate --plan --time 5", "--time: is 5; allowed: 10 to 3600 s"),
+        ("bench track --seeds 0", "--seeds: is 0; allowed: 1 to 2147483647"),
+        ("bench soak --minutes -1", "--minutes: is -1; allowed: 0.01 to 2147483647"),
+        ("firmware test --frames -1", "--frames: is -1; allowed: 1 to 1000000000"),
+        *(
+            (f"{command} --namespace left", "--namespace: is 'left'; a name that begins with / is needed, e.g. /left")
+            for command in ("up", "arm", "record", "replay TRIAL", "calibrate --live", "doctor --graph")
+        ),
+    ],
+)
+def test_values_of_options_are_checked_when_they_are_read(capsys, line, said):
+    with pytest.raises(SystemExit) as end:
+        main(line.split())
+    printed = capsys.readouterr()
+    assert end.value.code == 2 and not printed.out and f"argument {said}" in printed.err
 
 
 @pytest.mark.parametrize(

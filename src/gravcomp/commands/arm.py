@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gravcomp.commands import output
 from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.parsers import in_range, namespace
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -38,13 +39,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " arm's acceleration fed forward (default: both)",
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
-    parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="time at each pose in seconds (default: 5)")
     parser.add_argument(
-        "--travel", type=float, default=3.0, metavar="S", help="time of each motion between two poses in seconds (default: 3)"
+        "--hold",
+        type=in_range(float, 1.0, 600.0, "s"),
+        default=5.0,
+        metavar="S",
+        help="time at each pose in seconds (default: 5)",
+    )
+    parser.add_argument(
+        "--travel",
+        type=in_range(float, 0.5, 600.0, "s"),
+        default=3.0,
+        metavar="S",
+        help="time of each motion between two poses in seconds (default: 3)",
     )
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
-    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for one of several robots")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="namespace of all nodes, for one of several robots"
+    )
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import checked_target, made_folder
+from gravcomp.commands.parsers import in_range, namespace
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 
 if TYPE_CHECKING:
@@ -65,13 +66,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="lead through the plan on the running graph (./gravcomp up), and fit; interrupted, the same line goes on",
     )
-    parser.add_argument("--namespace", default="", metavar="NS", help="with --live: the robot in this namespace (default: /)")
     parser.add_argument(
-        "--time", type=float, metavar="S", help="robot time of the plan in s (default: 180); with --plan, --live and virtual"
+        "--namespace", type=namespace, default="", metavar="NS", help="with --live: the robot in this namespace (default: /)"
+    )
+    parser.add_argument(
+        "--time",
+        type=in_range(float, 10.0, 3600.0, "s"),
+        metavar="S",
+        help="robot time of the plan in s (default: 180); with --plan, --live and virtual",
     )
     add_seed_argument(parser, "; with virtual")
     parser.add_argument(
-        "--mass-g", type=float, metavar="G", help="weighed mass of body and payload in g: the data then tell density"
+        "--mass-g",
+        type=in_range(float, 1e-3, 1e6, "g"),
+        metavar="G",
+        help="weighed mass of body and payload in g: the data then tell density",
     )
     parser.add_argument(
         "--write", metavar="YAML", help="file to write, which stands on the robot file (default: NAME-calibrated.yaml next to it)"
@@ -106,10 +115,6 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
 
-    if args.time is not None and not 10.0 <= args.time <= 3600.0:
-        raise ConfigError(f"--time is {args.time:g} s; allowed: 10 to 3600 s")
-    if args.mass_g is not None and not 1e-3 <= args.mass_g <= 1e6:
-        raise ConfigError(f"--mass-g is {args.mass_g:g} g; allowed: 0.001 to 1000000 g")
     if (args.data is not None) + args.plan + args.live != 1:
         raise ConfigError("give one of DATA (a CSV file, a bag or 'virtual'), --plan and --live")
     if args.material and (args.mapping or args.data in (None, "virtual")):

@@ -8,6 +8,7 @@ from gravcomp.commands import output
 from gravcomp.commands.composition import add_composed_argument
 from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.parsers import namespace
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
 
@@ -31,7 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_tracker_argument(parser, "with --virtual: ")
     add_seed_argument(parser, "; with --virtual")
     parser.add_argument(
-        "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
+        "--namespace",
+        type=namespace,
+        default="",
+        metavar="NS",
+        help="namespace of all nodes, e.g. /left, for several robots in one graph",
     )
     add_composed_argument(parser)
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
@@ -55,8 +60,6 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
-    if args.namespace and not args.namespace.startswith("/"):
-        raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
     if args.tracker and not args.virtual:
         raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
     logs = made_logs(args.logs)
