@@ -9,5 +9,4 @@ from gravcomp.virtual.robot import VirtualRobot
 def warm_up() -> None:
     """Compile all kernels that the article's robot needs."""
     file = load_robot_file("article")
-    hardware = file.hardware
-    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, hardware).step(0.02)
+    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, file.hardware).step(0.02)
