@@ -35,7 +35,7 @@ def checked_target(option: str, path: Path) -> Path:
     if is_folder:
         raise ConfigError(f"{option} is {path}: is a folder; the path of a file is needed")
     if not folder_exists:
-        raise ConfigError(f"{option} is {path}: there is no folder {path.parent}")
+        raise ConfigError(f"{option} is {path}: cannot be written: there is no folder {path.parent}")
     if not os.access(path if exists else path.parent, os.W_OK):
-        raise ConfigError(f"{option} is {path}: cannot be written; write permission is needed")
+        raise ConfigError(f"{option} is {path}: cannot be written: write permission is needed")
     return path
