@@ -1,9 +1,12 @@
 """Places where the robot's surface is near an obstacle; compiled.
 
 At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
-half of g'^2 / g'': where it is a minimum along the robot, the place moves there, so that no point of the surface is deeper in
-a wall than at these places, within a few micrometres. Where a wall is across the robot, the points on the rim of the tip's face
-are places too; the nearest one of the rim is one then only where it is deeper than they are, as in a small tilt.
+an eighth of g''. Where that is much and the gap is a minimum along the robot, the place moves there, so that no point of the
+surface is deeper in a wall than at these places, within a few micrometres. Whether places move follows from g'' alone: if it
+followed from the slope, a force would hop between a station and the minimum next to it, and no equilibrium would be found.
+
+Where a wall is across the robot, the points on the rim of the tip's face are places too; the nearest one of the rim is one then
+only where it is deeper than they are, as in a small tilt.
 """
 
 from typing import NamedTuple
@@ -18,7 +21,7 @@ _TURNS = 4  # corrections of the direction in which the outline is nearest
 _SETTLED = 1e-5  # of the radius: what it changes of the gap is the square of that
 _MOVES = 3  # corrections of the place along the robot
 _ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
-_WORTH = 1e-4  # of the radius: a place moves along the robot if that makes the gap smaller by this
+_WORTH = 3e-4  # of the radius: places move along the robot where that can make the gap smaller by this
 
 
 class Places(NamedTuple):
@@ -211,7 +214,7 @@ def _write_place(
     before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
     bend = gap[k, first] - 2.0 * gap[k, first + 1] + gap[k, first + 2]
     slope = 0.5 * (gap[k, first + 2] - gap[k, first]) + (place - 1.0) * bend
-    if best <= before and best <= after and bend > 0.0 and slope * slope > 2.0 * bend * _WORTH * surface.radius[s]:
+    if best <= before and best <= after and bend > 8.0 * _WORTH * surface.radius[s]:
         low, high = max(place - 0.5, 0.0), min(place + 0.5, 2.0)
         moved, other, across = place - slope / bend, np.empty(2), np.empty(3)
         for _ in range(_MOVES):
@@ -227,7 +230,7 @@ def _write_place(
                 curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
                 ahead += across[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
             moved -= ahead / bend
-        if low < moved < high:  # at an end of the robot, or next to another station, the place stays when the robot tilts
+        if 0.0 < min(max(moved, low), high) < 2.0:  # at an end of the robot the place stays when it tilts
             result.rocking[i] = -1.0 / bend
     _section_at(sections, first, place, share, section)
     tilt = result.tilt[i]
