@@ -45,7 +45,7 @@ class Viewer(ManagedNode):
 
     def activate(self) -> None:
         """Subscribe, and update the page from now on."""
-        self.observer = GraphObserver(self, self.robot_file.robot.length, self._walls)
+        self.observer = GraphObserver(self, self.robot_file.robot, self._walls)
         self._frames = self.create_timer(1.0 / self.parameters.rate, self._frame)
 
     def deactivate(self) -> None:

@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 
 from gravcomp.inverse import Holdable, TargetError
-from gravcomp.view.backbone import arc_backbone
+from gravcomp.view.backbone import arc_backbone, rest_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
@@ -19,6 +19,7 @@ from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deform
 from gravcomp_node import COMMAND, LATCHED
 
 if TYPE_CHECKING:
+    from gravcomp.description import Robot
     from gravcomp.scene.scene import Scene
 
 _STREAM = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
@@ -39,10 +40,10 @@ _CLOCK_TOLERANCE = 10.0  # s
 
 
 class GraphObserver:
-    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it; None: it has none."""
+    """Reads the newest message of each topic for a robot with these walls around it; None: it has none."""
 
-    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None"):
-        self._node, self._length, self._walls = node, length, walls
+    def __init__(self, node: LifecycleNode, robot: "Robot", walls: "Scene | None"):
+        self._node, self._length, self._walls = node, robot.length, walls
         self._streams = {
             "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
             "command": Polled(node, CableCommand, "cable/command", _STREAM),
@@ -54,7 +55,8 @@ class GraphObserver:
             "target": Polled(node, PoseStamped, "target", COMMAND),
             "shape": Polled(node, ShapeTarget, "target/shape", COMMAND),
         }
-        self._target = TargetView(np.array([0.0, 0.0, length]), arc_backbone(length, 0.0, 0.0))
+        rest = rest_backbone(robot)
+        self._target = TargetView(rest.tip, rest)
         self._counted: tuple[float, int] | None = None
         self._rate = 0.0
 
