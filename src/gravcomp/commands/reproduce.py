@@ -198,12 +198,13 @@ def _unless_left_out(find: "Callable[[str], Any]", name: str, subject: Any, amon
     find: returns the module of a name, whose `run` takes the subject. Raises ConfigError for one that was asked for alone.
     """
     from gravcomp.calibration.measured import MeasurementError
+    from gravcomp.closed_loop.loop_failed import LoopFailed
     from gravcomp.config import ConfigError
 
     try:
         result: Result = find(name).run(subject)
         return result
-    except (ConfigError, MeasurementError) as error:
+    except (ConfigError, MeasurementError, LoopFailed) as error:
         if not among_all:
             raise ConfigError(str(error)) from error
         output.note(f"{name}: {error}")
