@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         columns = read_mapping(args.columns) if args.columns else None
         with output.progress(f"reading {args.file}") as reading:
             recording = read_recording(args.file, args.topic, columns, reading)
-        recording, findings = in_si(recording, convert=args.units == "auto")
+        recording, findings, unknown = in_si(recording, convert=args.units == "auto")
         correction = calibrate_in_motion(recording) if args.calibrate else None
         if correction is not None:
             recording = calibrated(recording, correction)
@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         "rejected": estimator.filter.rejected,
         "problems": dict.fromkeys((*recording.notes, *(f.text for f in findings)), 1) | result.problems,
         "findings": [finding.kind for finding in findings],
+        "not_shown": unknown,
         "calibration": None if correction is None else {"scale": correction.accel_scale, "offset": correction.accel_offset},
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
@@ -143,6 +144,7 @@ def _text(figures: dict[str, Any]) -> str:
         lines.append(f"  inclination RMSE    {figures['inclination_rmse_deg']:.3f} deg against the recording's ground truth")
     lines.append(f"  rejected samples    {figures['rejected']}")
     lines += [f"    {count} x {problem}" for problem, count in figures["problems"].items()]
+    lines += [f"  not checked         {sentence}" for sentence in figures["not_shown"]]
     lines.append(f"  computing time      {figures['us_per_sample']:.0f} us per sample")
     if "out" in figures:
         lines.append(f"  written             {figures['out']}")
