@@ -34,7 +34,8 @@ FEWEST = 3  # stretches: one that hardly turns says nothing
 LEAST = 0.005  # mean scatter of a stretch, of gravity squared, of a stream that turns too little
 STILL = 0.01  # deviation of the means of a stretch by changes of the velocity at least, of gravity: weighs the stretches
 UNCALIBRATED = 0.15  # m/s^2
-CERTAIN = 4.0  # standard deviations of the length of gravity
+LARGEST = 0.2 * STANDARD_GRAVITY  # m/s^2
+EXPLAINED = 40.0  # ratio of what an offset and a scale explain to the variance that is left
 SCALES = {"": 1.0, "half": 0.5, "double": 2.0, "deg/s": math.pi / 180.0, "millideg/s": math.pi / 180e3}
 
 
@@ -66,7 +67,7 @@ class Axes:
         self._scatter = np.zeros(len(CANDIDATES) + 1)  # weighted; the last one without turns
         self._stretches = self._turning = 0.0
         self._rate = RateScale()
-        self._lengths: list[float] = []  # of gravity in each window, m/s^2
+        self._windows: list[list[float]] = []  # length of gravity in m/s^2, and mean direction in the sensor's frame
         self._blocks: list[Block] = []
         self._length = self._pause = 0.0
         self._live = False
@@ -79,7 +80,7 @@ class Axes:
         self._stretches *= keep
         self._turning *= keep
         self._rate.forget(keep)
-        self._lengths = self._lengths[-10 * WINDOWS :]
+        self._windows = self._windows[-10 * WINDOWS :]
 
     def take(self, block: Block) -> None:
         """Take a block; every few seconds they make a stretch."""
@@ -97,7 +98,7 @@ class Axes:
     def findings(self) -> list[Finding]:
         """Return what is odd."""
         if self._stretches < FEWEST or not self._turns:
-            return [*self._rate.findings(), *self._of_length()]
+            return self._rate.findings() or self._of_length()
         scatter, still = self._scatter[:-1], self._scatter[-1]
         best, same_axes = self._likeliest(len(CANDIDATES)), self._likeliest(len(SCALES))
         likelier = self._likelier
@@ -111,7 +112,7 @@ class Axes:
             text = "the rates contradict the accelerometer: axes, signs or unit are wrong; it turns too little to show which"
             return [Finding("contradiction", text)]
         if usual or not shown or scatter[best] > CLEAR * scatter[0]:
-            return [*self._rate.findings(), *self._of_length()]
+            return self._rate.findings() or self._of_length()
         unit = scale if scale in ("deg/s", "millideg/s") else ""
         correction = matrix * (SCALES[unit] if unit else 1.0)
         found = []
@@ -146,17 +147,23 @@ class Axes:
         return 1.0 / (1.0 + chance_square(degrees, len(CANDIDATES)) / degrees)
 
     def _of_length(self) -> list[Finding]:
-        """Return whether gravity has another length in the means over the windows."""
-        if len(self._lengths) < FEWEST * WINDOWS:
+        """Return whether gravity has another length in the means over the windows, by a scale and an offset.
+
+        A sensor with offset o that points up along d (in its own frame) measures the length g + o d.
+        """
+        if len(self._windows) < FEWEST * WINDOWS:
             return []
-        lengths = np.array(self._lengths)
-        middle = float(np.median(lengths))
-        spread = 1.48 * float(np.median(np.abs(lengths - middle)))
-        error = abs(middle - STANDARD_GRAVITY)
-        # Of correlated windows as many count as there are stretches.
-        if not max(UNCALIBRATED, CERTAIN * spread / math.sqrt(len(lengths) / WINDOWS)) < error < 0.2 * STANDARD_GRAVITY:
+        windows = np.array(self._windows)  # (n, 4): length in m/s^2, direction
+        error = windows[:, 0] - STANDARD_GRAVITY
+        by_direction = np.column_stack([np.ones(len(windows)), windows[:, 1:]])
+        fitted = by_direction @ np.linalg.lstsq(by_direction, error, rcond=1e-2)[0]
+        left = float(np.sum((error - fitted) ** 2))
+        gain = float(np.sum(error**2)) - left
+        size = math.sqrt(float(np.mean(fitted**2)))
+        # Of the windows, whose errors go together, as many count as there are stretches.
+        if not UNCALIBRATED < size < LARGEST or gain * (len(windows) - 4.0) < EXPLAINED * WINDOWS * left:
             return []
-        text = f"the specific force of gravity is {middle:.2f} m/s^2 in motion: scale or offset of the accelerometer; calibrate"
+        text = f"in motion gravity is wrong by {size:.2f} m/s^2: scale or offset of the accelerometer; calibrate"
         return [Finding("accel_calibration", text)]
 
     def _likeliest(self, count: int) -> int:
@@ -179,15 +186,17 @@ class Axes:
             self._bias = rates[int(np.argmin(steady))].mean(axis=0)
 
     def _take_stretch(self, blocks: list[Block]) -> None:
-        if _longest_repeated(np.concatenate([block.gyro for block in blocks])) * blocks[-1].period > STUCK:
-            return
         stamp = np.concatenate([block.stamp_ns for block in blocks])
-        gyro = _without_spikes(np.concatenate([block.gyro for block in blocks]))
-        accel = _median(np.concatenate([block.accel for block in blocks]))
+        order = np.argsort(stamp, kind="stable")
+        stamp, gyro = stamp[order], np.concatenate([block.gyro for block in blocks])[order]
+        accel = _median(np.concatenate([block.accel for block in blocks])[order])
+        if _stuck(gyro, accel, round(STUCK / blocks[-1].period)):
+            return
+        gyro = _without_spikes(gyro)
         steps = np.diff(stamp) * 1e-9
         count = max(1, round(STEP / blocks[-1].period))
         whole = len(gyro) // (count * WINDOWS) * count * WINDOWS
-        if steps.min() < 0.0 or steps.max() > max(LONGEST_STEP, 3.0 * blocks[-1].period) or whole < 2 * WINDOWS * count:
+        if steps.max() > max(LONGEST_STEP, 3.0 * blocks[-1].period) or whole < 2 * WINDOWS * count:
             return
         length = np.median(np.linalg.norm(accel, axis=1))
         if not length > 0.0:
@@ -213,7 +222,10 @@ class Axes:
         self._turning += candidates.max()
         self._stretches += 1.0
         self._rate.take(orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._bias is not None)
-        self._lengths += (length * np.linalg.norm(means[:, 0], axis=1)).tolist()
+        up = np.einsum("mji,wj->wmi", orientations[:, 0], means[:, 0]).reshape(WINDOWS, WINDOWS, -1, 3)
+        lengths = np.linalg.norm(means[:, 0], axis=1)
+        directions = up[range(WINDOWS), range(WINDOWS)].mean(axis=1) / lengths[:, None]
+        self._windows += np.column_stack([length * lengths, directions]).tolist()
 
 
 def _median(values: np.ndarray) -> np.ndarray:
@@ -230,10 +242,14 @@ def _without_spikes(values: np.ndarray) -> np.ndarray:
     return np.where(away > SPIKE * np.median(away, axis=0), middle, _median(values))
 
 
-def _longest_repeated(values: np.ndarray) -> int:
-    """Return the largest number of rows (n, 3) in a row that repeat the one before."""
-    changes = np.flatnonzero(np.concatenate([[True], (values[1:] != values[:-1]).any(axis=1), [True]]))
-    return int(np.diff(changes).max()) - 1
+def _stuck(gyro: np.ndarray, accel: np.ndarray, longest: int) -> bool:
+    """Return whether rates (n, 3) repeat for more than `longest` samples while the specific force (n, 3) changes."""
+    changes = np.flatnonzero(np.concatenate([[True], (gyro[1:] != gyro[:-1]).any(axis=1), [True]]))
+    for i in np.flatnonzero(np.diff(changes) > longest):
+        forces = accel[changes[i] : changes[i + 1]]
+        if forces.std(axis=0).max() > QUIET * np.linalg.norm(forces.mean(axis=0)):
+            return True
+    return False
 
 
 def _named(matrix: np.ndarray) -> str:

@@ -15,6 +15,14 @@ from gravcomp.stream_checks.values import Values
 BLOCK = 256  # samples at least
 _LEAST = 0.6  # s of a block: longer than a window in which a sensor rests
 
+_HIDES = {
+    "gyro_unit": ("gyro_quantised", "gyro_stuck"),
+    "accel_unit": ("accel_quantised", "accel_stuck", "accel_clipped"),
+    "gyro_quantised": ("gyro_spikes",),
+    "accel_quantised": ("accel_spikes",),
+}
+"""Kinds that follow from another one: steps between values are known in SI only, and coarse steps look like spikes."""
+
 
 def block_length(rate: float) -> int:
     """Return the samples of a block of a stream with a rate in Hz."""
@@ -84,9 +92,9 @@ class StreamMonitor:
         """Return what is odd, the worst first."""
         if self._current is None:
             found = [finding for check in self._checks for finding in check.findings()]
-            # The step between values is known in SI only; of two looks at the length of gravity the later one, at rest, counts.
-            steps = {f"{finding.kind.removesuffix('_unit')}_quantised" for finding in found if finding.kind.endswith("_unit")}
-            kinds = {finding.kind: finding for finding in found if finding.kind not in steps}
+            hidden = {kind for finding in found for kind in _HIDES.get(finding.kind, ())}
+            # Of two looks at the length of gravity the later one, at rest, counts.
+            kinds = {finding.kind: finding for finding in found if finding.kind not in hidden}
             self._current = sorted(kinds.values(), key=lambda finding: not finding.fatal)
         return self._current
 

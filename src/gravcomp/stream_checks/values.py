@@ -96,7 +96,8 @@ class Values:
     def _extend_run(self, block: Block, part: slice) -> None:
         other = getattr(block, OTHER[self._name])[part]
         self._run += len(other) * block.period
-        self._low, self._high = np.minimum(self._low, other.min(axis=0)), np.maximum(self._high, other.max(axis=0))
+        low, high = np.quantile(other, (0.1, 0.9), axis=0)  # without spikes
+        self._low, self._high = np.minimum(self._low, low), np.maximum(self._high, high)
         if self._run >= STUCK and not self._rests(getattr(block, self._name)[part.start]):
             self._stuck = max(self._stuck, self._run)
 
@@ -107,5 +108,5 @@ class Values:
         extent = self._high - self._low
         if self._name == "accel":
             return bool(np.abs(np.concatenate([self._low, self._high])).max() <= LARGEST_BIAS)
-        # 6 standard deviations from the lowest to the highest value
-        return bool(extent.max() <= 6.0 * QUIET * np.linalg.norm(self._high) and np.abs(value).max() <= 2.0 * self._step.min())
+        # From the lowest to the highest tenth there are 2.6 standard deviations.
+        return bool(extent.max() <= 2.6 * QUIET * np.linalg.norm(self._high) and np.abs(value).max() <= 2.0 * self._step.min())

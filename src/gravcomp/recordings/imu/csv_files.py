@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.config import from_mapping, load_yaml
-from gravcomp.recordings.imu.csv_columns import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, CsvColumns, Found, by_mapping, by_names
+from gravcomp.recordings.imu.csv_columns import CsvColumns, Found, by_mapping, by_names
 from gravcomp.recordings.imu.csv_text import Table, read_table
+from gravcomp.recordings.imu.csv_units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
-SUFFIXES = (".csv", ".txt", ".tsv")
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log")
 _RATES = (5.0, 8000.0)  # Hz, of an IMU whose unit of time is not given
 _TRUTHS = ("state_groundtruth_estimate0", "mocap0")  # of EuRoC and TUM-VI, next to imu0
 _TREE = ("mav0/imu0/data.csv", "imu0/data.csv", "data.csv")
@@ -125,6 +126,8 @@ def _stamps(table: Table, found: Found, rate: float | None, values: np.ndarray) 
             names = ", ".join(name or "-" for name in table.names)
             raise RecordingError(f"{table.source}: has no column of time among {names}; give it or rate by --columns")
         return np.rint(np.arange(len(table.rows)) * (1e9 / rate)).astype(np.int64), ()
+    if (clock := table.clock_times(found.time)) is not None:
+        return usable_stamps(clock, None, values)
     numbers, whole = table.numbers(found.time), table.whole_numbers(found.time)
     if not np.isfinite(numbers).all():
         raise RecordingError(
@@ -133,6 +136,9 @@ def _stamps(table: Table, found: Found, rate: float | None, values: np.ndarray) 
     unit = found.time_unit or _time_unit(numbers, table)
     scale = TIME_UNITS[unit]
     stamp = np.rint(numbers * scale).astype(np.int64) if whole is None else np.array([x * scale for x in whole], np.int64)
+    if found.nanoseconds is not None:
+        rest = table.numbers(found.nanoseconds)
+        stamp = stamp + np.where(np.isfinite(rest), rest, 0.0).astype(np.int64)
     return usable_stamps(stamp, None, values)
 
 
