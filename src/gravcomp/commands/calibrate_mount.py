@@ -38,15 +38,21 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.orientation.resting_poses import resting_poses
     from gravcomp.recordings.bags.joint_states import read_description, read_joint_positions
     from gravcomp.recordings.imu import read_recording
+    from gravcomp.stream_checks import in_si
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
     options = from_mapping(ImuEstimatorParameters, section, source=file.source, key="nodes.imu_estimator").estimator
-    recording = read_recording(args.bag, args.topic)
+    with output.progress(f"reading {args.bag}") as progress:
+        recording, _, _ = in_si(read_recording(args.bag, args.topic, progress=progress), convert=False)
+    for note in recording.notes:
+        output.note(f"{args.bag}: {note}")
     try:
         urdf = Path(args.urdf).read_text(encoding="utf-8") if args.urdf else read_description(args.bag)
     except OSError as error:
         raise ConfigError(f"{args.urdf}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{args.urdf}: is no text in UTF-8, so it is not a URDF") from error
     if urdf is None:
         raise ConfigError(f"{args.bag}: has no robot_description; give the URDF with --urdf")
     chain = Chain(urdf, args.base_frame, args.world_frame, args.urdf or "robot_description")

@@ -47,9 +47,10 @@ def run(args: argparse.Namespace) -> int:
 
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
-    from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
+    from gravcomp.orientation.calibration_in_motion import calibrated
     from gravcomp.orientation.inclination import inclination_rmse
     from gravcomp.orientation.offline import without_rate_spikes
+    from gravcomp.orientation.self_calibration import calibrate_from_itself
     from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
@@ -60,10 +61,12 @@ def run(args: argparse.Namespace) -> int:
         with output.progress(f"reading {args.file}") as reading:
             recording = read_recording(args.file, args.topic, columns, reading)
         recording, findings, unknown = in_si(recording, convert=args.units == "auto")
-        correction = calibrate_in_motion(recording) if args.calibrate else None
-        if correction is not None:
-            recording = calibrated(recording, correction)
         options, mount = _of_robot(args.robot)
+        correction = None
+        if args.calibrate:
+            correction, left_open = calibrate_from_itself(recording, options.filter)
+            recording = calibrated(recording, correction)
+            unknown += [left_open] if left_open else []
         if args.average > 1:
             recording = without_rate_spikes(recording, options.filter.spikes).averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None

@@ -29,6 +29,7 @@ SPIKE = 6.0  # of the usual distance of a sample from the median of its neighbou
 STUCK = 0.25  # s with the same rates: they are not those of the sensor, and their stretch says nothing
 CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
 FAR = 10.0  # ratio to the scatter without turns of rates in another unit
+RANDOM = 0.1  # mean scatter of a stretch, of gravity squared, at least with rates in another unit
 OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
 FEWEST = 3  # stretches: one that hardly turns says nothing
 LEAST = 0.005  # mean scatter of a stretch, of gravity squared, of a stream that turns too little
@@ -65,7 +66,7 @@ class Axes:
 
     def __init__(self) -> None:
         self._scatter = np.zeros(len(CANDIDATES) + 1)  # weighted; the last one without turns
-        self._stretches = self._turning = 0.0
+        self._stretches = self._turning = self._as_given = 0.0
         self._rate = RateScale()
         self._windows: list[list[float]] = []  # length of gravity in m/s^2, and mean direction in the sensor's frame
         self._blocks: list[Block] = []
@@ -79,6 +80,7 @@ class Axes:
         self._scatter *= keep
         self._stretches *= keep
         self._turning *= keep
+        self._as_given *= keep
         self._rate.forget(keep)
         self._windows = self._windows[-10 * WINDOWS :]
 
@@ -107,7 +109,8 @@ class Axes:
         matrix, scale = CANDIDATES[best]
         usual = best < len(SCALES) and scale in ("", "half", "double")
         # Rates in another unit turn gravity about at random, those of other axes at most twice as far as it turns.
-        shown = scatter[best] <= likelier * still or (scale.endswith("deg/s") and scatter[0] > FAR * still)
+        at_random = scatter[0] > FAR * still and self._as_given > RANDOM * self._stretches
+        shown = scatter[best] <= likelier * still or (scale.endswith("deg/s") and at_random)
         if scatter[best] <= CLEAR * scatter[0] and not usual and not shown and CLEAR * scatter[0] > still:
             text = "the rates contradict the accelerometer: axes, signs or unit are wrong; it turns too little to show which"
             return [Finding("contradiction", text)]
@@ -132,7 +135,9 @@ class Axes:
     def unknown(self) -> list[str]:
         """Return what the motion does not show, a sentence each."""
         axes = []
-        if self._stretches < FEWEST or not self._turns:
+        if self._stretches < FEWEST:
+            axes = [f"the stream is too short to check unit and axes of the gyroscope: {FEWEST * STRETCH:.0f} s are needed"]
+        elif not self._turns:
             axes = ["the sensor turns too little to check unit and axes of the gyroscope"]
         return [*axes, *self._rate.unknown()]
 
@@ -220,6 +225,7 @@ class Axes:
         weight = 1.0 / (STILL**2 + min(candidates[: len(SCALES)].min(), scatter[scales].min()))
         self._scatter = self._scatter + weight * np.append(candidates, scatter[-1])
         self._turning += candidates.max()
+        self._as_given += candidates[0]
         self._stretches += 1.0
         self._rate.take(orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._bias is not None)
         up = np.einsum("mji,wj->wmi", orientations[:, 0], means[:, 0]).reshape(WINDOWS, WINDOWS, -1, 3)

@@ -18,6 +18,9 @@ from gravcomp.stream_checks.finding import Finding
 RATE_SCALES = {"half": 0.5, "less": 0.7, "same": 1.0, "more": 1.4, "double": 2.0}
 KNOWN_BIAS = np.radians(0.2)  # rad/s, deviation after a rest
 UNKNOWN_BIAS = np.radians(2.0)  # rad/s, of sensors in use
+NOISE = (
+    0.04  # weighted variance at least: gyroscope noise turns gravity by a tenth of a degree in a stretch, less with a small scale
+)
 CHANCE = 6e-5  # of a wrong report, as of four standard deviations
 
 
@@ -85,7 +88,7 @@ class RateScale:
         """Return minus twice the logarithm of the likelihood of each scale, beyond that of the likeliest."""
         if self._degrees < 1.0:
             return {}
-        variance = max(float(self._least(np.inf).min()) / self._degrees, 1e-12)
+        variance = max(float(self._least(np.inf).min()) / self._degrees, NOISE)
         sums = self._least(KNOWN_BIAS if self._rested else UNKNOWN_BIAS, variance) / variance
         return dict(zip(RATE_SCALES, (sums - sums.min()).tolist()))
 
