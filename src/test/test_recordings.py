@@ -43,7 +43,7 @@ def test_truth_is_optional(tmp_path):
         ({"gyr": np.full((10, 3), "x")}, "gyr is of type"),
         ({"quat": np.zeros((8, 4))}, r"orientation has the shape \(8, 4\)"),
         ({"rate": 0.0}, "rate is 0"),
-        ({"rate": np.array([1.0, 2.0])}, "one positive number in Hz"),
+        ({"rate": np.array([1.0, 2.0])}, "one number of 0.1 to 100000 Hz"),
         ({"movement": np.full(10, 7)}, "booleans are needed"),
         ({"gyr": np.zeros((1, 3)), "acc": np.zeros((1, 3)), "quat": None, "movement": None}, "at least 2"),
     ],

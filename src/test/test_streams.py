@@ -75,7 +75,7 @@ def test_a_stream_that_hardly_turns_keeps_its_unit_with_spikes_and_without_rest(
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_reported_and_held(name, trial, short, clean_deg):
     fault = FAULTS[name]
-    # The drift needs the rest at the end, a calibration the turns of the whole trial; the others are shown by any part with motion.
+    # The drift needs the rest at the end, a calibration all turns; the others are shown by any part with motion.
     kinds, error = outcome(fault, trial if name in ("bias_drift", "scale_and_offset") else short, seed=2)
     assert set(kinds) & set(fault.kinds) and "left_open" not in kinds
     if error is not None:

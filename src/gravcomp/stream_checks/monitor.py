@@ -15,6 +15,7 @@ from gravcomp.stream_checks.values import Values
 BLOCK = 256  # samples at least
 _LEAST = 0.6  # s of a block: longer than a window in which a sensor rests
 
+_LARGEST = 1e12  # in any unit: a larger value is no measurement, and its square may overflow
 _HIDES = {
     "gyro_unit": ("gyro_quantised", "gyro_stuck"),
     "accel_unit": ("accel_quantised", "accel_stuck", "accel_clipped"),
@@ -67,7 +68,7 @@ class StreamMonitor:
 
     def add_block(self, stamp_ns: np.ndarray, gyro: np.ndarray, accel: np.ndarray) -> None:
         """Take n samples: stamps (n,) in ns, rates (n, 3) and specific forces (n, 3)."""
-        finite = np.isfinite(gyro).all(axis=1) & np.isfinite(accel).all(axis=1)
+        finite = (np.abs(gyro) < _LARGEST).all(axis=1) & (np.abs(accel) < _LARGEST).all(axis=1)
         stamp_ns, gyro, accel = stamp_ns[finite], gyro[finite], accel[finite]
         if len(stamp_ns) < 8:
             return

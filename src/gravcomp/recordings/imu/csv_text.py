@@ -35,14 +35,18 @@ class Table:
         return np.array([_number(row[column]) for row in self.rows])
 
     def clock_times(self, column: int) -> np.ndarray | None:
-        """Return a column of dates or times of day in ISO 8601 in ns (n,), None where one is none."""
-        first = self.rows[0][column] if self.rows else ""
-        if ":" not in first:
-            return None
-        try:
-            times = [_clock(row[column]) for row in self.rows]
-        except ValueError:
-            return None
+        """Return a column of dates or times of day in ISO 8601 in ns (n,), None where it is none. Raises RecordingError."""
+        times: list[int] = []
+        for i, row in enumerate(self.rows):
+            try:
+                if ":" not in row[column]:
+                    raise ValueError
+                times.append(_clock(row[column]))
+            except ValueError:
+                if not times:
+                    return None
+                text = f"{self.source}: column '{self.names[column]}' is no time of a clock in row {i + 1}: '{row[column]}'"
+                raise RecordingError(text) from None
         return np.array(times, np.int64)
 
     def whole_numbers(self, column: int) -> list[int] | None:
