@@ -36,15 +36,21 @@ _LOADED, _AT_TIP = 0.7, 0.6
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Random paths: paths, and steps of each; modulus_range: relative to the robot's modulus; bend: largest in rad; seed."""
+    """Random paths: at most `paths`, at least `least`; steps of each; bend: largest in rad; seed.
+
+    modulus_range: relative to the robot's modulus.
+    """
 
     paths: int = 75
+    least: int = 25
     steps: int = 30
     modulus_range: tuple[float, float] = (0.6, 1.6)
     bend: float = np.radians(50.0)
     seed: int = 1
 
 
+# After so many paths it is asked again whether they are enough.
+_NEW = 10
 _ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
 
 
@@ -68,13 +74,16 @@ def samples(
     options: TrainingOptions,
     progress: Callable[[float], None] = lambda share: None,
     kept: Path | None = None,
+    enough: Callable[[list[Sample], list[Sample]], bool] | None = None,
 ) -> list[Sample]:
     """Return equilibria along random paths. progress: called with the completed share.
 
-    kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples.
+    kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples. enough:
+    asked every few paths with the samples of earlier paths and those of the last ones, whether more are needed; None: all paths.
     """
     rng = np.random.default_rng(options.seed)
     found: list[Sample] = []
+    begins: list[int] = []  # of each path, in `found`
     for number in range(options.paths):
         file = None if kept is None else kept / f"{number:04}.npz"
         path = _stored(file, rng) if file else None
@@ -82,8 +91,15 @@ def samples(
             path = list(_path(model, options, rng))
             if file:
                 _store(path, file, rng)
+        begins.append(len(found))
         found += path
         progress((number + 1) / options.paths)
+        more = number + 1 - options.least
+        if enough is not None and more >= 0 and more % _NEW == 0 and number + 1 > _NEW:
+            last = begins[-_NEW]
+            if enough(found[:last], found[last:]):
+                progress(1.0)
+                break
     return found
 
 
