@@ -60,11 +60,13 @@ def test_files_of_other_kinds_are_refused(tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.csv").write_text("1,2")
     (tmp_path / "a.jpg").write_text("")
+    (tmp_path / "old.bag").write_text("#ROSBAG V2.0")
     for name, words in (
         ("text.npz", "is not an .npz"),
         ("folder", "is not a bag"),
         ("a.csv", "lacks a rate and a specific force"),
         ("a.jpg", "of no known kind"),
+        ("old.bag", "is a bag of ROS 1; .* rosbags-convert --src"),
         ("none", "does not exist"),
     ):
         with pytest.raises(RecordingError, match=words):
