@@ -220,6 +220,7 @@ class ImuEstimator(ManagedNode):
             rejected=status.rejected,
             counter_wraps=self._counter.wraps,
             stream="; ".join(finding.text for finding in self._monitor.findings()),
+            not_shown="; ".join(self._monitor.unknown()),
         )
 
     def _follow_streams(self) -> None:

@@ -136,6 +136,68 @@ def test_usual_names_in_any_unit_of_time(tmp_path, names, unit):
     check(read_recording(tmp_path / "a.csv"))
 
 
+STRANGERS = {
+    "units at the end of names": ("timestamp_us,gyro_x_dps,gyro_y_dps,gyro_z_dps,acc_x_g,acc_y_g,acc_z_g", 1e6, "deg", "g"),
+    "other units": ("time_ns,wx_rad_s,wy_rad_s,wz_rad_s,ax_mg,ay_mg,az_mg", 1e9, "rad", "mg"),
+    "units spelt out": ("Epoch (ms),GyroX [deg/sec],GyroY [deg/sec],GyroZ [deg/sec],AccX [g],AccY [g],AccZ [g]", 1e3, "deg", "g"),
+    "milli-degrees": ("t [s],Gyr X {mdps},Gyr Y {mdps},Gyr Z {mdps},Acc X {m/s2},Acc Y {m/s2},Acc Z {m/s2}", 1.0, "mdeg", ""),
+    "a line of units": ("t,gx,gy,gz,ax,ay,az\nms,deg/s,deg/s,deg/s,g,g,g", 1e3, "deg", "g"),
+    "a line of units in brackets": ("t,gx,gy,gz,ax,ay,az\n[s],[°/s],[°/s],[°/s],[m/s²],[m/s²],[m/s²]", 1.0, "deg", ""),
+    "axis first": ("time,x_gyro,y_gyro,z_gyro,X-axis acceleration,Y-axis acceleration,Z-axis acceleration", 1.0, "rad", ""),
+    "the names of ROS": (
+        "%time,field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,"
+        "field.linear_acceleration.x,field.linear_acceleration.y,field.linear_acceleration.z", 1e9, "rad", ""),
+    "comments": ("# device: 12\n# rate, 200\n#\n% made by hand\nt,gx,gy,gz,ax,ay,az", 1.0, "rad", ""),
+    "the line of a spreadsheet": ("sep=,\nt,gx,gy,gz,ax,ay,az", 1.0, "rad", ""),
+    "Chinese": ("时间(s),角速度X(deg/s),角速度Y(deg/s),角速度Z(deg/s),加速度X(g),加速度Y(g),加速度Z(g)", 1.0, "deg", "g"),
+    "Polish": ("czas [ms],żyroskop x,żyroskop y,żyroskop z,przyspieszenie x,przyspieszenie y,przyspieszenie z", 1e3, "rad", ""),
+    "Spanish": ("Tiempo (s),Giroscopio x,Giroscopio y,Giroscopio z,Aceleración x,Aceleración y,Aceleración z", 1.0, "rad", ""),
+    "quotes": ('"t","gx","gy","gz","ax","ay","az"', 1.0, "rad", ""),
+    "spaces": ("t, gx, gy, gz, ax, ay, az", 1.0, "rad", ""),
+}  # fmt: skip
+IN_SI = {"rad": 1.0, "deg": np.pi / 180.0, "mdeg": np.pi / 180e3, "": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_headers_of_strangers_say_what_the_columns_are(tmp_path, name):
+    header, scale, rate, force = STRANGERS[name]
+    times = [round(scale * (1000.0 + t)) if scale > 1.0 else t for t in SECONDS]
+    (tmp_path / "a.csv").write_text(lines(header, rows(times, GYRO / IN_SI[rate], ACCEL / IN_SI[force])), encoding="utf-8")
+    check(read_recording(tmp_path / "a.csv"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize(
+    ("separator", "comma", "end"), [(";", True, "\n"), ("\t", False, "\r\n"), ("|", False, "\n"), (" ", True, "\n")]
+)
+def test_encodings_separators_and_ends_of_lines(tmp_path, encoding, separator, comma, end):
+    header = separator.join(["Zeit", "gx", "gy", "gz", "ax", "ay", "az"])
+    text = lines(header, rows(SECONDS, GYRO, ACCEL), separator, comma).replace("\n", "\n\n" + end, 2).replace("\n", end)
+    (tmp_path / "a.txt").write_bytes(text.encode(encoding))
+    check(read_recording(tmp_path / "a.txt"))
+
+
+def test_columns_in_another_order_with_gaps_and_a_separator_at_the_end(tmp_path):
+    table = rows(ACCEL[:, ::-1], [""] * N, GYRO[:, ::-1], SECONDS, [""] * N)
+    (tmp_path / "a.csv").write_text(lines("az,ay,ax,note,gz,gy,gx,t", table))
+    check(read_recording(tmp_path / "a.csv"))
+
+
+def test_seconds_and_nanoseconds_in_two_columns(tmp_path):
+    header = "header.stamp.sec,header.stamp.nanosec,gx,gy,gz,ax,ay,az"
+    table = rows([t // 10**9 for t in NS], [t % 10**9 for t in NS], GYRO, ACCEL)
+    (tmp_path / "a.csv").write_text(lines(header, table))
+    recording = read_recording(tmp_path / "a.csv")
+    check(recording)
+    assert recording.stamp_ns.tolist() == NS
+
+
+@pytest.mark.parametrize("form", ["2026-03-01 12:00:0{:.3f}", "2026-03-01T12:00:0{:.3f}Z", "12:00:0{:.3f}"])
+def test_times_of_a_clock(tmp_path, form):
+    (tmp_path / "a.csv").write_text(lines("time,gx,gy,gz,ax,ay,az", rows([form.format(t) for t in SECONDS], GYRO, ACCEL)))
+    check(read_recording(tmp_path / "a.csv"))
+
+
 def test_the_last_line_may_be_cut_off(tmp_path):
     (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)) + "0.03,0.1,")
     check(read_recording(tmp_path / "a.csv"))
@@ -155,7 +217,16 @@ MISTAKES = [
     ),
     ("t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,6\n", "has 1 IMU samples"),
     ("hello\nworld\n", "no line of numbers"),
-    ("", "no line of numbers"),
+    ("t,gx,gy,gz,ax,ay,az\n0.2,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n", "the time does not advance: it goes from 0.2 to 0.1"),
+    ("sec,nanosec,gx,gy,gz,ax,ay,az\n0,0,1,2,3,4,5,6\n0,-,1,2,3,4,5,6\n", "column 'nanosec' is no number in row 2"),
+    ("t,gx,gy,gz,ax,ay,az\n12:00:01,1,2,3,4,5,6\n(stop),1,2,3,4,5,6\n", r"column 't' is no time of a clock in row 2: '\(stop\)'"),
+    ("", "is empty; a header and lines of numbers are needed"),
+    ("\n\n  \n", "is empty"),
+    ("t,gx,gy,gz,ax,ay,az\n", "no line of numbers among the first 1"),
+    ("t,gx (rad/s),gy (deg/s),gz (rad/s),ax,ay,az\n0,1,2,3,4,5,6\n", "of one sensor are in different units"),
+    ("t,gx,gy,ax,ay,az\n0,1,2,3,4,5\n1,1,2,3,4,5\n", "lacks a rate; found the columns: t, gx, gy, ax, ay, az"),
+    ("\x00\x01\x02\x03PNG\n\x00\x00", "no line of numbers"),
+    ('t,gx,gy,gz,ax,ay,az\n0,"1,2,3,4,5,6\n', "no line of numbers"),
 ]
 
 

@@ -43,7 +43,7 @@ def test_truth_is_optional(tmp_path):
         ({"gyr": np.full((10, 3), "x")}, "gyr is of type"),
         ({"quat": np.zeros((8, 4))}, r"orientation has the shape \(8, 4\)"),
         ({"rate": 0.0}, "rate is 0"),
-        ({"rate": np.array([1.0, 2.0])}, "one positive number in Hz"),
+        ({"rate": np.array([1.0, 2.0])}, "one number of 0.1 to 100000 Hz"),
         ({"movement": np.full(10, 7)}, "booleans are needed"),
         ({"gyr": np.zeros((1, 3)), "acc": np.zeros((1, 3)), "quat": None, "movement": None}, "at least 2"),
     ],
@@ -60,11 +60,13 @@ def test_files_of_other_kinds_are_refused(tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "a.csv").write_text("1,2")
     (tmp_path / "a.jpg").write_text("")
+    (tmp_path / "old.bag").write_text("#ROSBAG V2.0")
     for name, words in (
         ("text.npz", "is not an .npz"),
         ("folder", "is not a bag"),
         ("a.csv", "lacks a rate and a specific force"),
         ("a.jpg", "of no known kind"),
+        ("old.bag", "is a bag of ROS 1; .* rosbags-convert --src"),
         ("none", "does not exist"),
     ):
         with pytest.raises(RecordingError, match=words):

@@ -92,3 +92,10 @@ def test_stamps_that_never_advance_are_refused_by_every_command(tmp_path, capsys
     for command in (["estimate"], ["calibrate-imu"]):
         assert main([*command, str(bag)]) == 2
         assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("pace", [0.5, 1.0, 2.0])
+def test_stamps_of_another_pace_than_the_reception_are_named(tmp_path, pace):
+    received = 100.0 + 0.01 * np.arange(1200)
+    notes = read_recording(write_bag(tmp_path / "bag", 50.0 + pace * 0.01 * np.arange(1200), received)).notes
+    assert [f"{pace:.2f} times as fast as the times of reception" in note for note in notes] == ([] if pace == 1.0 else [True])

@@ -172,6 +172,12 @@ ROWS = {
         Row("beyond_limit_deg.*", "error beyond the limit", "deg", 0.0),
         Row("excess_deg.gyro_spikes", "gyroscope spikes: error beyond the clean trial's, worst", "deg", 0.25),
         Row("excess_deg.accel_spikes", "accelerometer spikes: error beyond the clean trial's, worst", "deg", 0.25),
+        Row("partly_calibrated", "scale and offset: trials that turn too little to be calibrated, which is reported", ""),
+        Row("partly_calibrated_deg", "the same: error beyond the clean trial's, worst", "deg"),
+        Row("simulated.false_reports", "simulated sensors and motions, clean: findings", "", 0.0),
+        Row("simulated.missed.*", "simulated sensors and motions: recordings in which it is not reported", "", 0.0),
+        Row("simulated.excess_deg.gyro_spikes.*", "simulated: gyroscope spikes, error beyond the clean recording's", "deg", 0.25),
+        Row("simulated.excess_deg.accel_spikes.*", "simulated: accelerometer spikes, error beyond the clean's", "deg", 0.25),
         Row("us_per_sample", "CPU time of the live checks, a sample", "us", 20.0),
     ),
     "graph": (

@@ -22,6 +22,7 @@ class Fault:
     kinds: tuple[str, ...]
     excess_deg: float | None = None
     convert: bool = False  # the error is measured after the conversion
+    at_rest: bool = False  # shown by rests among the motion only
     calibrate: bool = False  # the error is measured after a calibration from the recording itself
 
 
@@ -114,7 +115,7 @@ FAULTS: dict[str, Fault] = {
     "accel_in_g": Fault(_scaled("accel", 1.0 / STANDARD_GRAVITY), ("accel_unit",), 0.05, convert=True),
     "gyro_in_deg_s": Fault(_scaled("gyro", 180.0 / np.pi), ("gyro_unit",), 0.05, convert=True),
     "gyro_in_millideg_s": Fault(_scaled("gyro", 180e3 / np.pi), ("gyro_unit",), 0.05, convert=True),
-    "scale_and_offset": Fault(_uncalibrated, ("accel_calibration",), 0.5, calibrate=True),
+    "scale_and_offset": Fault(_uncalibrated, ("accel_calibration",), 0.5, at_rest=True, calibrate=True),
     "accel_negated": Fault(_scaled("accel", -1.0), ("accel_negated",), 0.05, convert=True),
     "other_frame": Fault(
         lambda recording, random: _with(recording, gyro=recording.gyro @ SWAPPED.T), ("frames",), 0.05, convert=True
@@ -133,5 +134,5 @@ FAULTS: dict[str, Fault] = {
     "clipped": Fault(_clipped, ("gyro_clipped",)),
     "stuck": Fault(_stuck, ("gyro_stuck",)),
     "quantised": Fault(_quantised, ("gyro_quantised",)),
-    "bias_drift": Fault(_drift, ("bias_drift",)),
+    "bias_drift": Fault(_drift, ("bias_drift",), at_rest=True),
 }

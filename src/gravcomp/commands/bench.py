@@ -50,7 +50,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     },
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
     "loads": {"seeds": (3, "number of seeds of the virtual robot")},
-    "streams": {"seed": (1, "seed of the faults")},
+    "streams": {"seed": (1, "seed of the faults"), "seeds": (2, "simulated recordings of each kind")},
     "soak": {"minutes": (30.0, "duration in minutes")},
     "start": {"tests": (False, "measure the tests, too")},
 }
@@ -80,7 +80,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "track": {"seeds": 1, "brief": True},
     "loads": {"seeds": 1, "rods": 3, "brief": True},
     "estimator": {"every": 13},
-    "streams": {"every": 5},
+    "streams": {"every": 5, "seeds": 0},
     "board": {"frames": 10_000, "every": 5},
     "graph": {"listen": 1.0, "cost": 1.0, "warm_up": 0.2, "pairs": 1},
     "page": {"listen": 1.0, "settle": 0.2, "window": (500, 300)},

@@ -40,12 +40,16 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.orientation.resting_poses import resting_poses
     from gravcomp.recordings.bags.joint_states import read_description, read_joint_positions
     from gravcomp.recordings.imu import read_recording
+    from gravcomp.stream_checks import in_si
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
     options = from_mapping(ImuEstimatorParameters, section, source=file.source, key="nodes.imu_estimator").estimator
     target = checked_target("--write", Path(args.write or f"{file.robot.name}-mounted.yaml").expanduser())
-    recording = read_recording(args.bag, args.topic)
+    with output.progress(f"reading {args.bag}") as progress:
+        recording, _, _ = in_si(read_recording(args.bag, args.topic, progress=progress), convert=False)
+    for note in recording.notes:
+        output.note(f"{args.bag}: {note}")
     urdf = read_urdf(args.urdf) if args.urdf else read_description(args.bag)
     if urdf is None:
         raise ConfigError(f"{args.bag}: has no robot_description; give the URDF with --urdf")

@@ -48,9 +48,10 @@ def run(args: argparse.Namespace) -> int:
 
     from gravcomp.config import ConfigError
     from gravcomp.orientation import BiasModelError, BiasTemperatureModel, GravityEstimator, estimate_recording
-    from gravcomp.orientation.calibration_in_motion import calibrate_in_motion, calibrated
+    from gravcomp.orientation.calibration_in_motion import calibrated
     from gravcomp.orientation.inclination import inclination_rmse
     from gravcomp.orientation.offline import without_rate_spikes
+    from gravcomp.orientation.self_calibration import calibrate_from_itself
     from gravcomp.recordings.imu import read_mapping, read_recording
     from gravcomp.stream_checks import in_si
 
@@ -62,11 +63,13 @@ def run(args: argparse.Namespace) -> int:
         columns = read_mapping(args.columns) if args.columns else None
         with output.progress(f"reading {args.file}") as reading:
             recording = read_recording(args.file, args.topic, columns, reading)
-        recording, findings = in_si(recording, convert=args.units == "auto")
-        correction = calibrate_in_motion(recording) if args.calibrate else None
-        if correction is not None:
-            recording = calibrated(recording, correction)
+        recording, findings, unknown = in_si(recording, convert=args.units == "auto")
         options, mount = _of_robot(args.robot)
+        correction = None
+        if args.calibrate:
+            correction, left_open = calibrate_from_itself(recording, options.filter)
+            recording = calibrated(recording, correction)
+            unknown += [left_open] if left_open else []
         if args.average > 1:
             recording = without_rate_spikes(recording, options.filter.spikes).averaged(args.average)
         model = BiasTemperatureModel.load(args.bias_model) if args.bias_model else None
@@ -91,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
         "rejected": estimator.filter.rejected,
         "problems": dict.fromkeys((*recording.notes, *(f.text for f in findings)), 1) | result.problems,
         "findings": [finding.kind for finding in findings],
+        "not_shown": unknown,
         "calibration": None if correction is None else {"scale": correction.accel_scale, "offset": correction.accel_offset},
         "us_per_sample": elapsed / len(recording) * 1e6,
     }
@@ -143,6 +147,7 @@ def _text(figures: dict[str, Any]) -> str:
         lines.append(f"  inclination RMSE    {figures['inclination_rmse_deg']:.3f} deg against the recording's ground truth")
     lines.append(f"  rejected samples    {figures['rejected']}")
     lines += [f"    {count} x {problem}" for problem, count in figures["problems"].items()]
+    lines += [f"  not checked         {sentence}" for sentence in figures["not_shown"]]
     lines.append(f"  computing time      {figures['us_per_sample']:.0f} us per sample")
     if "out" in figures:
         lines.append(f"  written             {figures['out']}")

@@ -26,7 +26,7 @@ _NOISE = 0.1  # m/s^2, of the mean over a window
 _STILL = np.radians(1.0)  # rad/s: a window whose rate varies less shows the gyroscope's offset
 _LARGEST_OFFSET = np.radians(5.0)  # rad/s
 _PASSES = 3  # the noise follows from the residuals of the pass before
-_KNOWN = 0.4  # of the prior: an offset that is less certain is not determined
+KNOWN = 0.4  # of the prior: an offset that is less certain is not determined
 
 
 def calibrate_in_motion(recording: Recording, gravity: float = 9.81) -> ImuCalibration:
@@ -65,7 +65,7 @@ def calibrate_in_motion(recording: Recording, gravity: float = 9.81) -> ImuCalib
         unknown = solution.x
         noise = max(_NOISE, float(1.48 * np.median(np.abs(excess(unknown)))))
     std = np.sqrt(np.diag(np.linalg.inv(solution.jac.T @ solution.jac)))[3:]
-    if std.max() > _KNOWN * OFFSET_PRIOR:
+    if std.max() > KNOWN * OFFSET_PRIOR:
         raise CalibrationError(
             f"{recording.source}: its motion determines the offset of the accelerometer to {std.max():.2f} m/s^2 only;"
             " turn the sensor slowly in all directions to calibrate it"

@@ -4,8 +4,7 @@ With the right rates, the specific force turned back into the frame at the begin
 plus linear acceleration, and the latter nearly vanishes in means over two seconds. With rates in other units or axes these
 means scatter. Every signed permutation of the axes with every usual scale is tried; the one with the smallest scatter is
 that of the stream. A stream of which both sensors are left-handed looks like one with all rates negated, because the cross
-product in d(a)/dt = -w x a changes its sign. The bias of the rates is the mean rate at rest; before the first rest it counts as
-zero, and a factor of 2 is not reported, because a bias would look like it where the sensor hardly turns.
+product in d(a)/dt = -w x a changes its sign. The scale of the rates: `rate_scale`.
 """
 
 import itertools
@@ -14,22 +13,30 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.stream_checks.finding import Block, Finding
+from gravcomp.stream_checks.rate_scale import RATE_SCALES, RateScale, chance_square
+from gravcomp.stream_checks.resting import LARGEST_BIAS, QUIET, STEADY
 
 STRETCH = 8.0  # s
 WINDOWS = 4  # of a stretch
 STEP = 0.03  # s between the rotations; rates are averaged over it
 LONGEST_STEP = 0.2  # s: with a longer gap a stretch is left out
 LIVE_PAUSE = 16.0  # s between two stretches of a live stream
-QUIET = 0.01  # largest deviation of the specific force in a block at rest, of its length: elsewhere a mean rate is no bias
+REST = 0.5  # s of rest in which the mean rate is the bias
 ALIKE = 1.1  # ratio of scatters that says nothing
+SPIKE = 6.0  # of the usual distance of a sample from the median of its neighbours
 STUCK = 0.25  # s with the same rates: they are not those of the sensor, and their stretch says nothing
-CERTAIN = 4.0  # standard deviations from 1 of a scale of the rates that is reported
-NEAR = 0.25  # of a scale: what is fitted differs by less
 CLEAR = 0.6  # ratio to the scatter of the stream as it is from which another one is right
+FAR = 10.0  # ratio to the scatter without turns of rates in another unit
+RANDOM = 0.1  # mean scatter of a stretch, of gravity squared, at least with rates in another unit
 OTHER_AXES = 0.85  # the same, to that of the right scale without a change of axes
 FEWEST = 3  # stretches: one that hardly turns says nothing
 LEAST = 0.005  # mean scatter of a stretch, of gravity squared, of a stream that turns too little
+STILL = 0.01  # deviation of the means of a stretch by changes of the velocity at least, of gravity: weighs the stretches
+UNCALIBRATED = 0.15  # m/s^2
+LARGEST = 0.2 * STANDARD_GRAVITY  # m/s^2
+EXPLAINED = 40.0  # ratio of what an offset and a scale explain to the variance that is left
 SCALES = {"": 1.0, "half": 0.5, "double": 2.0, "deg/s": math.pi / 180.0, "millideg/s": math.pi / 180e3}
 
 
@@ -47,29 +54,39 @@ def _candidates() -> list[tuple[np.ndarray, str]]:
 
 
 CANDIDATES = _candidates()
-_MATRICES = np.array([matrix * SCALES[scale] for matrix, scale in CANDIDATES])
+_MATRICES = np.array(
+    [matrix * SCALES[scale] for matrix, scale in CANDIDATES]
+    + [scale * np.eye(3) for scale in RATE_SCALES.values()]
+    + [np.zeros((3, 3))]  # no turns
+)
 
 
 class Axes:
     """Scatter of each candidate, summed over the stretches."""
 
     def __init__(self) -> None:
-        self._scatter, self._stretches = np.zeros(len(CANDIDATES)), 0.0
+        self._scatter = np.zeros(len(CANDIDATES) + 1)  # weighted; the last one without turns
+        self._stretches = self._turning = self._as_given = 0.0
+        self._rate = RateScale()
+        self._windows: list[list[float]] = []  # length of gravity in m/s^2, and mean direction in the sensor's frame
         self._blocks: list[Block] = []
         self._length = self._pause = 0.0
         self._live = False
-        self._bias, self._steadiest = np.zeros(3), math.inf  # mean rate of the quiet block in which it changes least
+        self._bias: np.ndarray | None = None  # rad/s, of the last rest
 
     def forget(self, keep: float) -> None:
         """Multiply the sums by `keep`; the stream is live, so that stretches are taken with pauses."""
         self._live = True
         self._scatter *= keep
         self._stretches *= keep
+        self._turning *= keep
+        self._as_given *= keep
+        self._rate.forget(keep)
+        self._windows = self._windows[-10 * WINDOWS :]
 
     def take(self, block: Block) -> None:
         """Take a block; every few seconds they make a stretch."""
         length = len(block.stamp_ns) * block.period
-        self._find_bias(block)
         if self._pause > 0.0:
             self._pause -= length
             return
@@ -82,16 +99,23 @@ class Axes:
 
     def findings(self) -> list[Finding]:
         """Return what is odd."""
-        if self._stretches < FEWEST:
-            return []
-        if self._scatter.max() < LEAST * self._stretches:
-            return self._of_scale()
+        if self._stretches < FEWEST or not self._turns:
+            return self._rate.findings() or self._of_length()
+        scatter, still = self._scatter[:-1], self._scatter[-1]
         best, same_axes = self._likeliest(len(CANDIDATES)), self._likeliest(len(SCALES))
-        if self._scatter[best] > OTHER_AXES * self._scatter[same_axes]:
+        likelier = self._likelier
+        if scatter[best] > min(OTHER_AXES, likelier) * min(scatter[same_axes], self._rate.scatter):
             best = same_axes
-        if best == 0 or self._scatter[best] > CLEAR * self._scatter[0]:
-            return self._of_scale()
         matrix, scale = CANDIDATES[best]
+        usual = best < len(SCALES) and scale in ("", "half", "double")
+        # Rates in another unit turn gravity about at random, those of other axes at most twice as far as it turns.
+        at_random = scatter[0] > FAR * still and self._as_given > RANDOM * self._stretches
+        shown = scatter[best] <= likelier * still or (scale.endswith("deg/s") and at_random)
+        if scatter[best] <= CLEAR * scatter[0] and not usual and not shown and CLEAR * scatter[0] > still:
+            text = "the rates contradict the accelerometer: axes, signs or unit are wrong; it turns too little to show which"
+            return [Finding("contradiction", text)]
+        if usual or not shown or scatter[best] > CLEAR * scatter[0]:
+            return self._rate.findings() or self._of_length()
         unit = scale if scale in ("deg/s", "millideg/s") else ""
         correction = matrix * (SCALES[unit] if unit else 1.0)
         found = []
@@ -106,70 +130,108 @@ class Axes:
             found.append(Finding("frames", text, gyro_matrix=correction))
         if unit:
             found.append(Finding("gyro_unit", f"the gyroscope is in {unit}: rad/s is needed", fatal=True, gyro_matrix=correction))
-        elif scale and self._rested and self._scatter[best] <= CLEAR * self._scatter[best - list(SCALES).index(scale)]:
-            found.append(_wrong_by_two(scale))
         return found
 
-    def _of_scale(self) -> list[Finding]:
-        """Return whether the rates are wrong by 2 where the sensor turns so little that linear acceleration hides most of it.
-
-        The scatter is about a parabola over the scale s of the rates, S = c + k (s - s0)^2, and s0 the scale that fits best, with
-        the variance c / (9 k n) for n stretches: each has nine differences of its means.
-        """
-        same, half, double = self._scatter[:3] / self._stretches  # the order of SCALES
-        first = (same - half) / (1.0 - SCALES["half"])
-        curvature = ((double - same) / (SCALES["double"] - 1.0) - first) / (SCALES["double"] - SCALES["half"])
-        if not self._rested or not curvature > 0.0:
-            return []
-        fitted = 0.5 * (1.0 + SCALES["half"] - first / curvature)
-        least = half + first * (fitted - SCALES["half"]) + curvature * (fitted - SCALES["half"]) * (fitted - 1.0)
-        deviation = math.sqrt(max(least, 0.0) / (9.0 * curvature * self._stretches))
-        if abs(fitted - 1.0) <= CERTAIN * deviation:
-            return []
-        return [_wrong_by_two(name) for name in ("half", "double") if abs(fitted / SCALES[name] - 1.0) < NEAR]
+    def unknown(self) -> list[str]:
+        """Return what the motion does not show, a sentence each."""
+        axes = []
+        if self._stretches < FEWEST:
+            axes = [f"the stream is too short to check unit and axes of the gyroscope: {FEWEST * STRETCH:.0f} s are needed"]
+        elif not self._turns:
+            axes = ["the sensor turns too little to check unit and axes of the gyroscope"]
+        return [*axes, *self._rate.unknown()]
 
     @property
-    def _rested(self) -> bool:
-        return math.isfinite(self._steadiest)
+    def _turns(self) -> bool:
+        return self._turning >= LEAST * self._stretches
 
-    def _find_bias(self, block: Block) -> None:
-        gyro, accel = _median(block.gyro)[1:-1], _median(block.accel)[1:-1]  # a spike at either end would remain
-        steadiness = float(gyro.std(axis=0).max())
-        if steadiness < self._steadiest and accel.std(axis=0).max() <= QUIET * np.linalg.norm(accel.mean(axis=0)):
-            self._steadiest, self._bias = steadiness, gyro.mean(axis=0)
+    @property
+    def _likelier(self) -> float:
+        """The ratio of scatters below which a candidate is not the better one by chance."""
+        degrees = 3.0 * (WINDOWS - 1.0) * self._stretches
+        return 1.0 / (1.0 + chance_square(degrees, len(CANDIDATES)) / degrees)
+
+    def _of_length(self) -> list[Finding]:
+        """Return whether gravity has another length in the means over the windows, by a scale and an offset.
+
+        A sensor with offset o that points up along d (in its own frame) measures the length g + o d.
+        """
+        if len(self._windows) < FEWEST * WINDOWS:
+            return []
+        windows = np.array(self._windows)  # (n, 4): length in m/s^2, direction
+        error = windows[:, 0] - STANDARD_GRAVITY
+        by_direction = np.column_stack([np.ones(len(windows)), windows[:, 1:]])
+        fitted = by_direction @ np.linalg.lstsq(by_direction, error, rcond=1e-2)[0]
+        left = float(np.sum((error - fitted) ** 2))
+        gain = float(np.sum(error**2)) - left
+        size = math.sqrt(float(np.mean(fitted**2)))
+        # Of the windows, whose errors go together, as many count as there are stretches.
+        if not UNCALIBRATED < size < LARGEST or gain * (len(windows) - 4.0) < EXPLAINED * WINDOWS * left:
+            return []
+        text = f"in motion gravity is wrong by {size:.2f} m/s^2: scale or offset of the accelerometer; calibrate"
+        return [Finding("accel_calibration", text)]
 
     def _likeliest(self, count: int) -> int:
         """Return the first of the first `count` candidates whose scatter is about the smallest of theirs."""
         scatter = self._scatter[:count]
         return int(np.argmax(scatter <= ALIKE * scatter.min()))
 
-    def _take_stretch(self, blocks: list[Block]) -> None:
-        if _longest_repeated(np.concatenate([block.gyro for block in blocks])) * blocks[-1].period > STUCK:
+    def _find_bias(self, gyro: np.ndarray, accel: np.ndarray, period: float) -> None:
+        """Take the mean rate of the steadiest rest, if there is one, among means (m, 3) over `period` s."""
+        count = max(4, round(REST / period))
+        whole = len(gyro) // count * count
+        if not whole:
             return
+        rates, forces = (values[:whole].reshape(-1, count, 3) for values in (gyro, accel))
+        deviation = rates.std(axis=1).max(axis=1)
+        quiet = forces.std(axis=1).max(axis=1) <= QUIET * np.linalg.norm(forces.mean(axis=1), axis=1)
+        still = quiet & (np.abs(rates.mean(axis=1)).max(axis=1) <= LARGEST_BIAS)
+        steady = np.where(still, deviation, np.inf)
+        if steady.min() <= STEADY:
+            self._bias = rates[int(np.argmin(steady))].mean(axis=0)
+
+    def _take_stretch(self, blocks: list[Block]) -> None:
         stamp = np.concatenate([block.stamp_ns for block in blocks])
-        gyro = _median(np.concatenate([block.gyro for block in blocks]))
-        accel = _median(np.concatenate([block.accel for block in blocks]))
+        order = np.argsort(stamp, kind="stable")
+        stamp, gyro = stamp[order], np.concatenate([block.gyro for block in blocks])[order]
+        accel = _median(np.concatenate([block.accel for block in blocks])[order])
+        if _stuck(gyro, accel, round(STUCK / blocks[-1].period)):
+            return
+        gyro = _without_spikes(gyro)
         steps = np.diff(stamp) * 1e-9
         count = max(1, round(STEP / blocks[-1].period))
         whole = len(gyro) // (count * WINDOWS) * count * WINDOWS
-        if steps.min() < 0.0 or steps.max() > LONGEST_STEP or whole < 2 * WINDOWS * count:
+        if steps.max() > max(LONGEST_STEP, 3.0 * blocks[-1].period) or whole < 2 * WINDOWS * count:
             return
         length = np.median(np.linalg.norm(accel, axis=1))
         if not length > 0.0:
             return
         duration = (stamp[whole - 1] - stamp[0]) * 1e-9 / (whole - 1) * count
-        rate = gyro[:whole].reshape(-1, count, 3).mean(axis=1) - self._bias  # (m, 3)
+        rate = gyro[:whole].reshape(-1, count, 3).mean(axis=1)  # (m, 3)
         force = accel[:whole].reshape(-1, count, 3).mean(axis=1) / length
+        self._find_bias(rate, force, duration)
+        if self._bias is not None:
+            rate = rate - self._bias
         turns = np.einsum("cij,mj->mci", _MATRICES, rate) * duration
-        matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(CANDIDATES), 3, 3)
-        orientation = np.broadcast_to(np.eye(3), (len(CANDIDATES), 3, 3))
-        turned = np.empty((len(rate), len(CANDIDATES), 3))
+        matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(_MATRICES), 3, 3)
+        orientations = np.empty_like(matrices)
+        orientation = np.broadcast_to(np.eye(3), (len(_MATRICES), 3, 3))
         for m in range(len(rate)):
-            orientation = orientation @ matrices[m]
-            turned[m] = orientation @ force[m]
-        means = turned.reshape(WINDOWS, -1, len(CANDIDATES), 3).mean(axis=1)
-        self._scatter = self._scatter + np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=2), axis=0)
+            orientation = orientations[m] = orientation @ matrices[m]
+        turned = np.einsum("mcij,mj->mci", orientations, force)
+        means = turned.reshape(WINDOWS, -1, len(_MATRICES), 3).mean(axis=1)
+        scatter = np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=2), axis=0)
+        candidates, scales = scatter[: len(CANDIDATES)], slice(len(CANDIDATES), -1)
+        weight = 1.0 / (STILL**2 + min(candidates[: len(SCALES)].min(), scatter[scales].min()))
+        self._scatter = self._scatter + weight * np.append(candidates, scatter[-1])
+        self._turning += candidates.max()
+        self._as_given += candidates[0]
         self._stretches += 1.0
+        self._rate.take(orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._bias is not None)
+        up = np.einsum("mji,wj->wmi", orientations[:, 0], means[:, 0]).reshape(WINDOWS, WINDOWS, -1, 3)
+        lengths = np.linalg.norm(means[:, 0], axis=1)
+        directions = up[range(WINDOWS), range(WINDOWS)].mean(axis=1) / lengths[:, None]
+        self._windows += np.column_stack([length * lengths, directions]).tolist()
 
 
 def _median(values: np.ndarray) -> np.ndarray:
@@ -178,15 +240,22 @@ def _median(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[:1], inner, values[-1:]])
 
 
-def _longest_repeated(values: np.ndarray) -> int:
-    """Return the largest number of rows (n, 3) in a row that repeat the one before."""
-    changes = np.flatnonzero(np.concatenate([[True], (values[1:] != values[:-1]).any(axis=1), [True]]))
-    return int(np.diff(changes).max()) - 1
+def _without_spikes(values: np.ndarray) -> np.ndarray:
+    """Return the values (n, 3) without spikes of one or two samples: the median of five neighbours stands in for them."""
+    padded = np.pad(values, ((2, 2), (0, 0)), mode="edge")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
+    away = np.abs(values - middle)
+    return np.where(away > SPIKE * np.median(away, axis=0), middle, _median(values))
 
 
-def _wrong_by_two(scale: str) -> Finding:
-    text = f"the turns by the gyroscope are {'twice' if scale == 'half' else 'half'} those by the accelerometer"
-    return Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2")
+def _stuck(gyro: np.ndarray, accel: np.ndarray, longest: int) -> bool:
+    """Return whether rates (n, 3) repeat for more than `longest` samples while the specific force (n, 3) changes."""
+    changes = np.flatnonzero(np.concatenate([[True], (gyro[1:] != gyro[:-1]).any(axis=1), [True]]))
+    for i in np.flatnonzero(np.diff(changes) > longest):
+        forces = accel[changes[i] : changes[i + 1]]
+        if forces.std(axis=0).max() > QUIET * np.linalg.norm(forces.mean(axis=0)):
+            return True
+    return False
 
 
 def _named(matrix: np.ndarray) -> str:

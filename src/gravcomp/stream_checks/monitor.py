@@ -12,7 +12,22 @@ from gravcomp.stream_checks.spikes import Spikes
 from gravcomp.stream_checks.timing import Timing
 from gravcomp.stream_checks.values import Values
 
-BLOCK = 256  # samples
+BLOCK = 256  # samples at least
+_LEAST = 0.6  # s of a block: longer than a window in which a sensor rests
+
+_LARGEST = 1e12  # in any unit: a larger value is no measurement, and its square may overflow
+_HIDES = {
+    "gyro_unit": ("gyro_quantised", "gyro_stuck"),
+    "accel_unit": ("accel_quantised", "accel_stuck", "accel_clipped"),
+    "gyro_quantised": ("gyro_spikes",),
+    "accel_quantised": ("accel_spikes",),
+}
+"""Kinds that follow from another one: steps between values are known in SI only, and coarse steps look like spikes."""
+
+
+def block_length(rate: float) -> int:
+    """Return the samples of a block of a stream with a rate in Hz."""
+    return max(BLOCK, math.ceil(_LEAST * rate))
 
 
 class StreamMonitor:
@@ -30,9 +45,12 @@ class StreamMonitor:
         self._accel: list[Sequence[float]] = []
         self._last_ns: int | None = None
         self._period = 0.0
+        self._block = BLOCK
         self._resting = Resting()
-        self._checks: tuple[Check, ...] = (Axes(), self._resting, Spikes(), Values("gyro"), Values("accel"), Timing())
+        self._axes = Axes()
+        self._checks: tuple[Check, ...] = (self._axes, self._resting, Spikes(), Values("gyro"), Values("accel"), Timing())
         self._current: list[Finding] | None = None
+        self._unknown: list[str] | None = None
 
     @property
     def starts_upside_down(self) -> bool:
@@ -44,13 +62,13 @@ class StreamMonitor:
         self._stamps.append(stamp_ns)
         self._gyro.append(gyro)
         self._accel.append(accel)
-        if len(self._stamps) == BLOCK:
+        if len(self._stamps) >= self._block:
             self.add_block(np.array(self._stamps), np.array(self._gyro), np.array(self._accel))
             self._stamps, self._gyro, self._accel = [], [], []
 
     def add_block(self, stamp_ns: np.ndarray, gyro: np.ndarray, accel: np.ndarray) -> None:
         """Take n samples: stamps (n,) in ns, rates (n, 3) and specific forces (n, 3)."""
-        finite = np.isfinite(gyro).all(axis=1) & np.isfinite(accel).all(axis=1)
+        finite = (np.abs(gyro) < _LARGEST).all(axis=1) & (np.abs(accel) < _LARGEST).all(axis=1)
         stamp_ns, gyro, accel = stamp_ns[finite], gyro[finite], accel[finite]
         if len(stamp_ns) < 8:
             return
@@ -62,17 +80,27 @@ class StreamMonitor:
             self._period = float(np.median(forward))
         if not self._period:
             return
+        self._block = block_length(1.0 / self._period)
         block = Block(stamp_ns, gyro, accel, self._period, steps)
         keep = math.exp(-len(stamp_ns) * self._period / self._memory)
         for check in self._checks:
             if keep < 1.0:
                 check.forget(keep)
             check.take(block)
-        self._current = None
+        self._current = self._unknown = None
 
     def findings(self) -> list[Finding]:
         """Return what is odd, the worst first."""
         if self._current is None:
             found = [finding for check in self._checks for finding in check.findings()]
-            self._current = sorted(found, key=lambda finding: not finding.fatal)
+            hidden = {kind for finding in found for kind in _HIDES.get(finding.kind, ())}
+            # Of two looks at the length of gravity the later one, at rest, counts.
+            kinds = {finding.kind: finding for finding in found if finding.kind not in hidden}
+            self._current = sorted(kinds.values(), key=lambda finding: not finding.fatal)
         return self._current
+
+    def unknown(self) -> list[str]:
+        """Return what the stream does not show, a sentence each."""
+        if self._unknown is None:
+            self._unknown = [] if any(finding.fatal for finding in self.findings()) else self._axes.unknown()
+        return self._unknown

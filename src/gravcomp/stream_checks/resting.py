@@ -8,10 +8,12 @@ from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.stream_checks.finding import Block, Finding
 
 WINDOW = 0.5  # s
+FINEST = 0.01  # s: samples of a faster stream are averaged, because a single one has more noise the higher the rate is
 QUIET = 0.01  # largest deviation of a specific force in a quiet window, of its length
 STEADY = math.radians(0.5)  # rad/s, largest deviation of a rate in it
 LARGEST_BIAS = math.radians(5.0)  # rad/s: a larger mean rate is rotation
 UNIT = 0.2  # relative error of the length that a bad calibration explains
+MOVING = 2.0  # ratio of lengths that motion explains
 UNCALIBRATED = 0.1  # m/s^2
 DRIFT = math.radians(0.15)  # rad/s
 KEPT = 400  # windows
@@ -34,16 +36,18 @@ class Resting:
 
     def take(self, block: Block) -> None:
         """Look at the windows of a block."""
-        count = max(4, round(WINDOW / block.period))
-        for begin in range(0, len(block.accel) - count + 1, count):
-            accel, gyro = block.accel[begin : begin + count], block.gyro[begin : begin + count]
-            mean, rate = accel.mean(axis=0), gyro.mean(axis=0)
-            norm = float(np.linalg.norm(mean))
-            self._norms.append(norm)
-            if accel.std(axis=0).max() <= QUIET * max(norm, 0.3):
-                self._quiet.append(mean)
-                if gyro.std(axis=0).max() <= STEADY and abs(rate).max() <= LARGEST_BIAS:
-                    self._bias.append(rate)
+        averaged = max(1, round(FINEST / block.period))
+        accel, gyro = (_averaged(values, averaged) for values in (block.accel, block.gyro))
+        count = max(4, round(WINDOW / (averaged * block.period)))
+        whole = len(accel) // count * count
+        forces, rates = (values[:whole].reshape(-1, count, 3) for values in (accel, gyro))
+        norms = np.linalg.norm(forces.mean(axis=1), axis=1)
+        quiet = forces.std(axis=1).max(axis=1, initial=0.0) <= QUIET * np.maximum(norms, 0.3)
+        still = rates.std(axis=1).max(axis=1, initial=0.0) <= STEADY
+        still &= np.abs(rates.mean(axis=1)).max(axis=1, initial=0.0) <= LARGEST_BIAS
+        self._norms += norms.tolist()
+        self._quiet += list(forces[quiet].mean(axis=1))
+        self._bias += list(rates[quiet & still].mean(axis=1))
 
     def findings(self) -> list[Finding]:
         """Return what is odd."""
@@ -56,27 +60,28 @@ class Resting:
         return bool(-first[2] > UPSIDE_DOWN * np.linalg.norm(first) > 0.0)
 
     def _of_length(self) -> list[Finding]:
-        norms = np.linalg.norm(self._quiet, axis=1) if len(self._quiet) >= 3 else np.array(self._norms)
+        rested = len(self._quiet) >= 3
+        norms = np.linalg.norm(self._quiet, axis=1) if rested else np.array(self._norms)
         if len(norms) < 3:
             return []
         length = float(np.median(norms))
         if abs(length / STANDARD_GRAVITY - 1.0) <= UNIT:
             error = float(np.mean(np.abs(norms - STANDARD_GRAVITY)))
-            if len(self._quiet) < 3 or error <= UNCALIBRATED:
+            if not rested or error <= UNCALIBRATED:
                 return []
             text = f"the specific force at rest is {length:.2f} m/s^2: scale or offset of the accelerometer; calibrate"
             return [Finding("accel_calibration", text)]
+        if not rested and 1.0 / MOVING < length / STANDARD_GRAVITY < MOVING:
+            return []
+        where = "at rest" if rested else "in motion"
         for name, unit in UNITS.items():
-            if abs(length / unit - 1.0) <= UNIT:
-                text = f"the accelerometer is in {name} ({length:.3g} at rest): m/s^2 is needed"
+            if abs(length / unit - 1.0) <= UNIT or (not rested and 1.0 / MOVING < length / unit < MOVING):
+                text = f"the accelerometer is in {name} ({length:.3g} {where}): m/s^2 is needed"
                 return [Finding("accel_unit", text, fatal=True, accel_factor=STANDARD_GRAVITY / unit)]
         if length < 0.05 * STANDARD_GRAVITY:
-            return [Finding("no_gravity", f"the specific force at rest is {length:.2f}: gravity was removed", fatal=True)]
-        return [
-            Finding(
-                "accel_unit", f"the accelerometer is in no known unit: {length:.3g} at rest, 9.81 m/s^2 is needed", fatal=True
-            )
-        ]
+            return [Finding("no_gravity", f"the specific force {where} is {length:.2f}: gravity was removed", fatal=True)]
+        text = f"the accelerometer is in no known unit: {length:.3g} {where}, 9.81 m/s^2 is needed"
+        return [Finding("accel_unit", text, fatal=True)]
 
     def _of_bias(self) -> list[Finding]:
         if len(self._bias) < 20:
@@ -86,3 +91,8 @@ class Resting:
         if drift <= DRIFT:
             return []
         return [Finding("bias_drift", f"the bias of the gyroscope drifts by {math.degrees(drift):.2f} deg/s: it follows at rest")]
+
+
+def _averaged(values: np.ndarray, count: int) -> np.ndarray:
+    """Return the means (n // count, 3) of every `count` values (n, 3)."""
+    return values[: len(values) // count * count].reshape(-1, count, 3).mean(axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 
 from gravcomp.stream_checks.finding import Block, Finding
 
-RATIO = 4.0  # of the usual change: the median of the changes around
+RATIO = 3.0  # of the usual change: the median of the changes around; of noise it is 7 standard deviations
 AROUND = 15  # changes; so few that vibration which begins within a block is no row of spikes
 SHARE = 0.005  # of the samples, from which spikes are a property of the stream
 

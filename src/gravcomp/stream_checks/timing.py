@@ -26,7 +26,13 @@ class Timing:
         steps = block.steps
         self._count += len(steps)
         self._repeated += np.count_nonzero(steps == 0)
-        self._older += np.count_nonzero(steps < 0)
+        back = steps < 0
+        self._older += np.count_nonzero(back)
+        # Of samples in the wrong order the steps to both sides are neither jitter nor gaps.
+        around = back.copy()
+        around[1:] |= back[:-1]
+        around[:-1] |= back[1:]
+        steps = steps[~around]
         gaps = steps[steps > MISSING * block.period]
         self._gaps += len(gaps)
         self._longest = max(self._longest, float(gaps.max()) if len(gaps) else 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.recordings.imu import Recording, RecordingError
 from gravcomp.stream_checks.finding import Finding
-from gravcomp.stream_checks.monitor import BLOCK, StreamMonitor
+from gravcomp.stream_checks.monitor import StreamMonitor, block_length
 
 
 def check_recording(recording: Recording) -> list[Finding]:
@@ -15,24 +15,30 @@ def check_recording(recording: Recording) -> list[Finding]:
     The sign of the accelerometer cannot be found from the samples alone: with it the whole world is mirrored. It is found from
     a known orientation; without one, a first rest upside down is reported as possible.
     """
-    monitor = StreamMonitor()
-    for begin in range(0, len(recording), BLOCK):
-        part = slice(begin, begin + BLOCK)
+    return looked_at(recording)[0]
+
+
+def looked_at(recording: Recording) -> tuple[list[Finding], list[str]]:
+    """Return what is odd in the recording, and what it does not show, a sentence each."""
+    monitor, length = StreamMonitor(), block_length(recording.rate)
+    for begin in range(0, len(recording), length):
+        part = slice(begin, begin + length)
         monitor.add_block(recording.stamp_ns[part], recording.gyro[part], recording.accel[part])
-    return [*_of_sign(recording, monitor), *monitor.findings()]
+    return [*_of_sign(recording, monitor), *monitor.findings()], monitor.unknown()
 
 
-def in_si(recording: Recording, *, convert: bool) -> tuple[Recording, list[Finding]]:
-    """Return the recording in rad/s, m/s^2 and right-handed axes, and what is odd; `convert`: as far as the findings say how.
+def in_si(recording: Recording, *, convert: bool) -> tuple[Recording, list[Finding], list[str]]:
+    """Return the recording in rad/s, m/s^2 and right-handed axes, what is odd, and what it does not show.
 
-    Raises RecordingError for wrong units without `convert`, and for those that cannot be converted.
+    convert: as far as the findings say how. Raises RecordingError for wrong units without `convert`, and for those that cannot be
+    converted.
     """
-    findings = check_recording(recording)
+    findings, unknown = looked_at(recording)
     for finding in findings:
         if finding.fatal and not (convert and finding.convertible):
             way = "; convert the recording, or let --units auto do it" if finding.convertible else ""
             raise RecordingError(f"{recording.source}: {finding.text}{way}")
-    return (converted(recording, findings) if convert else recording), findings
+    return (converted(recording, findings) if convert else recording), findings, unknown
 
 
 def converted(recording: Recording, findings: list[Finding]) -> Recording:

@@ -12,6 +12,8 @@ import numpy as np
 
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 
+_SLOWEST, _FASTEST = 0.1, 100e3  # Hz
+
 LAYOUT = "needed: gyr (N, 3) rad/s, acc (N, 3) m/s^2, rate in Hz; optional: quat (N, 4), movement (N,)"
 
 
@@ -61,6 +63,7 @@ def _columns(values: np.ndarray, width: int, name: str, path: Path) -> np.ndarra
 
 
 def _rate(value: np.ndarray, path: Path) -> float:
-    if value.size != 1 or value.dtype.kind not in "fiu" or not np.isfinite(value).all() or not value.item() > 0:
-        raise RecordingError(f"{path}: rate is {np.array2string(value, threshold=4)}; one positive number in Hz is needed")
+    if value.size != 1 or value.dtype.kind not in "fiu" or not _SLOWEST <= value.item() <= _FASTEST:
+        allowed = f"one number of {_SLOWEST:g} to {_FASTEST:g} Hz is needed"
+        raise RecordingError(f"{path}: rate is {np.array2string(value, threshold=4)}; {allowed}")
     return float(value.item())

@@ -6,46 +6,36 @@
     rate: 256               # where there is no column of time
 
 The names of EuRoC, TUM-VI, RepoIMU, Sensor Logger, phyphox and X-IMU are known, and others that say what they are, in the larger
-European languages.
+languages. How units are spelt: `csv_units`.
 """
 
-import math
 import re
 from dataclasses import dataclass
 
 from gravcomp.config import parameter
+from gravcomp.recordings.imu.csv_units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, named_unit, plain_name
 from gravcomp.recordings.imu.recording import RecordingError
-from gravcomp.standard_gravity import STANDARD_GRAVITY
 
-TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-"""ns"""
-
-GYRO_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0, "mdeg/s": math.pi / 180e3}
-"""rad/s"""
-
-ACCEL_UNITS = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
-"""m/s^2"""
-
-_SPELT = {
-    "rad/s": r"rad\s*(/|\s)\s*s(ec)?(\^-1|-1)?",
-    "mdeg/s": r"m(deg|°|d)\s*/?\s*p?s",
-    "deg/s": r"(deg|°|grad|º)\s*/\s*s(ec)?|dps",
-    "m/s^2": r"m\s*(/|\s)\s*s(ec)?\s*(\^-?2|²|2|-2)|m\s*/\s*s\s*/\s*s",
-    "mg": r"mg|milli-?g",
-    "g": r"g",
-    "ns": r"ns|nanosec\w*",
-    "us": r"us|µs|μs|microsec\w*",
-    "ms": r"ms|millisec\w*",
-    "s": r"s|sec\w*",
-}
 _GYRO = (
-    r"gyr|giro|angular|w_rs_s|omega|rotation rate|rotationrate|drehrate|winkelgeschw|vitesse angul|velocidad ang|velocit. ang|"
-    r"гироск|углов|hoeksnelheid|vinkelhast"
+    r"gyr|giro|żyro|angular|ang.?vel|w_rs_s|omega|rotation.?rate|turn.?rate|drehrate|winkelgeschw|vitesse angul|velocidad ang|"
+    r"velocit. ang|kątow|úhlov|гироск|углов|hoeksnelheid|vinkelhast|kulmanopeus|açısal|szögseb|角速度|陀螺|ジャイロ|각속도|자이로"
 )
-_ACCEL = r"acc|a_rs_s|beschleun|aceler|versnelling|przyspiesz|specific.?force|ускор"
-_LINEAR = r"linear|without g|ohne g|sans g|sin g|senza g|user.?acc"
-_TIME = r"time|zeit|temps|tiempo|tempo\b|tijd|czas|tid\b|время|^t$"
-_MORE = r"absol|magnitude|norm\b|betrag|magnet"
+_ACCEL = (
+    r"acc|a_rs_s|beschleun|aceler|versnelling|przyspiesz|zrychlen|specific.?force|ускор|kiihtyvyys|ivme|gyorsul|加速度|가속도"
+)
+_LINEAR = r"linear(?!_acc|\.acc)|without g|ohne g|sans g|sin g|senza g|user.?acc"  # in ROS linear_acceleration is with gravity
+_TIME = (
+    r"time|stamp|epoch|elapsed|zeit|temps|tiempo|tempo\b|tijd|czas|čas|tid\b|aika|zaman|idő|время|时间|時間|時刻|시간|"
+    r"^t$|^(milli|micro|nano)?s(ec(ond)?s?)?$|^(millis|micros|nanos)$"
+)
+_WHOLE_SECONDS, _NANOSECONDS = r"(^|[^a-z])secs?(onds?)?$", r"(^|[^a-z])n(ano)?secs?(onds?)?$"  # of a stamp in two columns
+_MORE = r"absol|magnitude|norm\b|betrag|magnet|covariance|bias"
+_AXIS = (
+    r"(?:^|[\s_.\-])([xyz])(?:[\s_\-]?(?:axis|achse))?$",
+    r"[^\W\d_]([xyz])(?:[\s_\-]?(?:axis|achse))?$",
+    r"^([xyz])(?:[\s_\-]?(?:axis|achse))?[\s_.\-]",
+    r"^([xyz])(?=[^\x00-\x7f])",
+)  # at the end of a name, or at its begin
 
 
 @dataclass(frozen=True)
@@ -76,6 +66,7 @@ class Found:
     gyro_unit: str | None
     accel_unit: str | None
     linear: bool  # the acceleration is without gravity
+    nanoseconds: int | None = None  # of a stamp whose column of time has the whole seconds
 
 
 def by_mapping(names: tuple[str, ...], mapping: CsvColumns, source: str) -> Found:
@@ -108,7 +99,13 @@ def by_names(names: tuple[str, ...], stem: str, source: str) -> Found:
     if bare and not gyro and not accel:
         gyro, accel = (bare, ()) if re.search(_GYRO, stem.lower()) else ((), bare)
     linear = bool(accel) and bool(re.search(_LINEAR, (names[accel[0]] if not bare else stem).lower()))
-    times = [i for i, name in enumerate(names) if re.search(_TIME, name.lower())]
+    times = [i for i, name in enumerate(names) if re.search(_TIME, plain_name(name)) or re.search(_TIME, name.lower())]
+    whole, nanoseconds = (
+        next((i for i, name in enumerate(names) if re.search(words, name.lower())), None)
+        for words in (_WHOLE_SECONDS, _NANOSECONDS)
+    )
+    in_two = whole is not None and nanoseconds is not None
+    time = whole if in_two else times[0] if times else None
     turned = tuple(
         i
         for letter in "wxyz"
@@ -118,12 +115,13 @@ def by_names(names: tuple[str, ...], stem: str, source: str) -> Found:
     return Found(
         gyro=gyro,
         accel=accel,
-        time=times[0] if times else None,
+        time=time,
         orientation=turned if len(turned) == 4 else (),
-        time_unit=_unit(names[times[0]], tuple(TIME_UNITS), source) if times else None,
-        gyro_unit=_unit(names[gyro[0]], tuple(GYRO_UNITS), source) if gyro else None,
-        accel_unit=_unit(names[accel[0]], tuple(ACCEL_UNITS), source) if accel else None,
+        time_unit="s" if in_two else _unit(names, (time,), tuple(TIME_UNITS), source) if time is not None else None,
+        gyro_unit=_unit(names, gyro, tuple(GYRO_UNITS), source),
+        accel_unit=_unit(names, accel, tuple(ACCEL_UNITS), source),
         linear=linear,
+        nanoseconds=nanoseconds if in_two else None,
     )
 
 
@@ -131,11 +129,11 @@ def _axes(names: tuple[str, ...], words: str, letters: str, source: str) -> tupl
     """Return the columns x, y, z of a sensor, none where they are not all there."""
     found: dict[str, list[int]] = {"x": [], "y": [], "z": []}
     for i, name in enumerate(names):
-        plain = re.sub(r"[(\[].*?[)\]]", "", name.lower()).strip()
+        plain = plain_name(name)
         if re.search(_MORE, plain):
             continue
-        axis = re.search(r"(?:^|[\s_.\-])([xyz])$", plain) or re.search(r"[a-z]([xyz])$", plain)
-        rest = plain[: axis.start(1)].strip(" _.-") if axis else ""
+        axis = next(filter(None, (re.search(pattern, plain) for pattern in _AXIS)), None)
+        rest = (plain[: axis.start(1)] + plain[axis.end(1) :]).strip(" _.-") if axis else ""
         if axis and (re.search(words, rest) or (letters and rest in tuple(letters))):
             found[axis.group(1)].append(i)
     if not all(found.values()):
@@ -144,13 +142,10 @@ def _axes(names: tuple[str, ...], words: str, letters: str, source: str) -> tupl
     return tuple(of_axis[0] for of_axis in calibrated)
 
 
-def _unit(name: str, known: tuple[str, ...], source: str) -> str | None:
-    """Return the unit in the brackets of a name, None without one. Raises RecordingError for another one."""
-    bracket = re.search(r"[(\[](.*?)[)\]]", name)
-    if not bracket:
-        return None
-    text = bracket.group(1).strip()
-    for unit in known:
-        if re.fullmatch(_SPELT[unit], text, re.IGNORECASE):
-            return unit
-    raise RecordingError(f"{source}: column '{name}' is in '{text}'; known units: {', '.join(known)}")
+def _unit(names: tuple[str, ...], columns: tuple[int, ...], known: tuple[str, ...], source: str) -> str | None:
+    """Return the unit that the names of columns give, None without one. Raises RecordingError where they differ."""
+    units = {named_unit(names[column], known, source): names[column] for column in columns}
+    if len(units) > 1:
+        listed = ", ".join(f"'{name}'" for name in units.values())
+        raise RecordingError(f"{source}: the columns {listed} of one sensor are in different units")
+    return next(iter(units), None)

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.config import from_mapping, load_yaml
-from gravcomp.recordings.imu.csv_columns import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, CsvColumns, Found, by_mapping, by_names
+from gravcomp.recordings.imu.csv_columns import CsvColumns, Found, by_mapping, by_names
 from gravcomp.recordings.imu.csv_text import Table, read_table
+from gravcomp.recordings.imu.csv_units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
-SUFFIXES = (".csv", ".txt", ".tsv")
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log")
 _RATES = (5.0, 8000.0)  # Hz, of an IMU whose unit of time is not given
 _TRUTHS = ("state_groundtruth_estimate0", "mocap0")  # of EuRoC and TUM-VI, next to imu0
 _TREE = ("mav0/imu0/data.csv", "imu0/data.csv", "data.csv")
@@ -125,24 +126,35 @@ def _stamps(table: Table, found: Found, rate: float | None, values: np.ndarray) 
             names = ", ".join(name or "-" for name in table.names)
             raise RecordingError(f"{table.source}: has no column of time among {names}; give it or rate by --columns")
         return np.rint(np.arange(len(table.rows)) * (1e9 / rate)).astype(np.int64), ()
-    numbers, whole = table.numbers(found.time), table.whole_numbers(found.time)
-    if not np.isfinite(numbers).all():
-        raise RecordingError(
-            f"{table.source}: column '{table.names[found.time]}' is no number in row {int(np.argmin(np.isfinite(numbers))) + 1}"
-        )
+    if (clock := table.clock_times(found.time)) is not None:
+        return usable_stamps(clock, None, values)
+    numbers, whole = _finite(table, found.time), table.whole_numbers(found.time)
     unit = found.time_unit or _time_unit(numbers, table)
     scale = TIME_UNITS[unit]
     stamp = np.rint(numbers * scale).astype(np.int64) if whole is None else np.array([x * scale for x in whole], np.int64)
+    if found.nanoseconds is not None:
+        stamp = stamp + _finite(table, found.nanoseconds).astype(np.int64)
     return usable_stamps(stamp, None, values)
+
+
+def _finite(table: Table, column: int) -> np.ndarray:
+    """Return a column (n,) of numbers. Raises RecordingError where one is none."""
+    numbers = table.numbers(column)
+    if not np.isfinite(numbers).all():
+        row = int(np.argmin(np.isfinite(numbers))) + 1
+        raise RecordingError(f"{table.source}: column '{table.names[column]}' is no number in row {row}")
+    return numbers
 
 
 def _time_unit(times: np.ndarray, table: Table) -> str:
     if len(times) < 2:
         raise RecordingError(f"{table.source}: has {len(times)} IMU samples; at least 2 are needed")
     steps = np.diff(times)
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    if not (steps > 0).any():
+        raise RecordingError(f"{table.source}: the time does not advance: it goes from {times[0]:g} to {times[-1]:g}")
+    step = float(np.median(steps[steps > 0]))
     for unit, scale in TIME_UNITS.items():
-        if step and _RATES[0] <= 1e9 / (step * scale) <= _RATES[1]:
+        if _RATES[0] <= 1e9 / (step * scale) <= _RATES[1]:
             return unit
     raise RecordingError(f"{table.source}: the steps of time are {step:g}, in no known unit; give time_unit by --columns")
 

@@ -33,6 +33,9 @@ def read_recording(
         return read_csv(path, columns)
     if is_bag:
         return read_rosbag(path, topic, progress)
+    if path.suffix == ".bag":
+        way = f"rosbags-convert --src {path} --dst {path.with_suffix('')}"
+        raise RecordingError(f"{path}: is a bag of ROS 1; a rosbag2 folder is needed: {way}")
     if path.suffix != ".npz":
         raise RecordingError(f"{path}: is of no known kind; {_KINDS} is needed")
     return read_broad(path)

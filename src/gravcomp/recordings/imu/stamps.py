@@ -8,6 +8,8 @@ import numpy as np
 
 COUNTER_NS = tuple(2**32 * unit for unit in (1, 1_000, 1_000_000))  # ns: range of a counter of 32 bits in ns, us, ms
 LONGEST_WRAPPED_STEP = 20  # periods: a longer step is not the next sample of a counter that wrapped
+PACE = 0.02  # by which the stamps may advance faster or slower than the times of reception; clocks differ by 0.01 % at most
+LONG_ENOUGH = 5 * 10**9  # ns in which a delay of reception does not matter
 BURSTS_FROM = 0.1  # of the samples that repeat a stamp with other values: the driver reads in bursts
 
 
@@ -41,11 +43,24 @@ def usable_stamps(stamp_ns: np.ndarray, received_ns: np.ndarray | None, values: 
     stamp_ns, wraps = _unwrapped(stamp_ns)
     if wraps:
         notes.append(f"the stamps are those of a 32-bit counter, which wraps {wraps} time(s): continued")
+    if received_ns is not None and len(stamp_ns) > 1 and not lost:
+        notes += _other_pace(stamp_ns, received_ns)
     spread, longest = _spread_bursts(stamp_ns, values)
     if longest:
         stamp_ns = spread
         notes.append(f"the samples come in bursts of up to {longest} with one stamp: spread evenly since the burst before")
     return stamp_ns, tuple(notes)
+
+
+def _other_pace(stamp_ns: np.ndarray, received_ns: np.ndarray) -> list[str]:
+    """Return a sentence where stamps and times of reception (n,) advance at different paces, as with a wrong sample rate."""
+    stamped, received = (int(times.max()) - int(times.min()) for times in (stamp_ns, received_ns))
+    if min(stamped, received) < LONG_ENOUGH or abs(stamped / received - 1.0) <= PACE:
+        return []
+    return [
+        f"the stamps advance {stamped / received:.2f} times as fast as the times of reception: the sensor's clock or sample rate"
+        " is wrong, or the samples were played at another speed when they were recorded"
+    ]
 
 
 def _unwrapped(stamp_ns: np.ndarray) -> tuple[np.ndarray, int]:
