@@ -124,8 +124,8 @@ class ReducedContact:
         full = self._full
         scene = full.place(gravity)
         return Touching(
-            scene, full.surface, self._rest, self._change, self.sections(q), self.force.any(axis=2), self.force.copy(),
-            self._pull.copy(), full.rubbing, full.margin,
+            scene, full.surface, self._rest, self._change, self.sections(q), np.asarray(self.force.any(axis=2)),
+            self.force.copy(), self._pull.copy(), full.rubbing, full.margin,
         )  # fmt: skip
 
     def keep(
