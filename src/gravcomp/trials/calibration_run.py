@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
+from gravcomp.calibration.approach import approached
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
@@ -23,7 +24,6 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.inverse.limits import within_limits
 from gravcomp.mesh.tube import with_coarse_elements
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
@@ -62,7 +62,8 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
         options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(4, int(_BRIEF * options.fewest)))
         orientations = ORIENTATIONS[::_FEWER]
     period = first_period(setup.robot)
-    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations)
+    inverse = setup.controller.inverse
+    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
 
 
 def measure(context: Context, plan: Plan) -> Measured:
@@ -182,7 +183,7 @@ class _Rig:
             self._outgoing += self._bridge.tick(now)
 
     def _command(self, displacement: np.ndarray, tension: np.ndarray, now: float) -> None:
-        moved = within_limits(displacement, self._sent, self._limits, _SAMPLE_PERIOD)
+        moved = approached(displacement, self._sent, self._limits, _SAMPLE_PERIOD)
         self._sent = self._transmission.possible(moved, tension)
         refused = self._bridge.command(self._sent.tolist(), tension.tolist(), now)
         if refused:

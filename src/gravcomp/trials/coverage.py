@@ -211,7 +211,8 @@ def coverage_of_robots(
     for file in files:
         setup = Setup.of(load_robot_file(file))
         robot = setup.robot
-        plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress)
+        inverse = setup.controller.inverse
+        plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress, inverse=inverse)
         progress(f"{robot.name}: coverage over {len(seeds)} seeds")
         found[robot.name] = coverage(robot, plan, seeds)
     return found
