@@ -262,9 +262,7 @@ def _chosen(
     while True:
         factor = np.linalg.inv(information)
         gain = np.linalg.slogdet(np.eye(6) + np.einsum("kiu,uv,kjv->kij", rows, factor, rows))[1]
-        new = [
-            [k] if pose.station in stations else sorted({k, *always[pose.station]}) for k, pose in enumerate(candidates)
-        ]
+        new = [[k] if pose.station in stations else sorted({k, *always[pose.station]}) for k, pose in enumerate(candidates)]
         cost = held * np.array([len(poses) for poses in new])
         cost = cost + np.array([0.0 if pose.station in stations else turn for pose in candidates])
         gain = gain / cost
@@ -295,8 +293,15 @@ def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
     here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
     while left:
         station = [pose for pose in left if pose.station == here.station]
-        ordered += sorted(station, key=lambda pose: (bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum())))
+        ordered += sorted(
+            station, key=lambda pose: (bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum()))
+        )
         left = [pose for pose in left if not any(pose is one for one in station)]
         if left:
             here = max(left, key=lambda pose: float(pose.gravity @ ordered[-1].gravity))
     return ordered
+
+
+def _place(pose: PlannedPose) -> tuple:
+    """Return what sorts the poses of a station."""
+    return bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum())
