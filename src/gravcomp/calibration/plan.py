@@ -1,8 +1,8 @@
 """The plan of a calibration: the poses that tell most about the robot, in the time that it may take.
 
 Candidates are orientations of the base with the cables released, with one cable under a tension that the limits allow, or with
-the cables that hold the robot straight (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of the fit (`unknowns`). Poses are chosen one by one so that they add
-most to
+the cables that hold the robot straight (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of the fit
+(`unknowns`). Poses are chosen one by one so that they add most to
 
     log det (P + sum_k J_k^T W J_k)
 
