@@ -19,6 +19,10 @@ from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, writ
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.inverse import InverseOptions
+from gravcomp.mesh import MeshError
+from gravcomp.mesh.body import body_mesh
+from gravcomp.mesh.coarse import with_coarse_elements
+from gravcomp.mesh.tube import coarse_elements
 from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
@@ -228,3 +232,12 @@ def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
         assert all(len(pose.pulled) == 1 for pose in single)
         assert np.linalg.norm(straight.tip[:2]) < 0.02 * np.linalg.norm(free.tip[:2])
         assert straight.tension.min() > 0.019
+
+
+def test_a_narrow_lumen_in_a_thick_wall_has_a_coarse_mesh(robot):
+    """The first period, from which every plan begins, is that of a coarse mesh; the fewest elements would be refused here."""
+    wall = dataclasses.replace(robot.segments[0], outer_diameter=0.020, lumen_diameter=0.002)
+    narrow = dataclasses.replace(robot, segments=(wall,), elements=None)
+    with pytest.raises(MeshError, match="Jacobian ratio"):
+        body_mesh(dataclasses.replace(narrow, elements=coarse_elements(narrow)))
+    body_mesh(with_coarse_elements(narrow))

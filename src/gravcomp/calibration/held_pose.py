@@ -8,7 +8,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
-from gravcomp.inverse import InverseOptions, direction_weight, straight_target
+from gravcomp.inverse import ControllerCode, InverseOptions, direction_weight, straight_target
 from gravcomp.inverse.controller import InverseController
 from gravcomp.simulation import Shape, Simulator
 
@@ -20,7 +20,7 @@ _SETTLED = 1e-5  # of the robot's length: cables that move less have arrived
 def held_straight(
     simulator: Simulator, robot: Robot, transmission: Transmission | None, options: InverseOptions, gravity: np.ndarray
 ) -> Shape | None:
-    """Return the shape nearest to the straight one under gravity (3,) in m/s^2; None: the iteration ends in no equilibrium.
+    """Return the shape nearest to the straight one under gravity (3,) in m/s^2; None: the cables cannot bring the robot there.
 
     The solver of the simulator is left at that shape.
     """
@@ -38,7 +38,9 @@ def held_straight(
             gravity=gravity,
         )
         shape = simulator.step(gravity, command.displacement)
+        if command.code == ControllerCode.RELAXING or not shape.is_equilibrium:
+            return None
         if np.abs(command.displacement - last).max(initial=0.0) < _SETTLED * robot.length:
             break
         last = command.displacement
-    return shape if shape.is_equilibrium else None
+    return shape

@@ -29,7 +29,7 @@ from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.inverse import InverseOptions
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 

@@ -190,7 +190,7 @@ def _fit(args: argparse.Namespace, file: "RobotFile") -> int:
     from gravcomp.config import ConfigError
     from gravcomp.full_model.modes import first_period
     from gravcomp.mesh import MeshError
-    from gravcomp.mesh.tube import with_coarse_elements
+    from gravcomp.mesh.coarse import with_coarse_elements
     from gravcomp.report.page import write_report
     from gravcomp.sweep import Sweep
 
