@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.slack import taut_tensions
 from gravcomp.description import Cable, Elements, load_robot_file
@@ -110,3 +111,19 @@ def test_complementarity_from_any_guess(seed):
 def test_released_cables_carry_nothing():
     tension = taut_tensions(np.eye(3), np.zeros(3), np.array([0.1, np.nan, -0.1]))
     assert tension == pytest.approx([0.1, 0.0, 0.0])
+
+
+def test_a_command_that_trembles_does_not_reverse_the_friction():
+    """It turns round over a way of the cable, however small the steps are; a released cable is paid out at once."""
+    sliding = Sliding.none(2, 0.1)
+    way, none = sliding.way, np.zeros(2)
+    assert 1e-5 < way < 1e-4
+    sliding = sliding.after(np.array([1e-3, 1e-3]), None, none, none)
+    np.testing.assert_array_equal(sliding.direction, [1.0, 1.0])
+    for tremble in 1e-3 + 0.02 * way * np.array([-1.0, 1.0, -1.0, 1.0]):
+        sliding = sliding.after(np.array([tremble, 1e-3]), None, none, none)
+        assert sliding.direction[0] > 0.9
+    for step in range(1, 41):
+        sliding = sliding.after(np.array([tremble - 0.05 * step * way, np.nan]), None, np.ones(2), none)
+        assert sliding.direction[0] == pytest.approx(min(1.0, max(-1.0, 1.0 - 0.05 * step)), abs=0.05)
+        assert sliding.direction[1] == -1.0

@@ -13,7 +13,7 @@ from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.simulation import Simulator
 from gravcomp.trials.known_robot import known_setup, known_windows, offsets
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration import plan as planning
+from gravcomp.calibration.approach import APPROACH, approached
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
@@ -17,6 +18,11 @@ from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
+from gravcomp.inverse import InverseOptions
+from gravcomp.mesh import MeshError
+from gravcomp.mesh.body import body_mesh
+from gravcomp.mesh.coarse import with_coarse_elements
+from gravcomp.mesh.tube import coarse_elements
 from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
@@ -195,3 +201,41 @@ def test_kinds_that_few_seeds_tell_are_counted_together():
     assert set(found) == {"modulus", RARE} and found[RARE].count == 4 and found[RARE].share == 0.75
     assert found["modulus"].width == pytest.approx(2.0)
     assert set(counted(errors, halves, 50)) == set()
+
+
+def test_a_pull_arrives_slower_and_slower_and_never_runs_past_its_goal(robot):
+    """A motor that runs past its goal leaves a capstan inside the backlash of its gear."""
+    goal, interval = np.array([3e-3, -2e-3, 1e-6]), 0.01
+    here, moves = np.zeros(3), []
+    for _ in range(round((APPROACH + 3e-3 / robot.limits.displacement_rate) / interval)):
+        there = approached(goal, here, robot.limits, interval)
+        moves.append(there - here)
+        here = there
+    np.testing.assert_array_equal(here, goal)
+    steps = np.array(moves)
+    assert (steps * np.sign(goal) >= 0.0).all() and np.abs(steps).max() <= robot.limits.displacement_rate * interval * (1 + 1e-9)
+    left = np.abs(goal - np.cumsum(steps, axis=0))
+    assert np.abs(steps[1:][left[:-1] < 1e-4]).max() < 0.1 * np.abs(steps).max()
+
+
+def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
+    """At every station, after the released robot and before single cables: so every cable is wound in to where it pulls."""
+    options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
+    plan = make_plan(
+        robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[:2], inverse=InverseOptions(pretension=0.02)
+    )
+    for station in {pose.station for pose in plan.poses}:
+        free, straight, *single = [pose for pose in plan.poses[:-1] if pose.station == station]
+        assert not free.pulled and straight.pulled == robot.cable_names
+        assert all(len(pose.pulled) == 1 for pose in single)
+        assert np.linalg.norm(straight.tip[:2]) < 0.02 * np.linalg.norm(free.tip[:2])
+        assert straight.tension.min() > 0.019
+
+
+def test_a_narrow_lumen_in_a_thick_wall_has_a_coarse_mesh(robot):
+    """The first period, from which every plan begins, is that of a coarse mesh; the fewest elements would be refused here."""
+    wall = dataclasses.replace(robot.segments[0], outer_diameter=0.020, lumen_diameter=0.002)
+    narrow = dataclasses.replace(robot, segments=(wall,), elements=None)
+    with pytest.raises(MeshError, match="Jacobian ratio"):
+        body_mesh(dataclasses.replace(narrow, elements=coarse_elements(narrow)))
+    body_mesh(with_coarse_elements(narrow))

@@ -19,7 +19,7 @@ from gravcomp.calibration.report import calibration_result
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
 from gravcomp.description import Cable, Elements, Material, Robot, Segment, load_robot_file
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 
 LOST = "no equilibrium here"
 

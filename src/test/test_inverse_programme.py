@@ -166,3 +166,11 @@ def test_a_weight_of_the_direction_does_not_pull_cables_that_only_bend_off_the_p
     sag = np.linalg.norm(response.effector_free[:2])
     assert near[0] < 0.005 * sag
     assert near[1] < 0.02 * sag
+
+
+def test_only_a_cable_that_may_be_slack_is_paid_out_beyond_its_path():
+    """Both bounds are active; a cable with a pretension that is paid out loses it, and the next step pays it out farther."""
+    scale, upper = np.full(2, 0.1), np.full(2, 5.0)
+    tension, unwanted = unscaled(np.zeros(2), np.full(2, -0.3), scale, np.array([0.05, 0.0]), upper)
+    np.testing.assert_allclose(tension, [0.05, 0.0])
+    np.testing.assert_allclose(unwanted, [0.0, 0.03])

@@ -129,7 +129,9 @@ static void take(gc_inverse_controller *controller, const gc_inverse_problem *pr
     tension[i] = gc_clamp(solution->unknowns[i] * problem->scale[i], problem->tension_lower[i], problem->tension_upper[i]);
   }
   for (uint32_t i = 0; i < m; ++i) {
-    const float path = path_under(shape, m, i, tension), unwanted = solution->below[i] * problem->scale[i];
+    // At a bound above 0 the cable stays taut.
+    const float below = problem->tension_lower[i] > 0.0f ? 0.0f : solution->below[i];
+    const float path = path_under(shape, m, i, tension), unwanted = below * problem->scale[i];
     change[i] = path - shape->displacement[i];
     const float wanted = path - gc_min(s->slack, shape->compliance[i][i] * unwanted), before = controller->displacement[i];
     const float displacement = within_limits(s, wanted, before, interval);

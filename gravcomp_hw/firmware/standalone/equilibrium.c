@@ -8,7 +8,8 @@
 // Displacements of the tip as fractions of the length, as in reduction/tracking.py.
 #define GC_LONGEST_STEP 0.12f
 #define GC_TOLERANCE 1e-2f  // what is left at most; the next call takes it away
-#define GC_SLIDING_AT_REST 1e-9f  // m, or N: a change that is rounding error
+#define GC_SLIDING_AT_REST 1e-9f   // N: a tension that is rounding error
+#define GC_SLIDING_REVERSAL 5e-4f  // of the length: way of a cable from no friction to whole
 
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model) {
   gc_zero(state, sizeof *state);
@@ -24,13 +25,13 @@ void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model) {
 
 // Update the direction in which cables with friction slide, as Sliding.after in src/gravcomp/cables/friction.py.
 static void slide(gc_equilibrium *state, const float *wound) {
+  const float way = GC_SLIDING_REVERSAL * state->model->settings->length;
   for (uint32_t i = 0; i < state->model->cables; ++i) {
-    float change = -state->tension[i];
     if (gc_finite(wound[i])) {
-      change = wound[i] - (gc_finite(state->wound[i]) ? state->wound[i] : state->cables.displacement[i]);
-    }
-    if (gc_abs(change) > GC_SLIDING_AT_REST) {
-      state->pulling[i] = change > 0.0f ? 1.0f : -1.0f;
+      const float before = gc_finite(state->wound[i]) ? state->wound[i] : state->cables.displacement[i];
+      state->pulling[i] = gc_clamp(state->pulling[i] + (wound[i] - before) / way, -1.0f, 1.0f);
+    } else if (state->tension[i] > GC_SLIDING_AT_REST) {
+      state->pulling[i] = -1.0f;
     }
     state->wound[i] = wound[i];
   }

@@ -3,6 +3,9 @@
 Capstan friction (Euler and Eytelwein): lambda_k = lambda exp(-+ mu theta_k), where theta_k is the sum of the angles up to piece
 k, with the sheath between capstan and robot before the first; minus while the cable is pulled in, plus while it is paid out. The
 cable stretches by the mean of the tension along it: of a sheath that turns evenly by theta, (1 - exp(-mu theta)) / (mu theta).
+
+Friction turns round over a short way of the cable, in which line and sheath give: the sign above is a number from -1 to 1. With a
+sign that jumped, commands that only tremble would reverse the friction of all cables with every sample.
 """
 
 import dataclasses
@@ -13,6 +16,9 @@ from gravcomp.description import Cable
 
 # A change in m, or in N, that is rounding error.
 _AT_REST = 1e-9
+
+REVERSAL = 5e-4
+"""Way of a cable over which its friction goes from none to whole, over the robot's length."""
 
 
 class Friction:
@@ -31,7 +37,7 @@ class Friction:
         return bool(self.coefficient.any())
 
     def acts(self, pulling: np.ndarray) -> bool:
-        """Return whether any cable with friction slides. pulling (m,): 1 pulled in, -1 paid out, 0 for no friction."""
+        """Return whether any cable with friction slides. pulling (m,): 1 pulled in to -1 paid out, 0 for no friction."""
         return bool((self.coefficient * pulling).any())
 
     def shares(self, cable: np.ndarray, tangent: np.ndarray, pulling: np.ndarray) -> np.ndarray:
@@ -62,16 +68,18 @@ class Friction:
 class Sliding:
     """Direction in which m cables slide, and the input that it follows from.
 
-    direction (m,): 1 pulled in, -1 paid out, 0 not moved yet; wound (m,): last displacement that was given in m, NaN: none.
+    direction (m,): 1 pulled in, -1 paid out, between them while friction turns round, 0 not moved yet; wound (m,): last
+    displacement that was given in m, NaN: none; way: m of displacement from no friction to whole, 0: it is whole at once.
     """
 
     direction: np.ndarray
     wound: np.ndarray
+    way: float = 0.0
 
     @staticmethod
-    def none(count: int) -> "Sliding":
-        """Return the state of `count` cables that have not moved."""
-        return Sliding(np.zeros(count), np.full(count, np.nan))
+    def none(count: int, length: float) -> "Sliding":
+        """Return the state of `count` cables that have not moved, in a robot of `length` m."""
+        return Sliding(np.zeros(count), np.full(count, np.nan), REVERSAL * length)
 
     def after(
         self, wound: np.ndarray | None, given: np.ndarray | None, tension: np.ndarray, displacement: np.ndarray
@@ -88,4 +96,6 @@ class Sliding:
             before = np.where(np.isnan(self.wound), displacement, self.wound)
             change = np.where(np.isnan(wound), -tension, wound - before)
         direction = np.where(np.abs(change) > _AT_REST, np.sign(change), self.direction)
-        return Sliding(direction, self.wound if wound is None else wound)
+        if given is None and wound is not None and self.way > 0.0:
+            direction = np.where(np.isnan(wound), direction, np.clip(self.direction + change / self.way, -1.0, 1.0))
+        return Sliding(direction, self.wound if wound is None else wound, self.way)

@@ -32,7 +32,7 @@ from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 
 _AT_BOUND = 0.01  # of a logarithm
 

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gravcomp.calibration.approach import approached
 from gravcomp.calibration.bag import SAME_CLOCK, another_clock
 from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.files import csv_header, csv_row
@@ -30,7 +31,6 @@ from gravcomp.calibration.plan_table import instruction
 from gravcomp.calibration.plausible import check_units
 from gravcomp.config import parameter
 from gravcomp.description import Robot
-from gravcomp.inverse.limits import within_limits
 from gravcomp.whole_file import write_whole
 
 
@@ -131,7 +131,7 @@ class LiveSession:
         interval = min(max(time - self._commanded_at, 0.0), 0.1)
         self._commanded_at = time
         wanted = self._command if self.phase == Phase.TURN else pose.displacement
-        self._command = within_limits(wanted, self._command, self._robot.limits, interval)
+        self._command = approached(wanted, self._command, self._robot.limits, interval)
         if self.phase == Phase.PULL and np.abs(self._command - pose.displacement).max(initial=0.0) < 1e-9:
             self.phase, self._since = Phase.REST, time
         return self._command

@@ -1,8 +1,8 @@
 """The plan of a calibration: the poses that tell most about the robot, in the time that it may take.
 
-Candidates are orientations of the base with the cables released, or with one cable under a tension that the limits allow. The
-model gives the derivatives J_k of the tip by all unknowns of the fit (`unknowns`). Poses are chosen one by one so that they add
-most to
+Candidates are orientations of the base with the cables released, with one cable under a tension that the limits allow, or with
+the cables that hold the robot straight (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of the fit
+(`unknowns`). Poses are chosen one by one so that they add most to
 
     log det (P + sum_k J_k^T W J_k)
 
@@ -17,7 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.approach import APPROACH
 from gravcomp.calibration.fit import TipNoise
+from gravcomp.calibration.held_pose import held_straight
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.statics import StaticPredictor
@@ -26,7 +28,8 @@ from gravcomp.config import ConfigError, parameter
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
 from gravcomp.full_model.equilibrium import Equilibrium
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.inverse import InverseOptions
+from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
@@ -130,14 +133,16 @@ def make_plan(
     options: PlanOptions | None = None,
     progress: Callable[[str], None] = lambda sentence: None,
     orientations: tuple[tuple[float, float], ...] = ORIENTATIONS,
+    inverse: InverseOptions | None = None,
 ) -> Plan:
     """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose.
 
-    orientations: candidates, inclination and roll of the base in rad.
+    orientations: candidates, inclination and roll of the base in rad; inverse: of the controller, to hold the robot straight in
+    some of the poses; None: only one cable at a time is pulled, as by hand.
     """
     options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
-    candidates, shapes = _candidates(robot, transmission, options, progress, orientations)
+    candidates, usual, shapes = _candidates(robot, transmission, options, progress, orientations, inverse)
     if not candidates:
         raise ConfigError(
             f"robot '{robot.name}': in none of {len(orientations)} orientations has the released robot an equilibrium within"
@@ -162,7 +167,7 @@ def make_plan(
     pull = _pull_time(candidates, robot)
     rest = max(wanted - pull, _LEAST_REST * longest)
     held = rest + pull
-    chosen = _chosen(candidates, rows, prior, held, options)
+    chosen = _chosen(candidates, usual, rows, prior, held, options)
     if not chosen:
         raise ConfigError(
             f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
@@ -179,10 +184,11 @@ def _candidates(
     options: PlanOptions,
     progress: Callable[[str], None],
     orientations: tuple[tuple[float, float], ...],
-) -> tuple[list[PlannedPose], list[Equilibrium]]:
-    """Return the poses that the limits allow, and their shapes, from the model's equilibria."""
+    inverse: InverseOptions | None,
+) -> tuple[list[PlannedPose], list[bool], list[Equilibrium]]:
+    """Return the poses that the limits allow, whether each is measured at every station, and their shapes."""
     simulator = Simulator(robot, reduced=False)
-    found: list[tuple[PlannedPose, Equilibrium]] = []
+    found: list[tuple[PlannedPose, bool, Equilibrium]] = []
     count = len(robot.cables)
     slack = options.slack * robot.length
     for number, (inclination, roll) in enumerate(orientations):
@@ -191,7 +197,8 @@ def _candidates(
         free = simulator.solve(gravity)
         if not free.is_equilibrium:
             continue
-        found.append((_pose(robot, inclination, roll, free, np.zeros(count), slack, transmission), simulator.solver.state))
+        released = _pose(robot, inclination, roll, free, np.zeros(count), slack, transmission)
+        found.append((released, True, simulator.solver.state))
         turns = np.linalg.norm(free.response.compliance_ea[3:6], axis=0)
         largest = np.minimum(options.tension * robot.limits.tension_max, options.bend / np.maximum(turns, 1e-12))
         for one in np.eye(count):
@@ -200,9 +207,14 @@ def _candidates(
                 shape = simulator.solve(gravity, tension=tension)
                 if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
                     pose = _pose(robot, inclination, roll, shape, tension, slack, transmission)
-                    found.append((pose, simulator.solver.state))
-    found = [pair for pair in found if pair[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
-    return [pose for pose, _ in found], [shape for _, shape in found]
+                    found.append((pose, False, simulator.solver.state))
+        straight = None if inverse is None else held_straight(simulator, robot, transmission, inverse, gravity)
+        if straight is not None and straight.cable_tension.any():
+            pose = _pose(robot, inclination, roll, straight, straight.cable_tension, slack, transmission)
+            found.append((pose, True, simulator.solver.state))
+    found = [entry for entry in found if entry[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
+    poses, usual, shapes = zip(*found) if found else ((), (), ())
+    return list(poses), list(usual), list(shapes)
 
 
 def _turned(shape: Shape, free: Shape) -> float:
@@ -227,17 +239,32 @@ def _pose(
     return PlannedPose(inclination, roll, displacement, pulled, tension, shape.tip_position)
 
 
-def _chosen(candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, held: float, options: PlanOptions) -> list[int]:
-    """Return the chosen candidates. rows (k, 6, u): derivatives over the noise; held: time in s of each pose."""
+def _chosen(
+    candidates: list[PlannedPose],
+    usual: list[bool],
+    rows: np.ndarray,
+    prior: np.ndarray,
+    held: float,
+    options: PlanOptions,
+) -> list[int]:
+    """Return the chosen candidates.
+
+    usual: which are measured at every station that is visited: the released robot, which no error of a cable disturbs, and the
+    one that is held straight; rows (k, 6, u): derivatives over the noise; held: time in s of each pose.
+    """
     information = prior.T @ prior
+    always: dict[tuple[float, float], list[int]] = {}
+    for k, pose in enumerate(candidates):
+        always.setdefault(pose.station, []).extend([k] * usual[k])
     chosen: list[int] = []
     turn = _MEAN_TURN / options.rate
     spent, stations = held, set()  # the last pose, released
     while True:
         factor = np.linalg.inv(information)
         gain = np.linalg.slogdet(np.eye(6) + np.einsum("kiu,uv,kjv->kij", rows, factor, rows))[1]
-        # At each station the released robot is measured as well: no error of a cable disturbs it.
-        cost = np.array([held + (0.0 if pose.station in stations else turn + held * bool(pose.pulled)) for pose in candidates])
+        new = [[k] if pose.station in stations else sorted({k, *always[pose.station]}) for k, pose in enumerate(candidates)]
+        cost = held * np.array([len(poses) for poses in new])
+        cost = cost + np.array([0.0 if pose.station in stations else turn for pose in candidates])
         gain = gain / cost
         gain[chosen] = -np.inf
         gain[spent + cost > options.budget] = -np.inf
@@ -245,30 +272,36 @@ def _chosen(candidates: list[PlannedPose], rows: np.ndarray, prior: np.ndarray, 
         if not gain[best] > 0.0:
             return chosen
         spent += float(cost[best])
-        new = [best]
-        if candidates[best].station not in stations and candidates[best].pulled:
-            station = candidates[best].station
-            new.append(next(k for k, pose in enumerate(candidates) if pose.station == station and not pose.pulled))
-        for k in new:
+        for k in new[best]:
             information = information + rows[k].T @ rows[k]
-        chosen += new
+        chosen += new[best]
         stations.add(candidates[best].station)
 
 
 def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:
     """Return the time in s of the largest move of the cables."""
     moves = np.ptp(np.array([pose.displacement for pose in candidates]), axis=0).max(initial=0.0)
-    return float(moves / robot.limits.displacement_rate)
+    return float(moves / robot.limits.displacement_rate) + APPROACH
 
 
 def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
-    """Return the poses station by station, each next to the one before; released first, then cable by cable."""
+    """Return the poses station by station, each next to the one before.
+
+    Released first, then held straight, then cable by cable: so every cable is wound in to where it pulls.
+    """
     left, ordered = list(poses), []
     here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
     while left:
         station = [pose for pose in left if pose.station == here.station]
-        ordered += sorted(station, key=lambda pose: (pose.pulled, float(pose.tension.sum())))
+        ordered += sorted(
+            station, key=lambda pose: (bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum()))
+        )
         left = [pose for pose in left if not any(pose is one for one in station)]
         if left:
             here = max(left, key=lambda pose: float(pose.gravity @ ordered[-1].gravity))
     return ordered
+
+
+def _place(pose: PlannedPose) -> tuple:
+    """Return what sorts the poses of a station."""
+    return bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum())

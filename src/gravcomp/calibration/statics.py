@@ -28,7 +28,7 @@ from gravcomp.description import PronyTerm, Robot
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 
 _STEPS = {
     "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 1e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,

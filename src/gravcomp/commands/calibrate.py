@@ -166,11 +166,11 @@ def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     from gravcomp.mesh import MeshError
 
     setup = Setup.of(file)
+    inverse = None if args.plan else setup.controller.inverse  # by hand, one cable at a time is enough
+    period, transmission = first_period(setup.robot), setup.hardware.transmission
     with output.stages("planning") as show:
         try:
-            return make_plan(
-                setup.robot, first_period(setup.robot), setup.hardware.transmission, plan_options(args), progress=show
-            )
+            return make_plan(setup.robot, period, transmission, plan_options(args), progress=show, inverse=inverse)
         except MeshError as error:
             raise ConfigError(str(error)) from error
 

@@ -87,7 +87,7 @@ def _motion(
 ) -> "tuple[MotionFit | None, str]":
     """Return the fit of the robot's motion to the courses, or None and why its damping is kept; what was found at rest counts."""
     from gravcomp.calibration.motion import fit_motion
-    from gravcomp.mesh.tube import with_coarse_elements
+    from gravcomp.mesh.coarse import with_coarse_elements
 
     if not courses:
         return None, "" if args.no_damping else "no trial contains fast motion"

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gravcomp.cables.friction import Sliding
 from gravcomp.cache import cache_path, content_key
 from gravcomp.config import ConfigError
 from gravcomp.firmware.cycles import CLOCK_HZ
@@ -219,7 +218,7 @@ def _error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: Hos
     """
     loop, tracker = StandaloneLoop(blob), ReducedTracker(whole, model.length)
     count, branches = len(model.robot.cables), _branches(model)
-    tracker.place(np.zeros(whole.size), np.zeros(count), Sliding.none(count))
+    tracker.place(np.zeros(whole.size), np.zeros(count))
     memory, wound, worst = Memory.of(branches, np.zeros(whole.size), tracker.strain), np.zeros(count), 0.0
     for step, gravity in enumerate(run.gravity):
         creep = memory.stress(SAMPLE_PERIOD) if branches else None
@@ -239,7 +238,7 @@ def _error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: Hos
 def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:
     """Return the worst distance in m of the tip from the run's with the same gravity and commands, infinite where it is lost."""
     tracker, count = ReducedTracker(smaller, model.length), len(model.robot.cables)
-    tracker.place(np.zeros(smaller.size), np.zeros(count), Sliding.none(count))
+    tracker.place(np.zeros(smaller.size), np.zeros(count))
     branches = _branches(model)
     memory = Memory.of(branches, np.zeros(smaller.size), tracker.strain)
     worst = 0.0

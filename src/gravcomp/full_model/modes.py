@@ -4,7 +4,7 @@ import numpy as np
 
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 
 
 def natural_frequencies(model: RobotModel, count: int = 6) -> np.ndarray:

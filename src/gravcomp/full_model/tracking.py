@@ -74,7 +74,7 @@ class StaticTracker:
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
         tendons = self.model.tendons.state(self.model.mesh.nodes)
-        self.sliding = Sliding.none(count)
+        self.sliding = Sliding.none(count, self.model.length)
         self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
         if self.contact is not None:
             self.contact.reset()

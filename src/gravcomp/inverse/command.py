@@ -3,7 +3,7 @@
 A taut cable is wound to its path, u = delta = W_aa lambda + delta_free. An idle cable is paid out along its path, u = delta -
 slack, because a cable of fixed length would hold the robot up as soon as its path lengthens. Between the two u is continuous:
 the slack grows with the tension that the programme would take away if a cable could push, at the cable's own compliance. So
-nothing jumps when a cable becomes idle.
+nothing jumps when a cable becomes idle. A cable that has to keep a tension is never idle.
 """
 
 from typing import NamedTuple

@@ -144,13 +144,15 @@ def unscaled(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the tensions (m,) in N within their bounds, and the unwanted tensions (m,) in N, both rounded to `_QUANTUM`.
 
-    Unwanted is the distance by which the programme would go below the lower bound if cables could push, 0 where that bound is
-    not active. unknowns: m scaled tensions first; multipliers: of the rows, then of the box, which has one for each unknown.
+    Unwanted is the distance by which the programme would go below 0 if cables could push. It is 0 where no bound is active, and
+    at a bound above 0: such a cable stays taut. unknowns: m scaled tensions first; multipliers: of the rows, then of the box,
+    which has one for each unknown.
     """
     m, box = len(scale), len(multipliers) - len(unknowns)
     tension, unwanted = np.empty(m), np.empty(m)
     for i in range(m):
         tension[i] = min(max(np.rint(unknowns[i] * scale[i] / _QUANTUM) * _QUANTUM, lower[i]), upper[i])
         # The Hessian's diagonal is 1, so a multiplier is also the step beyond its bound.
-        unwanted[i] = np.rint(max(0.0, -multipliers[box + i]) * scale[i] / _QUANTUM) * _QUANTUM
+        below = max(0.0, -multipliers[box + i]) if lower[i] <= 0.0 else 0.0
+        unwanted[i] = np.rint(below * scale[i] / _QUANTUM) * _QUANTUM
     return tension, unwanted

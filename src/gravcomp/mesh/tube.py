@@ -4,7 +4,6 @@ A division of the cross-section (`section_division`) is swept along the axis in 
 hexahedra, or six tetrahedra each (Kuhn's division). The robot is meshed straight and then laid along its axis at rest.
 """
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -69,20 +68,6 @@ def coarse_elements(robot: Robot) -> Elements:
     several = any(len(piece.lumens) > 1 for piece in robot.pieces)
     cornered = not several and any(not piece.lumens or piece.outer[0].shape == "rectangle" for piece in robot.pieces)
     return Elements(around=8 if cornered else 6, along=max(10, least_layers(robot.pieces)))
-
-
-def with_coarse_elements(robot: Robot) -> Robot:
-    """Return the robot with a mesh for quick looks; unchanged where its own has fewer cells, or its body is from a file."""
-    if robot.body is not None:
-        return robot
-    coarse = coarse_elements(robot)
-    if robot.elements is not None and _cells(robot.elements) < _cells(coarse):
-        return robot
-    return dataclasses.replace(robot, elements=coarse)
-
-
-def _cells(elements: Elements) -> int:
-    return elements.around * elements.along * elements.radial
 
 
 def _halved(values: np.ndarray) -> np.ndarray:

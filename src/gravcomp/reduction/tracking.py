@@ -53,7 +53,7 @@ class ReducedTracker:
 
     def __init__(self, model: ReducedModel, length: float):
         """Start from the straight robot of `length` m."""
-        self.model = model
+        self.model, self._length = model, length
         self._body = body_of(model)
         # A body whose elasticity is quadratic in the strain is always calm: its strains leave out the stretch of a straight step.
         calm = _CALM * length if len(self._body.deviation.weight) else np.inf
@@ -69,7 +69,7 @@ class ReducedTracker:
     def place(self, q: np.ndarray, tension: np.ndarray, sliding: Sliding | None = None) -> None:
         """Start from the coordinates q (r,) under the tensions (m,). sliding: of the cables, default none."""
         m = len(tension)
-        self.sliding = sliding or Sliding.none(m)
+        self.sliding = sliding or Sliding.none(m, self._length)
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
         self._point = point_at(self._body, q, self.sliding.direction)
         if self.contact is not None:

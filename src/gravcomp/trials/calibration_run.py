@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
+from gravcomp.calibration.approach import approached
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
@@ -24,8 +25,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.inverse.limits import within_limits
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
 from gravcomp.orientation import GravityEstimator, Problem
@@ -40,6 +40,7 @@ _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
 _LONGEST_START = 5.0  # s
 _BRIEF, _FEWER = 0.2, 6  # of the budget; every so many of the orientations
+_FEWEST = 5  # poses: the three of an orientation, the last one, and the turn
 _BRIEFLY_FITTED = {"offsets", "compliance", "weight"}  # with the moduli: the others take most of the derivatives' time
 
 
@@ -60,10 +61,11 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
     """Return the plan for the context's robot; a brief context has a shorter one. Raises ConfigError, MeshError."""
     options, setup, orientations = options or PlanOptions(), context.setup, ORIENTATIONS
     if context.brief:
-        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(4, int(_BRIEF * options.fewest)))
+        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(_FEWEST, int(_BRIEF * options.fewest)))
         orientations = ORIENTATIONS[::_FEWER]
     period = first_period(setup.robot)
-    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations)
+    inverse = setup.controller.inverse
+    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
 
 
 def measure(context: Context, plan: Plan) -> Measured:
@@ -183,7 +185,7 @@ class _Rig:
             self._outgoing += self._bridge.tick(now)
 
     def _command(self, displacement: np.ndarray, tension: np.ndarray, now: float) -> None:
-        moved = within_limits(displacement, self._sent, self._limits, _SAMPLE_PERIOD)
+        moved = approached(displacement, self._sent, self._limits, _SAMPLE_PERIOD)
         self._sent = self._transmission.possible(moved, tension)
         refused = self._bridge.command(self._sent.tolist(), tension.tolist(), now)
         if refused:

@@ -26,7 +26,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.full_model.modes import first_period
 from gravcomp.materials.material_classes import class_of
-from gravcomp.mesh.tube import with_coarse_elements
+from gravcomp.mesh.coarse import with_coarse_elements
 
 _KINDS = {"modulus"} | {kind for kinds in GROUPS.values() for kind in kinds}
 _EVEN = {"modulus": 0.08, "density": 0.02, "radius": 0.01, "angle": np.radians(1.0), "winding": 0.003, "mount": np.radians(0.5)}
@@ -211,7 +211,8 @@ def coverage_of_robots(
     for file in files:
         setup = Setup.of(load_robot_file(file))
         robot = setup.robot
-        plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress)
+        inverse = setup.controller.inverse
+        plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress, inverse=inverse)
         progress(f"{robot.name}: coverage over {len(seeds)} seeds")
         found[robot.name] = coverage(robot, plan, seeds)
     return found
