@@ -22,6 +22,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.arm.chain import Chain
+from gravcomp.arm.description import read_urdf
 from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
@@ -44,10 +45,7 @@ class ArmPlayer(ManagedNode):
 
     def configure(self) -> None:
         """Read the URDF. Raises ConfigError when it cannot be read or has another number of joints."""
-        try:
-            text = Path(self.parameters.urdf).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ConfigError(f"arm_player: urdf '{self.parameters.urdf}' cannot be read: {error.strerror}") from error
+        text = read_urdf(self.parameters.urdf)
         self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, self.parameters.urdf)
         poses = np.array(list(FIVE_POSES.values()))
         if len(self._chain.moving) != poses.shape[1]:

@@ -16,8 +16,6 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from gravcomp.description.hardware import parse_hardware
-from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
@@ -48,7 +46,7 @@ class InverseController(ManagedNode):
 
     def configure(self) -> None:
         """Compile the solver; create publishers and services."""
-        file, transmission = self.robot_file, self._transmission()
+        file, transmission = self.robot_file, self.robot_file.hardware.transmission
         robot = file.robot
         self._problem = InverseProblem(robot, self.parameters.inverse, transmission, file.scene, file.zones)
         # Compile before the first deformation arrives.
@@ -111,14 +109,6 @@ class InverseController(ManagedNode):
                 self._tracker.begin(new.tracker)
         if old.enabled != new.enabled:
             self._enabled, self._relaxing = new.enabled, False
-
-    def _transmission(self) -> Transmission | None:
-        """Return how motors move cables; None for a robot file without hardware."""
-        file = self.robot_file
-        section = file.section("hardware")
-        if not section:
-            return None
-        return parse_hardware(section, source=file.source, cables=file.robot.cable_names).transmission
 
     def _straight(self) -> Target:
         return straight_target(

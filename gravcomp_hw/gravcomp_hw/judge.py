@@ -20,7 +20,7 @@ from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.config import ConfigError
-from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.description.hardware import CanInterface
 from gravcomp.evaluation import run_figures as figures
 from gravcomp.evaluation.bus_delay import DelayListener
 from gravcomp.evaluation.released import released_tip_error
@@ -207,10 +207,8 @@ class Judge(ManagedNode):
         write_whole(Path(self.parameters.result_file), json.dumps(state))
 
     def _can(self) -> CanInterface:
-        section = self.robot_file.section("hardware")
-        hardware = parse_hardware(section, source=self.robot_file.source, cables=self.robot_file.robot.cable_names)
         p = self.parameters
-        return hardware.on(p.interface, p.channel).board_bus
+        return self.robot_file.hardware.on(p.interface, p.channel).board_bus
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse.target import Target, direction_weight, straight_target
@@ -44,7 +44,7 @@ class LoopParameters:
                 f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
                 " that on the board has neither"
             )
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        hardware = file.hardware
         return cls(file.source, file.robot, estimator, controller, hardware)
 
     @property
