@@ -8,7 +8,7 @@ pytestmark = pytest.mark.timeout(1600)
 @pytest.mark.parametrize(
     ("line", "about"),
     [
-        ("./gravcomp reproduce static --brief", "recovery rate"),
+        ("./gravcomp reproduce freefall --brief", "Real to simulation"),
         pytest.param("./gravcomp reproduce all --write src/doc/figures.md", "index", marks=pytest.mark.graph),
     ],
 )

@@ -105,17 +105,17 @@ def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
     assert modulus == pytest.approx(330e3, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("line", "shorter"),
-    [
-        ("./gravcomp test", "--collect-only -q"),
-        ("./gravcomp test --fast", "--collect-only -q"),
-        ("./gravcomp test src/test/test_inverse.py -x", "-k straight"),
-    ],
-)
-def test_tests_are_found(type_in, line, shorter):
-    code, output = type_in(line, shorter)
-    assert code == 0 and re.search(r"\d+ (tests collected|passed|/)", output), output[-2000:]
+@pytest.mark.parametrize(("line", "graphs"), [("./gravcomp test", True), ("./gravcomp test --fast", False)])
+def test_tests_are_found(type_in, line, graphs):
+    """Those of the core are left out: the run that this test is part of has found them."""
+    code, output = type_in(line, "--collect-only -q --ignore-glob=src/test/*")
+    assert code == 0 and re.search(r"\d+ tests collected", output), output[-2000:]
+    assert "gravcomp_fem/test/test_" in output and ("test/test_demo.py" in output) is graphs
+
+
+def test_some_tests_are_run(type_in):
+    code, output = type_in("./gravcomp test src/test/test_inverse.py -x", "-k straight")
+    assert code == 0 and re.search(r"\d+ passed", output), output[-2000:]
 
 
 @pytest.mark.skipif(Path("/sys/class/net/can0").exists(), reason="there is a can0: motors may hang on it")

@@ -26,6 +26,7 @@ from gravcomp.arm.description import read_urdf
 from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.virtual.motion import quaternion
 from gravcomp.whole_file import write_whole
 from gravcomp_fem.conversion import vector_of
@@ -102,7 +103,7 @@ class ArmPlayer(ManagedNode):
         pose = self._tour.at_rest(time, self.parameters.hold - self.parameters.measured)
         self._measuring = pose is not None
         if pose is not None:
-            target = np.array([0.0, 0.0, self.robot_file.robot.length])
+            target, _ = rest_tip(self.robot_file.robot)
             name = _PASSES[self._pass]
             self._errors[name][pose].append(float(np.linalg.norm(self._tip - target)))
             self._followed[name].append(self._bridge.state == CableState.ACTIVE)

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.holdability.background import HoldProcess
-from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
+from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, rest_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, point_message, pose_target, seconds, shape_target
 from gravcomp_fem.deformed import Deformed, PublishedShape, from_message, from_shape
@@ -52,7 +52,7 @@ class InverseController(ManagedNode):
         # Compile before the first deformation arrives.
         warm_up(robot, self.parameters.inverse, transmission, surrounded=bool(file.scene or file.zones))
         self._tracker = TrackerInput(self, robot, self.parameters.frame)
-        self._target: Target | None = self._straight() if self.parameters.hold_straight else None
+        self._target: Target | None = self._at_rest() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
         self._relaxing = False
         self._command = self.create_publisher(CableCommand, "cable/command", COMMAND)
@@ -110,9 +110,9 @@ class InverseController(ManagedNode):
         if old.enabled != new.enabled:
             self._enabled, self._relaxing = new.enabled, False
 
-    def _straight(self) -> Target:
-        return straight_target(
-            self.robot_file.robot.length,
+    def _at_rest(self) -> Target:
+        return rest_target(
+            self.robot_file.robot,
             tip_position_weight=self.parameters.tip_position_weight,
             tip_direction_weight=self._direction_weight(),
         )

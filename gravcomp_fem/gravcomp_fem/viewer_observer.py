@@ -12,7 +12,7 @@ from rclpy.time import Time
 
 from gravcomp.description import Robot
 from gravcomp.inverse import Holdable, TargetError
-from gravcomp.view.backbone import arc_backbone
+from gravcomp.view.backbone import arc_backbone, rest_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
@@ -60,7 +60,8 @@ class GraphObserver:
             "target": Polled(node, PoseStamped, "target", COMMAND),
             "shape": Polled(node, ShapeTarget, "target/shape", COMMAND),
         }
-        self._target = TargetView(np.array([0.0, 0.0, robot.length]), arc_backbone(robot.length, 0.0, 0.0))
+        rest = rest_backbone(robot)
+        self._target = TargetView(rest.tip, rest)
         self._counted: tuple[float, int] | None = None
         self._rate = 0.0
 

@@ -4,9 +4,11 @@ import contextlib
 import dataclasses
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from gravcomp.cache import cache_folder
 from gravcomp.description import Elements, Robot, load_robot_file
 from gravcomp.reduction import Reduction, load
 from gravcomp.simulation import RobotModel
@@ -29,12 +31,20 @@ def coarse(robot: Robot | None = None) -> Robot:
 
 @contextlib.contextmanager
 def cache_of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Context with a cache that is empty at the start of a run, and that its processes share."""
+    """Context with a cache that is empty at the start of a run, but for compiled functions, and that its processes share."""
     own = tmp_path_factory.getbasetemp()
     folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
+    keep_compiled(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("GRAVCOMP_CACHE", str(folder))
         yield
+
+
+def keep_compiled(folder: Path) -> None:
+    """Give another cache the compiled functions of this one: to compile them again takes longer than what a test does."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        (folder / "numba").symlink_to(cache_folder("numba"))
 
 
 def built_once(robot: Robot) -> tuple[RobotModel, Reduction]:

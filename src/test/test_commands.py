@@ -45,7 +45,7 @@ def test_help_names_the_common_options_and_the_exit_codes(words, capsys):
         main([*words, "--help"])
     text = " ".join(capsys.readouterr().out.split())
     assert end.value.code == 0
-    assert "--json" in text and "--quiet" in text
+    assert f"gravcomp {' '.join(words)}" in text and "--json" in text and "--quiet" in text
     for code, meaning in EXIT_CODES.items():
         assert f"{code} {meaning}" in text
 

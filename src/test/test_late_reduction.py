@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coarse_article import built_once, cache_of_the_run, coarse
+from coarse_article import built_once, cache_of_the_run, coarse, keep_compiled
 
 from gravcomp.description import load_robot_file
 from gravcomp.description.robot import Robot
+from gravcomp.launcher import model_builder
 from gravcomp.mesh import tube_mesh
 from gravcomp.reduction import load, path_of
 from gravcomp.simulation import DynamicSimulator, RobotModel, Simulator
@@ -36,6 +37,7 @@ def built(tmp_path_factory) -> Path:
 @pytest.fixture
 def robot(tmp_path, monkeypatch) -> Robot:
     """The robot, and a cache without its reduced model."""
+    keep_compiled(tmp_path)
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
     return coarse()
 
@@ -128,5 +130,30 @@ def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):
     command = [sys.executable, "-m", "gravcomp.training.background", str(tmp_path / "robot.yaml")]
     done = subprocess.run(command, env=dict(os.environ), capture_output=True, text=True, timeout=120)
     assert done.returncode == 0 and not done.stderr
-    assert path_of(RobotModel(robot)).stat().st_mtime_ns == stamp
+    path = path_of(RobotModel(robot))
+    assert path.stat().st_mtime_ns == stamp and done.stdout == f"{stamp} {path}\n"
     assert load(RobotModel(robot)) is not None
+
+
+def test_no_builder_is_started_for_a_model_that_is_known_to_be_stored(tmp_path, monkeypatch):
+    file, robot, other, started = tmp_path / "model.npz", tmp_path / "robot.yaml", tmp_path / "other.yaml", []
+    file.touch()
+    robot.write_text(Path(load_robot_file("article").source).read_text())
+    other.write_text(robot.read_text().replace("grading: 16.0", "grading: 8.0"))
+
+    def start(name: str, output: int) -> subprocess.Popen:
+        line = f"{file.stat().st_mtime_ns} {file}"
+        started.append(subprocess.Popen([sys.executable, "-c", f"print({line!r})"], stdout=output, text=True))
+        started[-1].wait()
+        return started[-1]
+
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(model_builder, "start_builder", start)
+    for path, count in ((robot, 1), (robot, 1), (other, 2), (other, 2)):
+        with model_builder.ModelBuilder(str(path)) as builder:
+            builder.start()
+        assert len(started) == count
+    os.utime(file, ns=(0, 0))  # written again, for other moduli
+    with model_builder.ModelBuilder(str(robot)) as builder:
+        builder.start()
+    assert len(started) == 3

@@ -313,11 +313,12 @@ def held(setup: Setup, seconds: float, tracker: VirtualTrackerParameters | None)
     return loop
 
 
-def test_commands_are_the_same_bit_for_bit_while_no_measurement_arrives(setup: Setup, monkeypatch, tmp_path) -> None:
+def test_commands_stay_the_same_while_no_measurement_arrives(setup: Setup, monkeypatch, tmp_path) -> None:
     # A cache of its own: another process may store the reduced model between the two runs.
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
     without, lost = (held(setup, 0.3, tracker) for tracker in (None, VirtualTrackerParameters(rate=5.0, dropouts=1.0)))
-    assert (without.trace.command == lost.trace.command).all()
+    # But for rounding: ProxQP adds in an order that depends on where its memory begins.
+    assert np.abs(without.trace.command - lost.trace.command).max() < 1e-10
 
 
 def test_tracker_removes_the_error_of_a_wrong_model(setup: Setup) -> None:

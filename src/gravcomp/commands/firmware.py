@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--frames", type=in_range(int, 1, 10**9), default=50_000, metavar="N", help="frames of the fuzzer (default: 50000)"
     )
     test.add_argument("--seed", type=in_range(int, 0, 2**31 - 1), default=1, metavar="N", help="seed of the fuzzer (default: 1)")
+    test.add_argument("-k", dest="names", default="", metavar="NAMES", help="only tests with these names, as pytest's -k")
     model = add_subcommand(choices, "model", "turn a robot's reduced model into the blob of the loop on the board")
     model.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
     model.add_argument("--output", metavar="DIR", default=_FOLDER, help=f"folder of the blob (default: {_FOLDER})")
@@ -203,7 +204,7 @@ def _test(args: argparse.Namespace) -> int:
     found = findings()
     for line in found:
         output.note(line)
-    coverage = measure(list(_TESTS), root)
+    coverage = measure(list(_TESTS), root, args.names)
     for file, lines in coverage.missed.items():
         output.note(f"{file}: not reached: {', '.join(map(str, lines))}")
     fuzzed = fuzz(args.frames, args.seed)

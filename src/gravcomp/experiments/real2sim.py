@@ -21,7 +21,7 @@ TITLE = "Real to simulation: free fall"
 
 _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other poses than the evaluated ones
 # In first periods of the robot: a fall, and when shapes are drawn.
-_DURATION, _BRIEF_DURATION = 14.0, 2.1
+_DURATION, _BRIEF_DURATION = 14.0, 1.5
 _SHOWN = (0.1, 0.2, 0.35, 7.0)
 _REST = 0.25  # of a fall: its last part, which counts as rest
 # Of the sag of the horizontal robot, its tip's distance from the straight one's, and of the turn of that tip.

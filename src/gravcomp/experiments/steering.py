@@ -12,7 +12,7 @@ from gravcomp.trials.lumen import Reach
 from gravcomp.trials.steered import DEPTH, Passage, Steered, steer
 
 _SEEDS = 20
-_SECONDS, _BRIEF_SECONDS = 20.0, 2.0  # until a run is given up
+_SECONDS, _BRIEF_SECONDS = 20.0, 1.0  # until a run is given up
 _FIRST, _DEPTHS = 0.35, (0.85, 1.0)  # of the robot's length: the tip at the start, the target
 _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0

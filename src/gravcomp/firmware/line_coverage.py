@@ -31,8 +31,11 @@ class Coverage:
         return round(100.0 * self.reached / self.lines, 1) if self.lines else 0.0
 
 
-def measure(tests: list[str], root: Path) -> Coverage:
-    """Run pytest on `tests` and the fuzzer's corpus with counters; return what they reach. Raises SetupError."""
+def measure(tests: list[str], root: Path, names: str = "") -> Coverage:
+    """Run pytest on `tests` and the fuzzer's corpus with counters; return what they reach. Raises SetupError.
+
+    names: of the tests, as pytest's -k takes them; empty: all.
+    """
     if not shutil.which("gcov"):
         raise SetupError("gcov is missing, which counts the lines that are reached. Run: apt-get install gcc")
     compiler = host_compiler()
@@ -42,7 +45,8 @@ def measure(tests: list[str], root: Path) -> Coverage:
         compile_files(compiler, sources(*PARTS), library, [*_OPTIONS, "-shared"], folder)
         compile_files(compiler, [*sources(*PARTS), *sources(TESTS)], corpus, [*_OPTIONS], folder)
         environment = dict(os.environ, **{LIBRARY_VARIABLE: str(library)})
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", "-n", "0", *tests]
+        options = ["-q", "-p", "no:cacheprovider", "-p", "no:randomly", "-n", "0", "-k", names]
+        command = [sys.executable, "-m", "pytest", *options, *tests]
         done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
         if done.returncode != 0:
             raise SetupError(f"the firmware's tests fail:\n{done.stdout.strip()[-3000:]}")

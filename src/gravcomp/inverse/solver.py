@@ -37,7 +37,10 @@ class Solution(NamedTuple):
 
 
 class ProgrammeSolver:
-    """Solves a sequence of programmes, each started from the last solution. The same sequence gives the same bits."""
+    """Solves a sequence of programmes, each started from the last solution.
+
+    The same sequence gives the same solutions but for rounding: ProxQP adds in an order that depends on where its memory begins.
+    """
 
     def __init__(self) -> None:
         from proxsuite import proxqp  # here, because its import is slow and not every user of the module solves

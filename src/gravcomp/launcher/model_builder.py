@@ -1,10 +1,20 @@
-"""The process that builds a robot's reduced model while its nodes already run on the full model."""
+"""The process that builds a robot's reduced model while its nodes already run on the full model.
+
+To see that the model is stored, the process imports and meshes for a second, next to nodes that have just started. So a note in
+the cache, under a key of the robot and of this package's code, names the stored file with its time of writing (another robot
+with the same ratios of its moduli may replace it); as long as they are right, no process is started.
+"""
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+from gravcomp.cache import cache_path, content_key
+from gravcomp.compiled_functions import PACKAGE
+from gravcomp.description import load_robot_file
 from gravcomp.environment.end_with_parent import end_with_parent
+from gravcomp.whole_file import write_whole
 
 MARK = "GRAVCOMP_MODEL_BUILDER"
 """Environment variable that tells nodes that their launcher builds the reduced model."""
@@ -20,27 +30,62 @@ class ModelBuilder:
     def __init__(self, robot: str):
         self._robot = robot
         self._process: subprocess.Popen | None = None
+        self._note: Path | None = None
         self.environment = {MARK: "1"}
 
     def __enter__(self) -> "ModelBuilder":
         return self
 
     def start(self) -> None:
-        """Start the process. Call it when the nodes have started: their imports and its own would wait for each other."""
-        self._process = start_builder(self._robot)
+        """Start the process, unless the model is known to be stored. Raises ConfigError.
+
+        Call it when the nodes have started: their imports and its own would wait for each other.
+        """
+        self._note = note_of(self._robot)
+        if not is_stored(self._note):
+            self._process = start_builder(self._robot, subprocess.PIPE)
 
     def __exit__(self, *_: object) -> None:
-        if self._process is not None:
+        if self._process is None:
+            return
+        if self._process.poll() is None:
             self._process.terminate()
-            self._process.wait()
+        stored, _errors = self._process.communicate()
+        if self._note is not None and self._process.returncode == 0 and stored:
+            write_whole(self._note, stored.strip())
 
 
-def start_builder(robot: str) -> subprocess.Popen:
-    """Start the building process; it ends by itself, or with the thread that calls this. Its progress goes to stderr."""
+def note_of(robot: str) -> Path | None:
+    """Return the path of the note about a robot's stored model; None for a body from a file, which can change by itself.
+
+    Raises ConfigError.
+    """
+    described = load_robot_file(robot).robot
+    if described.body is not None:
+        return None
+    code = sorted((str(path.relative_to(PACKAGE)), path.stat().st_mtime_ns) for path in PACKAGE.rglob("*.py"))
+    return cache_path("reduction", content_key(described, code), ".stored")
+
+
+def is_stored(note: Path | None) -> bool:
+    """Return whether a note names a file as it is there."""
+    try:
+        written, path = note.read_text().split(" ", 1) if note else ("", "")
+        return bool(path) and Path(path).stat().st_mtime_ns == int(written)
+    except (OSError, ValueError):
+        return False
+
+
+def start_builder(robot: str, output: int = subprocess.DEVNULL) -> subprocess.Popen:
+    """Start the building process; it ends by itself, or with the thread that calls this. Its progress goes to stderr.
+
+    output: where it writes time and path of the stored model (`subprocess`).
+    """
     return subprocess.Popen(
         [sys.executable, "-m", "gravcomp.training.background", robot],
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=output,
+        text=True,
         start_new_session=True,  # Ctrl-C reaches the launcher alone
         preexec_fn=end_with_parent,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},

@@ -72,8 +72,17 @@ def coarse_elements(robot: Robot) -> Elements:
 
 
 def with_coarse_elements(robot: Robot) -> Robot:
-    """Return the robot with a mesh for quick looks, a body from a file unchanged."""
-    return robot if robot.body is not None else dataclasses.replace(robot, elements=coarse_elements(robot))
+    """Return the robot with a mesh for quick looks; unchanged where its own has fewer cells, or its body is from a file."""
+    if robot.body is not None:
+        return robot
+    coarse = coarse_elements(robot)
+    if robot.elements is not None and _cells(robot.elements) < _cells(coarse):
+        return robot
+    return dataclasses.replace(robot, elements=coarse)
+
+
+def _cells(elements: Elements) -> int:
+    return elements.around * elements.along * elements.radial
 
 
 def _halved(values: np.ndarray) -> np.ndarray:

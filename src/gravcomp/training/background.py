@@ -12,24 +12,29 @@ from gravcomp.mesh import MeshError
 
 
 def main(arguments: list[str]) -> int:
-    """Build the reduced model unless it exists. Returns 0, also for a robot that cannot be reduced."""
+    """Build the reduced model unless it exists; print when its file was written (ns) and the path.
+
+    Returns 0, also for a robot that cannot be reduced, of which nothing is printed.
+    """
     give_way()
     (robot,) = arguments
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.robot_model import RobotModel
-    from gravcomp.reduction import load, why_not
+    from gravcomp.reduction import load, path_of, why_not
     from gravcomp.training.build import alone, build
 
     try:
         model = RobotModel(load_robot_file(robot).robot)
-        if why_not(model) or load(model) is not None:
+        if why_not(model):
             return 0
-        with alone(model):
-            if load(model) is not None:  # built by another process meanwhile
-                return 0
-            _say("is built in the background; the full model serves until then")
-            _, seconds = build(model, progress=_Quarters())
-            _say(f"was built in {seconds:.0f} s; the running simulator changes over to it")
+        if load(model) is None:
+            with alone(model):
+                if load(model) is None:  # not built by another process meanwhile
+                    _say("is built in the background; the full model serves until then")
+                    _, seconds = build(model, progress=_Quarters())
+                    _say(f"was built in {seconds:.0f} s; the running simulator changes over to it")
+        path = path_of(model)
+        print(path.stat().st_mtime_ns, path, flush=True)
     except (ConfigError, MeshError) as error:
         _say(f"cannot be built: {error}")
     return 0

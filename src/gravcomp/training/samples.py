@@ -20,7 +20,7 @@ import numpy as np
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import ShapeStatus
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.inverse import InverseController, bend_target, direction_weight
+from gravcomp.inverse import InverseController, direction_weight, rest_target
 from gravcomp.simulation.simulator import Simulator
 
 GRAVITY = 9.81
@@ -132,7 +132,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     if kind >= _RELEASED:
         bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
         weight = rng.choice([0.0, direction_weight(model.length)])
-        target = bend_target(model.length, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
+        target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
     gravity, displacement = size * _direction(rng), None
     largest = _largest_load(model, rng)
