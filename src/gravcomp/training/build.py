@@ -41,9 +41,9 @@ class BuildOptions:
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
     to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose the
-    cubature of the law's deviation with, cubature its tolerance and points their largest number; represented: the training ends
-    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to test
-    with.
+    cubature of the law's deviation with, cubature its tolerance, and points a number that is enough for twice the tolerance (the
+    board has room for 128); represented: the training ends when the modes of earlier paths represent new ones to this part of the
+    length; training and test: motions to train and to test with.
     """
 
     modes: int = 44
