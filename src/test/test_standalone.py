@@ -13,6 +13,7 @@ from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import PronyTerm, load_robot_file
+from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware import model_blob
 from gravcomp.firmware.cycles import MEMORY_AT, Processor, sample_bytes
 from gravcomp.firmware.host_library import load as library
@@ -23,6 +24,7 @@ from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopPara
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.guard import Problem
 from gravcomp.simulation import RobotModel
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
@@ -123,9 +125,10 @@ def test_a_spoilt_model_is_refused_and_the_old_one_goes_on(found, spoil, reason)
     np.testing.assert_array_equal(loop.read().displacement, untouched.read().displacement)
 
 
-def test_the_settings_have_the_length_that_the_firmware_reads(parameters):
+def test_the_settings_have_the_length_that_the_firmware_reads(parameters, built):
+    turn = BaseTurn(built[0], parameters.turn)
     library().gc_loop_settings.restype = ctypes.c_size_t
-    assert len(settings(parameters, 1.0, 1.0)) == model_blob.SETTINGS == library().gc_loop_settings()
+    assert len(settings(parameters, 1.0, 1.0, turn)) == model_blob.SETTINGS == library().gc_loop_settings()
 
 
 def test_a_robot_that_creeps_and_whose_cables_rub_does_so_on_the_board(parameters, built):
@@ -169,6 +172,43 @@ def test_the_estimator_in_float32_follows_that_of_the_host(parameters, found):
         assert loop.weigh(k * 10_000, gyro, accel)
         worst = max(worst, float(np.linalg.norm(np.subtract(loop.gravity, estimate.gravity))))
     assert np.degrees(worst / 9.81) < 0.05
+
+
+def test_the_forces_of_a_turning_base_are_those_of_the_host(parameters, built, found):
+    """Over lost samples, one of an unknown kind, and a pause after which the rates begin again."""
+    estimator = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))
+    mount, turn, loop = parameters.robot.imu_mount.rotation, BaseTurn(built[0], parameters.turn), StandaloneLoop(found.blob)
+    worst = largest = 0.0
+    for k in range(600):
+        if k in (200, 201) or 400 <= k < 420:
+            continue
+        gyro = np.array([1.0, -0.5, 0.3]) * np.sin(0.05 * k)
+        accel = np.full(3, np.nan) if k == 300 else np.array([0.0, 0.0, 9.81])
+        estimate = estimator.update(k * 10_000_000, gyro.tolist(), accel.tolist())
+        if not isinstance(estimate, Problem):
+            turn.add(0.01 * k, mount @ np.array(estimate.imu.angular_velocity))
+        wanted = turn.acceleration(0.01 * k)
+        assert loop.weigh(k * 10_000, gyro, accel) == (k != 300)
+        worst = max(worst, float(np.linalg.norm(loop.read().turning - wanted)))
+        largest = max(largest, float(np.linalg.norm(wanted)))
+        if k in (0, 420):
+            assert not loop.read().turning.any()
+    assert largest > 0.1 and worst < 1e-4 * largest
+    last, without = loop.read(), StandaloneLoop(found.blob)
+    loop.follow(SAMPLE_PERIOD)
+    without.follow(SAMPLE_PERIOD, last.gravity)
+    alike = StandaloneLoop(found.blob)
+    alike.follow(SAMPLE_PERIOD, last.gravity + last.turning)
+    np.testing.assert_allclose(loop.read().tip, alike.read().tip, rtol=0.0, atol=1e-9)
+    assert np.linalg.norm(loop.read().tip - without.read().tip) > 1e-6
+
+
+def test_a_turn_that_does_not_count_has_no_forces_on_the_board(parameters, built):
+    off = dataclasses.replace(parameters, turn=dataclasses.replace(parameters.turn, enabled=False))
+    values = [settings(each, 1.0, 1.0, BaseTurn(built[0], each.turn)) for each in (parameters, off)]
+    height, lag = np.flatnonzero(values[0] != values[1])
+    assert values[0][height] == pytest.approx(BaseTurn(built[0], off.turn).height) and values[0][lag] > 0.0
+    assert not values[1][[height, lag]].any()
 
 
 def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host(parameters, found):

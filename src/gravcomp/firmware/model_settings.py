@@ -1,12 +1,16 @@
 """Settings of the standalone loop from a robot file, in the order of gravcomp_hw/firmware/standalone/settings.h."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile
 from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.external_loads.base_turn import BaseTurn
+from gravcomp.external_loads.options import BaseTurnOptions
+from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse.target import Target, direction_weight, straight_target
@@ -26,26 +30,25 @@ class LoopParameters:
     estimator: ImuEstimatorParameters
     controller: InverseControllerParameters
     hardware: Hardware
+    turn: BaseTurnOptions
 
     @classmethod
     def of(cls, file: RobotFile) -> "LoopParameters":
         """Return the parameters of a robot file. Raises ConfigError."""
 
-        def section(kind: type, name: str) -> object:
+        def section(kind: type, name: str) -> Any:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
 
-        estimator, controller = (
-            section(ImuEstimatorParameters, "imu_estimator"),
-            section(InverseControllerParameters, "inverse_controller"),
-        )
-        assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
+        estimator = section(ImuEstimatorParameters, "imu_estimator")
+        controller = section(InverseControllerParameters, "inverse_controller")
         if file.zones or controller.inverse.max_contact_force is not None:
             raise ConfigError(
                 f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
                 " that on the board has neither"
             )
         hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        return cls(file.source, file.robot, estimator, controller, hardware)
+        turn = section(FemSimulatorParameters, "fem_simulator").turn
+        return cls(file.source, file.robot, estimator, controller, hardware, turn)
 
     @property
     def straight(self) -> Target:
@@ -74,10 +77,10 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
     return [numbers[name] for name in parameters.robot.cable_names]
 
 
-def settings(parameters: LoopParameters, reach: float, joystick_bend: float, law_share: int = 1) -> np.ndarray:
+def settings(parameters: LoopParameters, reach: float, joystick_bend: float, turn: BaseTurn, law_share: int = 1) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
-    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; law_share: points of a law of rubber of which
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; turn: of the robot's model; law_share: points of a law of rubber of which
     a step computes the stiffness. Raises ConfigError for motors that are shared.
     """
     robot, wanted = parameters.robot, parameters.straight
@@ -101,6 +104,12 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, law
         rest.time_constant, rest.gyro_deviation, rest.accel_deviation, rest.accel_drift, rest.minimum_time, rest.largest_bias,
         sensor.gyro_range, sensor.accel_range, sensor.delay, sensor.stuck_time, sensor.largest_gap,
         spikes.gyro, spikes.accel, spikes.ratio, spikes.time_constant, float(spikes.longest),
-        float(law_share), *numbers, *[0] * (CABLES_MAX - len(numbers)),
+        *_of_turn(turn), float(law_share), *numbers, *[0] * (CABLES_MAX - len(numbers)),
     ]  # fmt: skip
     return np.array(values, dtype="<f4")
+
+
+def _of_turn(turn: BaseTurn) -> tuple[float, float]:
+    """Return the height in m and the time of the low-pass in s; zeros where the forces of turns do not count."""
+    counts = turn.options.enabled and turn.height > 0.0
+    return (turn.height, turn.options.lag * turn.period) if counts else (0.0, 0.0)
