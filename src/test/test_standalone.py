@@ -233,7 +233,7 @@ def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host
 def test_the_image_computes_the_same_bits_as_the_host(found):
     """The inner loops are written in the processor's instructions there."""
     processor, loop = Processor(build_image(standalone=True), found.blob), StandaloneLoop(found.blob)
-    sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
+    sample, targets = MEMORY_AT + 0x17000, MEMORY_AT + 0x17100
     assert processor.take_model(found.blob)
     on_host = (ctypes.c_float * 8)(), (ctypes.c_float * 8)()
     memory = ctypes.create_string_buffer(24)

@@ -141,7 +141,7 @@ def cost(model: ReducedModel, share: int = 0) -> tuple[int, float]:
 
 def _law_cost(modes: int, points: int) -> int:
     """Return the multiply-adds of a step for the force of a law of rubber at these points."""
-    return points * (18 * modes + _LAW_FORCE) + (2 * modes * modes if points else 0)
+    return points * (18 * modes + _LAW_FORCE)
 
 
 def _share_cost(modes: int) -> int:
