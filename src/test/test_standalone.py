@@ -97,6 +97,22 @@ def test_a_lost_equilibrium_holds_the_robot_at_its_last_one(found):
     assert loop.read().converged and np.all(np.isfinite(loop.read().displacement))
 
 
+def test_a_jolt_that_loses_the_equilibrium_does_not_lose_it_for_good(found):
+    lost, left = 0, []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        gravity, jolt = (size * axis / np.linalg.norm(axis) for size, axis in zip((9.81, 100.0), rng.normal(size=(2, 3))))
+        loop, steps = started(found.blob, gravity), int(rng.integers(5, 60))
+        for k in range(steps):
+            loop.follow(SAMPLE_PERIOD, gravity + (k + 1) / steps * jolt)
+            lost += not loop.read().converged
+        for _ in range(200):
+            loop.follow(SAMPLE_PERIOD, gravity)
+        left.append(loop.read())
+    assert lost > 20
+    assert sum(result.converged for result in left) >= 10  # some try for longer
+
+
 def changed(blob: bytes, at: int, value: int) -> bytes:
     return model_blob.with_crc(blob[:at] + struct.pack("<I", value) + blob[at + 4 :])
 
@@ -110,6 +126,10 @@ def changed(blob: bytes, at: int, value: int) -> bytes:
         (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: changed(b, 32, 52), "more modes"),
         (lambda b: changed(b, 40, CABLES_MAX + 1), "more modes"),
+        (lambda b: changed(b, 44, model_blob.PIECES_MAX + 1), "pieces of cables"),
+        (lambda b: changed(b, 52, model_blob.POINTS_MAX + 1), "points"),
+        (lambda b: changed(b, 56, model_blob.LAW_POINTS_MAX + 1), "points"),
+        (lambda b: changed(b, 60, model_blob.BRANCHES_MAX + 1), "branches"),
         (lambda b: changed(b, 8, len(b) - 4), "size"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 16, 0), "another robot"),
@@ -204,7 +224,9 @@ def test_the_forces_of_a_turning_base_are_those_of_the_host(parameters, built, f
 
 
 def test_a_turn_that_does_not_count_has_no_forces_on_the_board(parameters, built):
-    off = dataclasses.replace(parameters, turn=dataclasses.replace(parameters.turn, enabled=False))
+    file = load_robot_file("article")
+    nodes = {**file.section("nodes"), "fem_simulator": {"turn": {"enabled": False}}}
+    off = LoopParameters.of(dataclasses.replace(file, robot=parameters.robot, sections={**file.sections, "nodes": nodes}))
     values = [settings(each, 1.0, 1.0, BaseTurn(built[0], each.turn)) for each in (parameters, off)]
     height, lag = np.flatnonzero(values[0] != values[1])
     assert values[0][height] == pytest.approx(BaseTurn(built[0], off.turn).height) and values[0][lag] > 0.0
