@@ -18,6 +18,7 @@ from std_msgs.msg import Header, String
 
 from gravcomp.arm.acceleration import CarriedPoint
 from gravcomp.arm.chain import Chain, angle_between, gravity_in
+from gravcomp.arm.description import read_urdf
 from gravcomp.arm.frames import FrameTree
 from gravcomp.arm.fusion import GravityFusion
 from gravcomp.config import ConfigError
@@ -43,11 +44,7 @@ class ArmGravity(ManagedNode):
         self._chain: Chain | None = None
         self._point: CarriedPoint | None = None
         if self.parameters.source == "joint_states" and self.parameters.urdf:
-            try:
-                with open(self.parameters.urdf, encoding="utf-8") as file:
-                    self._take_urdf(file.read(), self.parameters.urdf)
-            except OSError as error:
-                raise ConfigError(f"arm_gravity: urdf '{self.parameters.urdf}' cannot be read: {error.strerror}") from error
+            self._take_urdf(read_urdf(self.parameters.urdf), self.parameters.urdf)
         if self.parameters.feed_acceleration and self.parameters.source != "joint_states":
             raise ConfigError("arm_gravity: feed_acceleration needs source: joint_states; TF has no stamps that are dense enough")
         topic = "gravity/arm" if self.parameters.use == "check" else "gravity"

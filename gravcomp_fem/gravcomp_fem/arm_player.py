@@ -22,9 +22,11 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.arm.chain import Chain
+from gravcomp.arm.description import read_urdf
 from gravcomp.arm.tour import FIVE_POSES, Tour
 from gravcomp.config import ConfigError
 from gravcomp.graph.parameters.arm_player import ArmPlayerParameters
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.virtual.motion import quaternion
 from gravcomp.whole_file import write_whole
 from gravcomp_fem.conversion import vector_of
@@ -44,10 +46,7 @@ class ArmPlayer(ManagedNode):
 
     def configure(self) -> None:
         """Read the URDF. Raises ConfigError when it cannot be read or has another number of joints."""
-        try:
-            text = Path(self.parameters.urdf).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ConfigError(f"arm_player: urdf '{self.parameters.urdf}' cannot be read: {error.strerror}") from error
+        text = read_urdf(self.parameters.urdf)
         self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, self.parameters.urdf)
         poses = np.array(list(FIVE_POSES.values()))
         if len(self._chain.moving) != poses.shape[1]:
@@ -104,7 +103,7 @@ class ArmPlayer(ManagedNode):
         pose = self._tour.at_rest(time, self.parameters.hold - self.parameters.measured)
         self._measuring = pose is not None
         if pose is not None:
-            target = np.array([0.0, 0.0, self.robot_file.robot.length])
+            target, _ = rest_tip(self.robot_file.robot)
             name = _PASSES[self._pass]
             self._errors[name][pose].append(float(np.linalg.norm(self._tip - target)))
             self._followed[name].append(self._bridge.state == CableState.ACTIVE)

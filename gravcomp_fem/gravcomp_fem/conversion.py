@@ -24,11 +24,16 @@ def vector_of(message: Point | Vector3) -> np.ndarray:
     return np.array([message.x, message.y, message.z])
 
 
-def deformation_message(shape: Shape, header: Header) -> Deformation:
-    """Return the message of a shape; `header`: stamp of the IMU sample, and base frame."""
+def deformation_message(shape: Shape, header: Header, turn: np.ndarray | None = None) -> Deformation:
+    """Return the message of a shape.
+
+    header: stamp of the IMU sample, and base frame; turn (3,) m/s^2: what a turning base adds to gravity in the shape's load.
+    """
     message = Deformation(header=header, status=int(shape.status), message=shape.message, model=shape.model)
     message.tip = pose_message(shape.tip_position, shape.tip_orientation)
-    message.gravity.x, message.gravity.y, message.gravity.z = map(float, shape.gravity)
+    gravity, added = (shape.gravity, np.zeros(3)) if turn is None else (shape.gravity - turn, turn)
+    for field, vector in ((message.gravity, gravity), (message.turn_acceleration, added)):
+        field.x, field.y, field.z = map(float, vector)
     message.backbone_station = doubles(shape.backbone_station)
     message.backbone_position = doubles(shape.backbone_position)
     message.backbone_orientation = doubles(shape.backbone_orientation)

@@ -17,14 +17,23 @@ from gravcomp_msgs.msg import Deformation
 
 @dataclass(frozen=True)
 class PublishedShape:
-    """A shape with the header of its message: stamp of the IMU sample, and base frame."""
+    """A shape with the header of its message: stamp of the IMU sample, and base frame.
+
+    turn (3,) m/s^2: what a turning base adds to gravity in the shape's load.
+    """
 
     shape: Shape
     header: Header
+    turn: np.ndarray
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """Gravity alone (3,) in m/s^2."""
+        return self.shape.gravity - self.turn
 
     def message(self) -> Deformation:
         """Return the message for those who need one."""
-        return deformation_message(self.shape, self.header)
+        return deformation_message(self.shape, self.header, self.turn)
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Deformed:
     """m cables, p stations of the backbone; in soft_base.
 
     status: one of Deformation's; tip_position (3,) in m; tip_orientation (4,) x y z w; backbone_station (p,) 0..1; cable_tension
-    (m,) in N; gravity (3,) in m/s^2.
+    (m,) in N; gravity (3,) in m/s^2, without what a turning base adds.
     """
 
     header: Header
@@ -68,7 +77,7 @@ def from_shape(published: PublishedShape) -> Deformed:
     shape = published.shape
     response, contact = shape.response, shape.contacts.by_obstacle()
     numbers = {field.name: getattr(response, field.name) for field in dataclasses.fields(response)}
-    numbers |= {"gravity": shape.gravity, "cable_tension": shape.cable_tension}
+    numbers |= {"gravity": published.gravity, "cable_tension": shape.cable_tension}
     numbers |= {"contact_force": contact.force, "contact_position": contact.position, "contact_force_change": contact.change}
     for name, values in numbers.items():
         if not np.isfinite(values).all():
@@ -81,7 +90,7 @@ def from_shape(published: PublishedShape) -> Deformed:
         tip_orientation=shape.tip_orientation,
         backbone_station=shape.backbone_station,
         cable_tension=shape.cable_tension,
-        gravity=shape.gravity,
+        gravity=published.gravity,
         response=response,
         contact=contact,
     )

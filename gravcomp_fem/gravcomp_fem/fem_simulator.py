@@ -195,26 +195,27 @@ class FemSimulator(ManagedNode):
         last, self._last_stamp = self._last_stamp, stamp
         elapsed = None if last is None or stamp <= last else stamp - last
         interval = None if elapsed is None or elapsed > _LONGEST_GAP else elapsed
-        gravity = gravity + self._turned(stamp)
+        turn = self._turned(stamp)
+        load = gravity + turn
         self._move_cables(interval or _LONGEST_GAP)
         self._late_reduction.exchange()
-        carried = self._loads.carried(gravity, stamp)
-        shape = self._shape(gravity, interval if self._dynamic else elapsed, carried)
+        carried = self._loads.carried(load, stamp)
+        shape = self._shape(load, interval if self._dynamic else elapsed, carried)
         if not np.isfinite(shape.tip_position).all():
             self._simulator.reset()  # otherwise the next step would start at an invalid shape
             self._refuse(
-                f"gravity {gravity.tolist()} m/s^2 and the cable displacements give no finite shape; the simulator restarts"
+                f"gravity {load.tolist()} m/s^2 and the cable displacements give no finite shape; the simulator restarts"
             )
             return
         header = Header(stamp=message.header.stamp, frame_id=self.parameters.base_frame)
-        self._deformation.publish(Adapted(PublishedShape(shape, header), PublishedShape.message))
+        self._deformation.publish(Adapted(PublishedShape(shape, header, turn), PublishedShape.message))
         self._loads.observe(header, shape, self._simulator, carried, self._cables)
         if self._tip.get_subscription_count():
             tip = pose_message(shape.tip_position, shape.tip_orientation)
             self._tip.publish(PoseStamped(header=header, pose=tip))
-        self._show(shape, header)
+        self._show(shape, header, gravity)
         level = {ShapeStatus.OK: OK, ShapeStatus.FALLBACK: WARN}.get(shape.status, ERROR)
-        of_loads, values = self._loads.report(gravity, stamp)
+        of_loads, values = self._loads.report(load, stamp)
         self.report(
             max(level, WARN) if of_loads else level,
             "; ".join(part for part in (shape.message or "following gravity", of_loads) if part),
@@ -233,7 +234,7 @@ class FemSimulator(ManagedNode):
             return self._simulator.settle(gravity, self._cables)
         return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried)
 
-    def _show(self, shape: Shape, header: Header) -> None:
+    def _show(self, shape: Shape, header: Header, gravity: np.ndarray) -> None:
         rate = self.parameters.marker_rate
         stamp = seconds(header)
         # A stamp that goes back means that a replay has restarted.
@@ -241,7 +242,7 @@ class FemSimulator(ManagedNode):
             return
         self._last_markers = stamp
         if self._markers.get_subscription_count():
-            self._markers.publish(self._robot_markers.of(shape, header))
+            self._markers.publish(self._robot_markers.of(shape, header, gravity))
         self._transforms.publish(shape, header, self.parameters.tip_frame)
         if self._chain is not None:
             positions = joint_positions(shape.backbone_position, self.robot_file.robot.length)

@@ -16,11 +16,9 @@ from gravcomp_node.managed_node import ERROR, OK, WARN
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from gravcomp.description.hardware import parse_hardware
-from gravcomp.description.transmission import Transmission
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.holdability.background import HoldProcess
-from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, straight_target, warm_up
+from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, rest_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
 from gravcomp_fem.conversion import doubles, point_message, pose_target, seconds, shape_target
 from gravcomp_fem.deformed import Deformed, PublishedShape, from_message, from_shape
@@ -48,13 +46,13 @@ class InverseController(ManagedNode):
 
     def configure(self) -> None:
         """Compile the solver; create publishers and services."""
-        file, transmission = self.robot_file, self._transmission()
+        file, transmission = self.robot_file, self.robot_file.hardware.transmission
         robot = file.robot
         self._problem = InverseProblem(robot, self.parameters.inverse, transmission, file.scene, file.zones)
         # Compile before the first deformation arrives.
         warm_up(robot, self.parameters.inverse, transmission, surrounded=bool(file.scene or file.zones))
         self._tracker = TrackerInput(self, robot, self.parameters.frame)
-        self._target: Target | None = self._straight() if self.parameters.hold_straight else None
+        self._target: Target | None = self._at_rest() if self.parameters.hold_straight else None
         self._enabled = self.parameters.enabled
         self._relaxing = False
         self._command = self.create_publisher(CableCommand, "cable/command", COMMAND)
@@ -112,17 +110,9 @@ class InverseController(ManagedNode):
         if old.enabled != new.enabled:
             self._enabled, self._relaxing = new.enabled, False
 
-    def _transmission(self) -> Transmission | None:
-        """Return how motors move cables; None for a robot file without hardware."""
-        file = self.robot_file
-        section = file.section("hardware")
-        if not section:
-            return None
-        return parse_hardware(section, source=file.source, cables=file.robot.cable_names).transmission
-
-    def _straight(self) -> Target:
-        return straight_target(
-            self.robot_file.robot.length,
+    def _at_rest(self) -> Target:
+        return rest_target(
+            self.robot_file.robot,
             tip_position_weight=self.parameters.tip_position_weight,
             tip_direction_weight=self._direction_weight(),
         )

@@ -7,7 +7,7 @@ affected. No node of the loop depends on it.
 import sys
 from typing import TYPE_CHECKING
 
-from gravcomp_node.managed_node import OK
+from gravcomp_node.managed_node import OK, WARN
 
 from gravcomp.graph.parameters.viewer import ViewerParameters
 from gravcomp.view.page import Page
@@ -45,7 +45,7 @@ class Viewer(ManagedNode):
 
     def activate(self) -> None:
         """Subscribe, and update the page from now on."""
-        self.observer = GraphObserver(self, self.robot_file.robot.length, self._walls)
+        self.observer = GraphObserver(self, self.robot_file.robot, self._walls)
         self._frames = self.create_timer(1.0 / self.parameters.rate, self._frame)
 
     def deactivate(self) -> None:
@@ -68,7 +68,8 @@ class Viewer(ManagedNode):
             self.sender.send(request)
         self.observer.read()
         self._page.show(self.observer.snapshot(recording=self.sender.current_bag()))
-        self.report(OK, f"the page is at {self._page.address}", browsers=self._page.clients)
+        address, misfit = f"the page is at {self._page.address}", self.observer.misfit
+        self.report(WARN if misfit else OK, f"{address}; {misfit}" if misfit else address, browsers=self._page.clients)
 
 
 def main() -> int:

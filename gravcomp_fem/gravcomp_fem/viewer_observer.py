@@ -10,8 +10,9 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 
+from gravcomp.description import Robot
 from gravcomp.inverse import Holdable, TargetError
-from gravcomp.view.backbone import arc_backbone
+from gravcomp.view.backbone import arc_backbone, rest_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
@@ -39,10 +40,15 @@ _CLOCK_TOLERANCE = 10.0  # s
 
 
 class GraphObserver:
-    """Reads the newest message of each topic for a robot of `length` (m) with these walls around it; None: it has none."""
+    """Reads the newest message of each topic for a robot with these walls around it; None: it has none.
 
-    def __init__(self, node: LifecycleNode, length: float, walls: "Scene | None"):
-        self._node, self._length, self._walls = node, length, walls
+    Attribute: misfit, a sentence about messages that do not fit this robot and are not shown; empty where all fit.
+    """
+
+    def __init__(self, node: LifecycleNode, robot: Robot, walls: "Scene | None"):
+        self._node, self._length, self._walls = node, robot.length, walls
+        self._cables = len(robot.cables)
+        self.misfit = ""
         self._streams = {
             "deformation": Polled(node, Deformation, "robot/deformation", _STREAM),
             "command": Polled(node, CableCommand, "cable/command", _STREAM),
@@ -54,7 +60,8 @@ class GraphObserver:
             "target": Polled(node, PoseStamped, "target", COMMAND),
             "shape": Polled(node, ShapeTarget, "target/shape", COMMAND),
         }
-        self._target = TargetView(np.array([0.0, 0.0, length]), arc_backbone(length, 0.0, 0.0))
+        rest = rest_backbone(robot)
+        self._target = TargetView(rest.tip, rest)
         self._counted: tuple[float, int] | None = None
         self._rate = 0.0
 
@@ -73,7 +80,10 @@ class GraphObserver:
         """Return what the page shows; recording: path of the bag that is being recorded."""
         deformation, motors, status, truth = (self._current(name) for name in ("deformation", "motors", "status", "truth"))
         shown: dict = {}
-        if deformation:
+        of_shape = self._misfit("robot/deformation", deformation, "cable_tension", "cable_displacement")
+        of_motors = self._misfit("cable/state", motors, "tension")
+        self.misfit = "; ".join(filter(None, (of_shape, of_motors)))
+        if deformation and not of_shape:
             d = deformation.message
             shown.update(
                 backbone=backbone_of(d), gravity=vector_of(d.gravity),
@@ -89,10 +99,12 @@ class GraphObserver:
             shown.update(load=Touch("estimated", backbone.tip, force), load_deviation=float(np.sqrt(max(variance, 0.0))))
         if motors:
             m = motors.message
-            shown.update(
-                motors_tension=np.array(m.tension), motors_state=_MOTOR_STATES.get(m.state, "?"), motors_message=m.message
-            )
-        if status:
+            shown.update(motors_state=_MOTOR_STATES.get(m.state, "?"), motors_message=m.message)
+            if not of_motors:
+                shown.update(motors_tension=np.array(m.tension))
+        if self.misfit:
+            shown.update(status=self.misfit, status_level="error")
+        elif status:
             shown.update(status=_status_text(status.message), status_level=_LEVELS.get(status.message.code, "warn"))
         return Snapshot(
             time=time.monotonic(),
@@ -104,6 +116,15 @@ class GraphObserver:
             virtual=self._sees_virtual_robot(),
             **shown,
         )
+
+    def _misfit(self, topic: str, received: Received | None, *fields: str) -> str:
+        """Return what is wrong with fields of a message that have a number for each cable; empty where nothing is."""
+        for values in () if received is None else (getattr(received.message, field) for field in fields):
+            if len(values) != self._cables:
+                return f"{topic} has {len(values)} cables and is not shown; this robot has {self._cables}"
+            if not np.isfinite(values).all():
+                return f"{topic} has numbers that are not finite and is not shown"
+        return ""
 
     def _sees_virtual_robot(self) -> bool:
         """Return whether a virtual robot runs.

@@ -19,7 +19,7 @@ def published(shape) -> PublishedShape:
         force=rng.normal(size=(2, 3)), gap=np.zeros(2), sliding=np.zeros(2, bool), by_tension=rng.normal(size=(2, cables)),
         names=("table", "ball"),
     )  # fmt: skip
-    return PublishedShape(dataclasses.replace(shape, contacts=contacts), Header(frame_id="soft_base"))
+    return PublishedShape(dataclasses.replace(shape, contacts=contacts), Header(frame_id="soft_base"), np.array([0.1, 0.2, 0.3]))
 
 
 def test_a_shape_and_its_message_say_the_same(published):
@@ -32,6 +32,12 @@ def test_a_shape_and_its_message_say_the_same(published):
         else:
             assert np.array_equal(mine, other), field.name
     assert here.status == ShapeStatus.FALLBACK and len(here.contact) == 2
+
+
+def test_gravity_and_what_a_turning_base_adds_are_apart(published):
+    message = published.message()
+    gravity, turn = ([v.x, v.y, v.z] for v in (message.gravity, message.turn_acceleration))
+    assert turn == published.turn.tolist() and np.add(gravity, turn) == pytest.approx(published.shape.gravity)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +56,7 @@ def test_the_same_numbers_are_refused_in_both_ways(published, of_response, name,
         shape = dataclasses.replace(shape, response=broken)
     else:
         shape = dataclasses.replace(shape, **{name: change(getattr(shape, name))})
-    published = PublishedShape(shape, published.header)
+    published = PublishedShape(shape, published.header, published.turn)
     for read, given in ((from_shape, published), (from_message, published.message())):
         with pytest.raises(ValueError, match=said):
             read(given)

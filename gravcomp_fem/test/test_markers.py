@@ -35,7 +35,9 @@ def straight(robot: Robot) -> Shape:
 def test_a_rectangular_body_is_shown_as_it_is():
     segment = Segment("a", 0.1, section=Section("rectangle", 10e-3, 6e-3, tip_width=5e-3))
     robot = Robot("r", segments=(segment,), cables=(Cable("c", 0.0, 2e-3, segment="a", follow_taper=True),))
-    body, cable, _ = RobotMarkers(robot).of(straight(robot), Header(frame_id="soft_base")).markers
+    gravity = np.array([0.0, 0.0, -9.81])
+    body, cable, arrow = RobotMarkers(robot).of(straight(robot), Header(frame_id="soft_base"), gravity).markers
+    assert arrow.points[1].z == pytest.approx(-0.04), "0.4 of the robot's length"
     assert body.type == Marker.TRIANGLE_LIST and len(body.points) % 3 == 0
     points = np.array([[p.x, p.y, p.z] for p in body.points])
     assert np.abs(points).max(axis=0) == pytest.approx([5e-3, 3e-3, 0.1], rel=1e-6)

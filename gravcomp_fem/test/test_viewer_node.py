@@ -20,7 +20,7 @@ from gravcomp.view.requests import BridgeService, Compensate, InjectFault, Place
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.motion import base_orientation, rotation_from_quaternion
 from gravcomp.virtual.placed_wall import parse_wall
-from gravcomp_msgs.msg import Deformation, ShapeTarget, VirtualForces, WrenchEstimate
+from gravcomp_msgs.msg import CableState, Deformation, ShapeTarget, VirtualForces, WrenchEstimate
 from gravcomp_node import COMMAND, SENSOR
 
 
@@ -193,6 +193,26 @@ def test_a_load_is_shown_at_the_tip_and_nowhere_without_a_valid_backbone(stand):
     stand.until(lambda: is_shown(lambda shown: shown.load is not None), "no load")
     touch = stand.viewer.observer.snapshot().load
     assert touch.place.tolist() == [0.0, 0.0, 0.1] and touch.force.tolist() == [0.03, 0.0, 0.0]
+
+
+def test_messages_of_another_robot_are_named_and_not_shown(stand):
+    shapes = stand.other.create_publisher(Deformation, "robot/deformation", SENSOR)
+    states = stand.other.create_publisher(CableState, "cable/state", SENSOR)
+    own = len(stand.viewer.robot_file.robot.cables)
+
+    def is_shown(cables, is_done):
+        shapes.publish(Deformation(cable_tension=[0.1] * cables, cable_displacement=[0.0] * cables))
+        states.publish(CableState(state=CableState.ACTIVE, tension=[0.1] * cables))
+        return is_done(stand.viewer.observer.snapshot())
+
+    other = f"robot/deformation has {own + 1} cables and is not shown; this robot has {own}; cable/state has {own + 1} cables"
+    stand.until(lambda: is_shown(own + 1, lambda shown: shown.status.startswith(other)), "the other robot is not named")
+    snapshot = stand.viewer.observer.snapshot()
+    assert snapshot.status_level == "error" and snapshot.tension is None and snapshot.motors_tension is None
+    broken = Deformation(cable_tension=[np.nan] * own, cable_displacement=[0.0] * own)
+    stand.until(lambda: (shapes.publish(broken), "not finite" in stand.viewer.observer.snapshot().status)[1], "NaN is not named")
+    stand.until(lambda: is_shown(own, lambda shown: shown.tension is not None), "the node does not go on")
+    assert stand.viewer.observer.misfit == ""
 
 
 def test_the_button_records_a_bag(stand, tmp_path):

@@ -16,8 +16,7 @@ from std_srvs.srv import Trigger
 from gravcomp.canbus.bus import BusError
 from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.config import ConfigError
-from gravcomp.description.hardware import Hardware, parse_hardware
-from gravcomp.description.pairs import check_pairs
+from gravcomp.description.hardware import Hardware
 from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
@@ -96,8 +95,7 @@ class CanBridge(ManagedNode):
     def _read_hardware(self) -> Hardware:
         """Return the section `hardware` with this node's interface and channels."""
         file, p = self.robot_file, self.parameters
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        check_pairs(hardware, file.robot, file.source)
+        hardware = file.hardware
         hardware = hardware.on(p.interface, p.channel)
         for bus in hardware.all_buses:
             file.require_motors(bus.interface)

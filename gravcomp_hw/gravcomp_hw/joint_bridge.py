@@ -19,9 +19,8 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from gravcomp.config import ConfigError
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.description.joint_motors import Joints
-from gravcomp.description.pairs import check_pairs
 from gravcomp.graph.parameters.joint_bridge import JointBridgeParameters
 from gravcomp.motors.joint_driver import JointDriver, JointDriverOptions
 from gravcomp.motors.state import CableSnapshot
@@ -106,8 +105,7 @@ class JointBridgeNode(ManagedNode):
 
     def _read_hardware(self) -> tuple[Joints, Hardware]:
         file = self.robot_file
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        check_pairs(hardware, file.robot, file.source)
+        hardware = file.hardware
         if hardware.joints is None:
             raise ConfigError(
                 f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)"

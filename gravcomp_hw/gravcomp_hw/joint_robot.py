@@ -15,7 +15,6 @@ from trajectory_msgs.msg import JointTrajectory
 
 from gravcomp.canbus.bus import BusError
 from gravcomp.config import ConfigError
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.graph.parameters.joint_robot import JointRobotParameters
 from gravcomp.virtual.joint_controller import TrajectoryPoint
 from gravcomp.virtual.joint_robot import JointRobot
@@ -35,7 +34,7 @@ class JointRobotNode(ManagedNode):
     def configure(self) -> None:
         """Create publishers and joints. Raises ConfigError when the hardware section is not usable."""
         file, p = self.robot_file, self.parameters
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        hardware = file.hardware
         if hardware.joints is None:
             raise ConfigError(
                 f"{file.source}: key 'hardware.joints' is missing (the controller and the joints that wind the cables)"

@@ -20,7 +20,7 @@ from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.config import ConfigError
-from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.description.hardware import CanInterface
 from gravcomp.evaluation import run_figures as figures
 from gravcomp.evaluation.bus_delay import DelayListener
 from gravcomp.evaluation.released import released_tip_error
@@ -29,13 +29,13 @@ from gravcomp.firmware import requests
 from gravcomp.firmware.client import BoardClient
 from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp.inverse import Holdable
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.whole_file import write_whole
 from gravcomp_msgs.msg import CableCommand, ControllerStatus
 from gravcomp_node import LATCHED, ManagedNode, run
 
 # Messages that the middleware keeps between two reads, which are 0.1 s apart.
 _KEPT = 100
-_STRAIGHT = np.array([0.0, 0.0, 1.0])
 
 
 class Judge(ManagedNode):
@@ -52,7 +52,7 @@ class Judge(ManagedNode):
         self._states: dict[str, str] = {}
         self._phase, self._begin, self._compensated_at = "waiting for the ground truth", None, None
         self._pending = None
-        self._target = self.robot_file.robot.length * _STRAIGHT
+        self._target, self._direction = rest_tip(self.robot_file.robot)
         self._delay = DelayListener(self._can()) if self.parameters.measure_delay else None
 
     def activate(self) -> None:
@@ -160,17 +160,19 @@ class Judge(ManagedNode):
         at_rest = self._begin + 2.0 / 3.0 * p.relax_time
         released_until = self._begin + p.relax_time
         counted_from = (self._compensated_at or end) + p.settle_time
-        residual = figures.residual(self._truth_tip, self._target, _STRAIGHT, counted_from, end)
+        residual = figures.residual(self._truth_tip, self._target, self._direction, counted_from, end)
         _, gravity = self._truth_gravity.between(counted_from, end)
         delays = 1e3 * np.array(self._delay.delays) if self._delay and self._delay.delays else None
         seed = None if p.seed < 0 else p.seed
         error = figures.gravity_error(self._truth_gravity, self._gravity, self._begin, end)
         released = released_tip_error(self.robot_file, gravity, self._target, seed)
-        held, moving = figures.held_and_moving(self._truth_tip, self._truth_gravity, self._target, _STRAIGHT, counted_from, end)
+        held, moving = figures.held_and_moving(
+            self._truth_tip, self._truth_gravity, self._target, self._direction, counted_from, end
+        )
         started = self._compensated_at or end
         sag = figures.sag(self._truth_tip, self._target, at_rest, released_until)
         # Until the counted time begins, the demo's base rests.
-        settled = figures.settled(self._truth_tip, self._target, _STRAIGHT, started, counted_from, sag) if sag else None
+        settled = figures.settled(self._truth_tip, self._target, self._direction, started, counted_from, sag) if sag else None
         return {
             "sag_mm": _mm(sag),
             "residual_lateral_mm": _mm(residual and residual[0]),
@@ -207,10 +209,8 @@ class Judge(ManagedNode):
         write_whole(Path(self.parameters.result_file), json.dumps(state))
 
     def _can(self) -> CanInterface:
-        section = self.robot_file.section("hardware")
-        hardware = parse_hardware(section, source=self.robot_file.source, cables=self.robot_file.robot.cable_names)
         p = self.parameters
-        return hardware.on(p.interface, p.channel).board_bus
+        return self.robot_file.hardware.on(p.interface, p.channel).board_bus
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

@@ -24,6 +24,7 @@ from gravcomp.config import ConfigError
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
+from gravcomp.view.touches import HAND
 from gravcomp.virtual.described import described
 from gravcomp.virtual.faults import Fault
 from gravcomp.virtual.load_cells import VirtualLoadCells
@@ -216,7 +217,7 @@ def _forces(truth: Truth) -> VirtualForces:
     message = VirtualForces(source=list(truth.contact_obstacle), has_wall=truth.wall is not None)
     places, forces = list(truth.contact_place), list(truth.contact_force)
     if truth.hand_force.any():
-        message.source.append("hand")
+        message.source.append(HAND)
         places.append(truth.tip_position)
         forces.append(truth.hand_force)
     message.position = [Point(x=x, y=y, z=z) for x, y, z in map(np.ndarray.tolist, places)]

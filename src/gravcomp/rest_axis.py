@@ -29,6 +29,17 @@ class RestAxis:
         """Whether any piece turns."""
         return any(arc.angle for arc in self.arcs)
 
+    def bent_further(self, angle: float, plane: float) -> "RestAxis":
+        """Return the axis whose curvature is larger by that of an arc of its length: `angle` (rad) towards `plane` (rad)."""
+        length = sum(arc.length for arc in self.arcs)
+        bent = []
+        for arc in self.arcs:
+            own, more = arc.angle / arc.length, angle / length
+            x = own * np.cos(arc.plane) + more * np.cos(plane)
+            y = own * np.sin(arc.plane) + more * np.sin(plane)
+            bent.append(Arc(arc.length, float(np.hypot(x, y)) * arc.length, float(np.arctan2(y, x))))
+        return RestAxis(tuple(bent))
+
     def points(self, straight: np.ndarray) -> np.ndarray:
         """Return where the points (n, 3) of the straightened robot lie at rest (n, 3)."""
         straight = np.asarray(straight, dtype=float).reshape(-1, 3)

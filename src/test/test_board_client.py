@@ -13,7 +13,7 @@ from gravcomp.canbus.codec import decode
 from gravcomp.commands.__main__ import main
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import CanInterface, parse_hardware
+from gravcomp.description.hardware import CanInterface
 from gravcomp.doctor import board as bench_test
 from gravcomp.doctor import board_motor
 from gravcomp.doctor.board_page import write_page
@@ -57,7 +57,7 @@ def live(request):
     hardware, motors, pace = None, None, 1.0
     if getattr(request, "param", "") == "motors":
         file = load_robot_file("article")
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+        hardware = file.hardware
     board = EmulatedBoard(Board(), np.random.default_rng(1), hardware)
     if hardware is not None:
         motors, pace = FreeMotors(board, [motor.can_id for motor in hardware.motors]), SLOW
@@ -131,7 +131,7 @@ def test_a_board_that_has_run_alone_waits_for_its_host_again(monkeypatch):
 def test_the_parameters_of_a_robot_are_written_and_stored(live, monkeypatch):
     channel, board = live
     file = load_robot_file("article")
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     with BoardClient(CanInterface("virtual", channel)) as client:
         client.configure(settings_of(hardware, between=True))
         board.firmware.restart()

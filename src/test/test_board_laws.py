@@ -58,12 +58,12 @@ def test_the_stiffness_of_a_law_is_that_of_the_shape_once_each_point_has_had_its
     settings[-10] = 2.0  # points in a call
     tables = {"law_change": change.ctypes.data, "law": constants.ctypes.data, "settings": settings.ctypes.data}
     model, state = Model(modes=modes, law_points=count, **tables), (ctypes.c_uint64 * 8000)()
+    q = np.zeros(modes, np.float32)
     for k in range(403):
-        q = rng.normal(0.0, 0.03, modes).astype(np.float32) if k < 401 else q
+        if k < 401:
+            q = rng.normal(0.0, 0.03, modes).astype(np.float32)
         force, matrix = np.zeros(modes, np.float32), np.zeros(10, np.float32)
-        load().gc_law_deviation_at(
-            ctypes.byref(model), ctypes.c_void_p(q.ctypes.data), state, ctypes.c_void_p(force.ctypes.data)
-        )
+        load().gc_law_deviation_at(ctypes.byref(model), ctypes.c_void_p(q.ctypes.data), state, ctypes.c_void_p(force.ctypes.data))
     add = load().gc_law_deviation_add_stiffness
     add.restype, add.argtypes = None, (*[ctypes.c_void_p] * 3, ctypes.c_float)
     add(ctypes.addressof(model), ctypes.addressof(state), matrix.ctypes.data, 1.0)

@@ -11,10 +11,12 @@ from gravcomp.cables.disks import disk_heights
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Cable, Cap, Disks, Elements, Lumen, Material, RestShape, Robot, Section, Segment, Station
 from gravcomp.experiments.measured import default_folder
+from gravcomp.full_model import mesh_error, mesh_loads
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.mesh_choice import chosen_mesh
 from gravcomp.full_model.mesh_error import error_of_mesh
 from gravcomp.full_model.modes import natural_frequencies
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.mesh import Mesh, MeshError, tube_mesh
 from gravcomp.mesh.elements import shape_gradients, stiffness_quadrature
@@ -355,6 +357,27 @@ def test_the_chosen_mesh_reaches_its_accuracy(monkeypatch, tmp_path):
     assert choice.error < 1e-3
     assert error_of_mesh(robot) < 1.2e-3  # also the robot that is twice as stiff as the one for which the mesh was chosen
     assert len(list(tmp_path.rglob("*.json"))) == 1 and chosen_mesh(robot) == choice
+
+
+def test_the_error_of_a_mesh_ends_with_an_answer_or_a_reason(monkeypatch):
+    """However large the finer mesh is, and however far a load is from an equilibrium."""
+    robot = Robot("tube", segments=(Segment("a", 0.05, 8e-3, 3e-3),), elements=Elements(around=6, along=5))
+    monkeypatch.setattr(mesh_error, "_MOST_WORK", 1e6)
+    with pytest.raises(MeshError, match=r"unknowns in .* levels: .* the error is not measured"):
+        error_of_mesh(robot)
+
+    class Creeping(StaticSolver):
+        """Finds an equilibrium only near the last one, each time a little less near."""
+
+        tried = 0
+
+        def track(self, gravity, *args, **kwargs):
+            self.tried += 1
+            return dataclasses.replace(self.state, converged=self.tried % 2 == 0)
+
+    solver = Creeping(RobotModel(robot))
+    assert not mesh_loads._follow(solver, mesh_loads.MeshLoad("heavy", np.array([1.0, 0.0, 0.0]), np.zeros(0)))
+    assert solver.tried <= 40
 
 
 def test_a_shape_is_carried_to_another_mesh():

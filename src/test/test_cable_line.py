@@ -16,7 +16,7 @@ from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, CableLine, Elements, Material, Payload, Robot, Segment, load_robot_file, shipped_robots
 from gravcomp.description.cable_line import CABLE_MATERIALS
-from gravcomp.description.hardware import Hardware, Motor, parse_hardware
+from gravcomp.description.hardware import Hardware, Motor
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.reduction.reduced_cables import ReducedCables, stretch, tendons_at
 from gravcomp.simulation import RobotModel, Simulator
@@ -200,7 +200,7 @@ def test_a_cables_own_pretension_is_kept():
 
 def true_article(robot, **tendons):
     file = load_robot_file("article")
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     return draw(VirtualRobotParameters(tendons=dataclasses.replace(Tendons(), **tendons)), robot, hardware, seed=1)
 
 
@@ -226,7 +226,7 @@ def test_a_line_that_nobody_describes_is_stiff_in_the_virtual_robot():
 def test_the_loop_assumes_the_most_probable_line_where_none_is_described():
     """Lines of 20 seeds scatter around the one in the model. What is described stays, and so does the described robot."""
     robot = article()
-    hardware = parse_hardware(load_robot_file("article").section("hardware"), source="article")
+    hardware = load_robot_file("article").hardware
     drawn = [draw(VirtualRobotParameters(), robot, hardware, seed).cables for seed in range(20)]
     inside = np.array([robot.line_length(cable) for cable in robot.cables])
     true = np.array([(lines.free_length + inside) / lines.axial_stiffness for lines in drawn])
@@ -243,7 +243,7 @@ def test_the_loop_assumes_the_most_probable_line_where_none_is_described():
 def test_stiff_lines_do_not_slow_the_virtual_robot_down():
     """Motors pull the robot up with lines of 5 and of 200 kN; the tips move alike, and every step is solved."""
     file = load_robot_file("article")
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     tips = []
     for stiffness in (5e3, 2e5):
         parameters = VirtualRobotParameters(tendons=dataclasses.replace(Tendons(), axial_stiffness=stiffness, slack=2e-3))

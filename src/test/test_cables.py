@@ -5,9 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gravcomp.cables.routing import route_cables
 from gravcomp.cables.slack import taut_tensions
 from gravcomp.description import Cable, Elements, load_robot_file
-from gravcomp.mesh import MeshError
+from gravcomp.mesh import MeshError, body_mesh
+from gravcomp.mesh.sections import is_one_region
 from gravcomp.simulation import RobotModel
 
 
@@ -67,6 +69,22 @@ def test_a_cable_outside_the_body_is_refused():
     outside = Cable("far", angle=0.0, radius=4.2e-3, end=0.08)
     with pytest.raises(MeshError, match="cable 'far' leaves the body at"):
         RobotModel(dataclasses.replace(robot, cables=(outside,)))
+
+
+def test_a_cable_in_a_body_from_a_file_moves_with_its_sections_where_they_are_one_region():
+    robot = load_robot_file("mesh_body").robot
+    mesh = body_mesh(robot)
+    stretch = np.array([[1.1, 0.1, 0.0], [-0.2, 0.9, 0.3], [0.0, 0.1, 1.2]])
+    middle = mesh.nodes[mesh.elements].mean(axis=1)
+    forked = dataclasses.replace(mesh, elements=mesh.elements[(np.abs(middle[:, 0]) > 1e-3) | (middle[:, 2] < 0.05)])
+    assert is_one_region(forked, 0.03) and not is_one_region(forked, 0.065)
+    for body, spread in ((mesh, 20), (forked, 1)):
+        points = route_cables(robot, body)[1].points
+        place = np.einsum("pc,pci->pi", points.weights, body.nodes[points.nodes])
+        assert place[0] == pytest.approx([-1.1e-3, 1.9053e-3, 0.0], abs=1e-7)
+        assert np.einsum("pc,pci->pi", points.weights, (body.nodes @ stretch)[points.nodes]) == pytest.approx(place @ stretch)
+        nodes = (points.weights != 0.0).sum(axis=1)
+        assert nodes[:10].min() > 20 and (nodes[-3:].max() > 20) == (spread > 1)
 
 
 def test_explicit_via_points_are_followed():

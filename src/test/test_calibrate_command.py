@@ -13,7 +13,6 @@ from gravcomp.calibration.standstill import Standstill
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.trials.free_fall import free_fall
 from gravcomp.trials.known_robot import known_setup, known_windows
 
@@ -116,7 +115,7 @@ def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured, setup):
     write_csv(measured, here / "tips.csv", load_robot_file("article").robot.cable_names)
     result = calibrate(capsys, "tips.csv")
     check(result, setup)
-    motors = parse_hardware(load_robot_file("mine.yaml").section("hardware"), source="mine.yaml").motors
+    motors = load_robot_file("mine.yaml").hardware.motors
     offsets = {f"offset of {m.cable}": 1e3 * m.offset for m in motors}
     found = {p["name"]: p["value"] for p in result["data"]["parameters"] if p["name"] in offsets}
     assert len(found) == 6 and found == pytest.approx({name: offsets[name] for name in found}, abs=1e-4)

@@ -13,7 +13,6 @@ from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.mesh.tube import with_coarse_elements
 from gravcomp.simulation import Simulator
 from gravcomp.trials.known_robot import known_setup, known_windows, offsets
@@ -148,7 +147,7 @@ def test_bad_csv_is_refused_with_what_is_wrong(tmp_path, robot, change, message)
 
 def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
     source = load_robot_file("article")
-    hardware = parse_hardware(source.section("hardware"), source=source.source)
+    hardware = source.hardware
     parameters = StaticParameters(
         np.array([0.7512e6, 0.81e6]), np.array([0.1e-3, 0, 0, 0, 0, -0.2e-3]), np.array([0.2e-3] * 3 + [0.0] * 3)
     )
@@ -156,7 +155,7 @@ def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
     fitted = calibrated_robot(robot, parameters).with_material(damping_time=0.031)
     write_calibrated(source.source, path, robot, fitted, calibrated_hardware(hardware, parameters))
     mine = load_robot_file(path)
-    motors = parse_hardware(mine.section("hardware"), source=mine.source).motors
+    motors = mine.hardware.motors
     assert [m.offset for m in motors] == pytest.approx(parameters.offset, abs=1e-9)
     assert [s.material.youngs_modulus for s in mine.robot.segments] == pytest.approx([0.7512e6, 0.81e6])
     assert mine.robot.segments[0].material.damping_time == pytest.approx(0.031)

@@ -117,6 +117,16 @@ def test_friction_holds_a_robot_that_is_pushed_along_a_wall(model):
     assert tips[1] < 2e-2 * tips[0]  # the robot rolls a little where it sticks
 
 
+def test_a_sagging_robot_is_found_whose_tip_rubs_on_a_plane(model):
+    """At the end of the robot the place of contact stays where it is, however steeply the gap falls towards it."""
+    planes = {"normal": [1, 0, 0], "point_mm": [-6.5, 0, 0]}
+    for friction in (0.1, 1.0):
+        shape = in_scene(model, planes=[planes | {"friction": friction}]).solve(G)
+        assert shape.is_equilibrium
+        rubbing = np.linalg.norm(shape.contacts.force[:, 1:], axis=1)
+        assert 0.0 < rubbing.max() <= (friction + 1e-3) * shape.contacts.normal_force.max()
+
+
 def test_a_robot_follows_a_curved_tube_that_the_straight_robot_would_cross(model):
     tube = {"points_mm": [[0, 0, -20], [0, 0, 20], [0, 8, 60], [0, 25, 110], [0, 35, 130]], "radius_mm": [6]}
     simulator = in_scene(model, tubes=[tube])

@@ -8,7 +8,6 @@ import yaml
 
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
-from gravcomp.description.hardware import parse_hardware
 
 
 @pytest.fixture
@@ -109,8 +108,15 @@ def test_unknown_sections_and_missing_files_are_refused(document, tmp_path):
 
 def test_a_renamed_key_is_refused_and_the_error_names_the_new_one(document, tmp_path):
     document["hardware"]["drive"]["displacement_minimum_mm"] = -20.0
-    section = load(document, tmp_path).section("hardware")
+    file = load(document, tmp_path)
     with pytest.raises(ConfigError) as error:
-        parse_hardware(section, source="robot.yaml")
+        _ = file.hardware
     for word in ["robot.yaml", "hardware.drive.displacement_minimum_mm", "renamed", "'displacement_min_mm'"]:
         assert word in str(error.value)
+
+
+def test_the_hardware_of_a_file_fits_its_robot(document, tmp_path):
+    document["hardware"]["motors"][0]["cable"] = "x"
+    file = load(document, tmp_path)
+    with pytest.raises(ConfigError, match=r"hardware.motors are for the cables x, .*; needed, in this order: s1c1, "):
+        _ = file.hardware

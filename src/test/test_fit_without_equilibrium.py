@@ -1,6 +1,7 @@
 """Fits whose trial points have no equilibrium: they go on with a shorter step; only a start without one is an error."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from gravcomp.calibration.pose_fit import MODULUS, fit_poses
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import Poses
 from gravcomp.calibration.problem import Problem
+from gravcomp.calibration.report import calibration_result
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
 from gravcomp.description import Cable, Elements, Material, Robot, Segment, load_robot_file
@@ -137,12 +139,17 @@ def swing(robot: Robot, course: Measured, steps: object = None) -> tuple[np.ndar
     return np.column_stack([tip, np.zeros_like(tip), np.full_like(tip, z)]), np.tile([0.0, 0.0, 1.0], (len(tip), 1))
 
 
-def test_a_motion_that_cannot_be_computed_is_a_refused_step(monkeypatch):
+@pytest.fixture
+def fall() -> Measured:
+    """The swing of a softer bar, as it would be measured."""
     time = np.linspace(0.0, 0.3, 61)
     gravity, displacement = np.tile(GRAVITY, (61, 1)), np.full((61, 1), np.nan)
     measured = Measured("fall", np.zeros(61, int), time, gravity, displacement, np.zeros((61, 3)), None)
-    tip, _ = swing(BAR.with_material(youngs_modulus=0.4e6), measured)
-    measured, refused = dataclasses.replace(measured, tip_position=tip), []
+    return dataclasses.replace(measured, tip_position=swing(BAR.with_material(youngs_modulus=0.4e6), measured)[0])
+
+
+def test_a_motion_that_cannot_be_computed_is_a_refused_step(monkeypatch, fall):
+    refused = []
 
     def predicted(robot, *others):
         if not 0.39e6 < robot.materials[0].youngs_modulus < 0.501e6:
@@ -151,10 +158,31 @@ def test_a_motion_that_cannot_be_computed_is_a_refused_step(monkeypatch):
         return swing(robot, *others)
 
     monkeypatch.setattr(motion, "predict_course", predicted)
-    fit = motion.fit_motion(BAR, [measured], creep=False)
+    fit = motion.fit_motion(BAR, [fall], creep=False)
     assert refused and fit.youngs_modulus == pytest.approx(0.4e6, rel=0.01)
     with pytest.raises(RuntimeError, match="fall: the motion of the robot as it is described cannot be computed"):
-        motion.fit_motion(BAR.with_material(youngs_modulus=1e6), [measured], creep=False)
+        motion.fit_motion(BAR.with_material(youngs_modulus=1e6), [fall], creep=False)
+
+
+def test_the_error_of_a_described_robot_whose_motion_cannot_be_computed_is_unknown(monkeypatch, fall):
+    """The report says so in words, without a number."""
+
+    def predicted(robot, course, *others):
+        if robot == BAR and len(course.time) == len(fall.time):
+            raise RuntimeError(LOST)
+        return swing(robot, course, *others)
+
+    monkeypatch.setattr(motion, "predict_course", predicted)
+    fit = motion.fit_motion(BAR, [fall], creep=False)
+    assert fit.rms_before is None and fit.rms_after < 1e-4
+    tips = SimpleNamespace(tip=np.zeros((1, 6)))
+    statics = SimpleNamespace(
+        estimates=[], fitted=(), warnings=[], rms_before=1e-3, rms_after=1e-4, evaluations=1, before=tips, after=tips,
+        windows=StillWindows(GRAVITY[None], np.full((1, 1), np.nan), np.zeros((1, 3))),
+    )  # fmt: skip
+    result = calibration_result("fall", "fitted.yaml", statics, fit, [fall], 0.01)
+    assert all(np.isfinite(figure.value) for figure in result.figures)
+    assert any("the motion of the robot as it is described cannot be computed" in note for note in result.notes)
 
 
 def test_poses_are_fitted_from_the_described_robot_where_another_start_has_no_equilibrium(monkeypatch):

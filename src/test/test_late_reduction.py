@@ -1,5 +1,6 @@
 """A simulator that starts on the full model changes over to the reduced model when that is built."""
 
+import dataclasses
 import os
 import re
 import shutil
@@ -103,6 +104,19 @@ def test_an_interrupted_training_goes_on_and_finds_the_same_samples(robot, tmp_p
     assert len(again) == len(whole)
     for one, other in zip(whole, again):
         np.testing.assert_array_equal(one.unknowns, other.unknowns)
+
+
+def test_the_training_ends_once_new_paths_are_represented(robot):
+    model, options = RobotModel(robot), TrainingOptions(paths=14, least=11, steps=1)
+    asked = []
+
+    def enough(earlier: list, new: list) -> bool:
+        asked.append((len(earlier), len(new)))
+        return True
+
+    found = samples(model, options, enough=enough)
+    assert asked == [(1, 10)] and len(found) == 11
+    assert len(samples(model, dataclasses.replace(options, paths=12), enough=lambda earlier, new: False)) == 12
 
 
 def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):

@@ -80,7 +80,8 @@ def test_stiffness_of_damping_is_the_derivative_of_its_force():
     elements, pattern = elements_of("hex20")
     n_free = pattern.n // 3
     u, direction = some_displacements(elements.mesh), some_direction(elements, n_free)
-    viscous = ViscousStrain(np.full(len(elements.weights), 3.0), 2.0 * elements.strains(0.9 * u))
+    count = len(elements.weights)
+    viscous = ViscousStrain(np.full(count, 3.0), 2.0 * elements.strains(0.9 * u), np.ones(count, bool))
     matrix = BlockMatrix(pattern)
     elements.assemble(u, matrix, viscous)
     change = directional(lambda at: elements.internal_force(at, viscous), u, direction)[:n_free].ravel()

@@ -1,10 +1,14 @@
 """`gravcomp model`: what its subcommands print and write."""
 
 import json
+import math
 
 import pytest
 
 from gravcomp.commands.__main__ import main
+from gravcomp.commands.model.reach import reach
+from gravcomp.description import Cable, Elements, Limits, Material, RestShape, Robot, Segment
+from gravcomp.simulation import Simulator
 
 
 def test_solve_prints_the_shape(capsys):
@@ -46,3 +50,21 @@ def test_info_tells_masses_modes_and_reach(capsys):
 def test_mistakes_are_named(arguments, words, capsys):
     assert main(["model", *arguments]) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("angle", "ended_by"), [(0.0, "half turn"), (180.0, "tension limit")])
+def test_the_reach_of_a_robot_that_is_bent_at_rest_counts_from_its_rest(angle, ended_by):
+    """The cable outside its bend straightens it first: its tip turns from the rest, although it comes nearer to the axis."""
+    rest = RestShape(bend_angle=math.radians(70.0))
+    segment = Segment("s", 0.06, 7e-3, 3e-3, material=Material("neo_hookean", 2e6, 0.45), rest=rest)
+    robot = Robot(
+        "hook",
+        segments=(segment,),
+        cables=(Cable("c", math.radians(angle), 2.5e-3, segment="s"),),
+        elements=Elements(around=4, along=6),
+        limits=Limits(tension_max=8.0 if angle == 0.0 else 1.5),
+    )
+    (entry,) = reach(Simulator(robot, reduced=False))
+    assert entry["ended_by"] == ended_by
+    # E I is 2.3e-4 N m^2: a tension of 1.5 N bends it by 1 rad or so.
+    assert entry["tilt_deg"] > (130.0 if angle == 0.0 else 40.0) and entry["lateral_mm"] > (5.0 if angle == 0.0 else 25.0)

@@ -1,9 +1,12 @@
 """The ratio of paired delays is found under a load that changes, and is refused where the load moves it."""
 
+import can
 import numpy as np
 import pytest
 
 from gravcomp.bench import composition
+from gravcomp.description.hardware import CanInterface
+from gravcomp.evaluation import bus_delay
 
 
 def test_the_median_of_the_pairs_is_known_to_its_spread():
@@ -43,3 +46,17 @@ def test_no_answer_where_the_load_moves_the_delay_more_than_the_nodes(monkeypatc
 def test_nothing_heard_is_an_error(monkeypatch):
     with pytest.raises(TimeoutError, match="no command was traced"):
         _measured(monkeypatch, {False: [[]], True: [[]]}, 1)
+
+
+def test_the_bus_is_closed_when_listening_to_it_fails(monkeypatch):
+    closed = []
+
+    def lost(*_):
+        raise can.CanError("unplugged")
+
+    monkeypatch.setattr(bus_delay.CanLink, "open", lambda _: None)
+    monkeypatch.setattr(bus_delay.CanLink, "receive", lost)
+    monkeypatch.setattr(bus_delay.CanLink, "close", lambda _: closed.append(True))
+    with pytest.raises(can.CanError, match="unplugged"):
+        bus_delay.delays_during(CanInterface(), 1.0)
+    assert closed

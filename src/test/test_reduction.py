@@ -242,9 +242,10 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
     _, _, basis, _ = modes
     coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
     sections = section_changes(model, basis)[:, 0] / model.length
-    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance) for tolerance in (1e-3, 3e-5))
+    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance, 999) for tolerance in (1e-3, 3e-5))
     assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
     assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
+    assert len(choose(model.elements, basis, coordinates, sections, 3e-5, len(rough.weight)).weight) <= len(rough.weight)
     few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
     for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
         assert deviation_at(few, q).force == pytest.approx(deviation_at(every, q).force, abs=0.05 * largest)

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Elements, Material, Robot, Segment, Spring
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.simulation import Simulator
+from gravcomp.view.skin import half_width
+from gravcomp.view.wall import lumen_skin, wall_skins
 
 
 def test_a_spring_bends_and_gets_shorter_as_the_formulas_of_springs_say():
@@ -25,6 +28,17 @@ def test_a_spring_bends_and_gets_shorter_as_the_formulas_of_springs_say():
     turns = length / pitch
     mass = 7850 * np.pi / 4 * wire**2 * turns * np.hypot(2 * np.pi * radius, pitch)
     assert Simulator(robot, reduced=False).model.mass == pytest.approx(mass, rel=1e-3)
+
+
+def test_a_spring_is_touched_and_seen_where_its_coils_are_not_where_the_tube_would_be():
+    robot = Robot("spring", segments=(Segment("s", 0.15, 8e-3, spring=Spring(1e-3, 2.5e-3)),))
+    assert robot.pieces[0].outer[0].half_width > 6e-3  # the tube
+    surface = contact_surface(robot)
+    assert surface.radius == pytest.approx(np.full(len(surface.radius), 4e-3))
+    (wall,) = wall_skins(robot)
+    lumen = lumen_skin(robot)
+    assert np.hypot(*wall.offset.T).max() == pytest.approx(4e-3) and half_width(robot) == pytest.approx(4e-3)
+    assert np.hypot(*lumen.offset.T) == pytest.approx(np.full(len(lumen.offset), 3e-3))
 
 
 @pytest.mark.parametrize(

@@ -274,7 +274,7 @@ def test_the_board_holds_the_virtual_robot_by_itself(parameters, built, found, m
     setup = dataclasses.replace(Setup.of(load_robot_file("article")), robot=parameters.robot)
     loop = ClosedLoop(setup, StaticMotion(base_orientation(np.radians(135.0))), board="standalone")
     sagging = np.linalg.norm(loop.truth.tip_position[:2])
-    loop.hold(parameters.straight)
+    loop.hold(parameters.at_rest)
     loop.run(1.5)
     assert loop.virtual.firmware.word("motors") == 0b111111 and loop.virtual.firmware.loop().code == 1
     assert np.linalg.norm(loop.truth.tip_position[:2]) < 0.06 * sagging

@@ -177,7 +177,7 @@ def test_errors_are_distances_to_the_target(robot):
 def test_texts_from_the_graph_are_escaped(robot):
     snapshot = Snapshot(time=0.0, status="<script>alert(1)</script>", tension=np.zeros(6), displacement=np.zeros(6))
     assert "<script>" not in status_html(snapshot)
-    assert "<b>" not in cables_html(snapshot, ("<b>",) * 6)
+    assert "<b>" not in cables_html(snapshot, ("<b>",) * 6, 1.0)
 
 
 def test_the_motors_state_is_shown_next_to_the_controllers():
@@ -194,9 +194,9 @@ def test_the_motors_state_is_shown_next_to_the_controllers():
 
 
 def test_colours_of_tension_run_from_dark_to_bright():
-    brightness = [sum(tension_colour(t)) for t in np.linspace(0.0, 1.0, 11)]
+    brightness = [sum(tension_colour(t, 1.0)) for t in np.linspace(0.0, 1.0, 11)]
     assert all(a < b for a, b in zip(brightness, brightness[1:]))
-    assert tension_colour(-1.0) == tension_colour(0.0) and tension_colour(9.0) == tension_colour(1.0)
+    assert tension_colour(-1.0, 1.0) == tension_colour(0.0, 1.0) and tension_colour(9.0, 1.0) == tension_colour(1.0, 1.0)
 
 
 def test_the_next_free_port_is_taken():

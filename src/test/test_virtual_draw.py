@@ -7,7 +7,6 @@ import yaml
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.virtual.described import described
 
 ROBOT = {
@@ -104,7 +103,7 @@ def test_cables_at_the_wall_are_drawn_inside_the_body(stranger):
 
 def test_a_robot_without_motors_gets_one_for_each_cable_that_reaches_its_limits(stranger):
     file = stranger()
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     drive = hardware.drive
     assert drive.tension_limit == 40.0
     assert drive.current_limit * drive.tension_per_ampere > 40.0
@@ -116,7 +115,7 @@ def test_a_robot_without_motors_gets_one_for_each_cable_that_reaches_its_limits(
 def test_nine_cables_without_motors_get_two_buses(stranger):
     cables = [{"name": f"c{i}", "angle_deg": 40 * i, "radius_mm": 4.5, "segment": "stiff"} for i in range(9)]
     file = stranger(robot=ROBOT | {"cables": cables})
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     assert len(hardware.buses) == 2
     assert len(described(file).draw().motors.backlash) == 9
 

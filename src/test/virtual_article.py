@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.config import from_mapping
 from gravcomp.description import Robot
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.description.robot_file import load_robot_file
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import Tendons, VirtualRobotParameters
@@ -18,7 +18,7 @@ GRAVITY = 9.81
 
 def article() -> tuple[Robot, Hardware]:
     file = load_robot_file("article")
-    return file.robot, parse_hardware(file.section("hardware"), source=file.source)
+    return file.robot, file.hardware
 
 
 def reference_robot() -> Robot:

@@ -1,9 +1,19 @@
-"""URDF from the xacro files that the ROS packages install."""
+"""URDF from files, and from the xacro files that the ROS packages install."""
 
 import os
 from pathlib import Path
 
 from gravcomp.config import ConfigError
+
+
+def read_urdf(path: str | Path) -> str:
+    """Return the text of a URDF file. Raises ConfigError when it cannot be read."""
+    try:
+        return Path(path).expanduser().read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}; the path of a URDF file is needed") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not a UTF-8 text file; the path of a URDF file is needed") from error
 
 
 def shipped_xacro(name: str) -> Path:

@@ -11,7 +11,7 @@ from gravcomp.canbus import c610
 from gravcomp.canbus.codec import encode
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.firmware.campaign import attack
 from gravcomp.firmware.emulator.image_board import ImageBoard
 from gravcomp.firmware.fuzzing import fuzz
@@ -36,7 +36,7 @@ def run(progress: Callable[[str], None], *, frames: int = 200_000, seed: int = 1
     one no loop.
     """
     file = load_robot_file("article")
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     build_s, identical = _built_again(progress)
     image = build_image()
     progress("hostile frames at the C code under sanitizers")

@@ -154,7 +154,7 @@ def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -
 
 
 def _of_a_base(path: np.ndarray) -> np.ndarray:
-    """Return a path of gravity (n, 3) without jumps of the rate, whose forces would be those of an impact: its mean over 0.3 s."""
+    """Return the mean of a path of gravity (n, 3) over 0.3 s: jumps of the rate would have the forces of an impact."""
     whole = np.concatenate([[path[0]] * _SMOOTHED, path, [path[-1]] * _SMOOTHED])
     mean = np.array([np.convolve(column, np.full(2 * _SMOOTHED + 1, 1.0), mode="valid") for column in whole.T]).T
     return np.linalg.norm(path[0]) * _unit(mean)

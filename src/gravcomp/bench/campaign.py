@@ -8,7 +8,6 @@ from collections.abc import Callable
 from gravcomp.bench.current_monitor import CurrentMonitor
 from gravcomp.bench.probe import Probe
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.launcher.virtual_graph import NODES, RunningGraph
 from gravcomp.motors.state import State
 
@@ -23,8 +22,7 @@ class Campaign:
     """
 
     def __init__(self, graph: RunningGraph, seed: int) -> None:
-        file = load_robot_file("article")
-        self.limit = parse_hardware(file.section("hardware"), source=file.source).drive.current_limit
+        self.limit = load_robot_file("article").hardware.drive.current_limit
         self.graph, self.probe, self.monitor = graph, Probe(graph), CurrentMonitor(graph, self.limit)
         self.random = random.Random(seed)
         self.crashes: list[str] = []

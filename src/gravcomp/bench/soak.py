@@ -12,7 +12,6 @@ from collections.abc import Callable
 from gravcomp.bench.current_monitor import CurrentMonitor
 from gravcomp.bench.probe import Probe
 from gravcomp.description import load_robot_file
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.launcher.virtual_graph import NODES, START_TIMEOUT, RunningGraph
 
 _WARM_UP = 60.0  # s, at most a fifth of the run
@@ -22,8 +21,7 @@ _SETTLE = 1.0  # s for the last commands to arrive
 
 def run(progress: Callable[[str], None], *, minutes: float = 30.0) -> dict:
     """Return `lost_commands`, `memory_growth_mb` by process, `worst_growth_mb`, `limit_violations` and further figures."""
-    file = load_robot_file("article")
-    limit = parse_hardware(file.section("hardware"), source=file.source).drive.current_limit
+    limit = load_robot_file("article").hardware.drive.current_limit
     parameters: dict[str, dict] = {"virtual_robot": {"motion": "tremor"}, "inverse_controller": {"enabled": False}}
     with RunningGraph(parameters) as graph:
         progress("starting the graph")

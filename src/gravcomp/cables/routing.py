@@ -2,8 +2,8 @@
 
 A force on one point or along one line of a solid sinks into it without limit as the mesh is refined. So a cable of a segment
 moves with whole sections, as in the theory of rods: it lies at p + x f_1 + y f_2 with the functionals of `mesh.sections`, which
-spread its force over the section as a rod's stress is. A cable given by via points, and one in a body from a file, is attached
-to the points of the body.
+spread its force over the section as a rod's stress is. The same holds in a body from a file, wherever its cross-section is one
+region. Where it is not, and where via points are given for segments, a cable is attached to the points of the body.
 """
 
 import dataclasses
@@ -14,7 +14,7 @@ from gravcomp.cables.disks import disk_heights, holes
 from gravcomp.description import Cable, Robot
 from gravcomp.mesh.embedding import Embedding, embed
 from gravcomp.mesh.mesh import Mesh, MeshError
-from gravcomp.mesh.sections import section_functionals
+from gravcomp.mesh.sections import is_one_region, section_functionals
 
 # How far outside its element a point may lie in a mesh from a file, in local coordinates: facets cut a little off a round
 # body. For segments the description has been checked: the cable runs inside the walls that the facets approximate.
@@ -44,36 +44,55 @@ def route_cables(robot: Robot, mesh: Mesh) -> list[Route]:
     of the mesh between its start and its end. Raises MeshError for a cable that leaves the body.
     """
     guided = disk_heights(robot)
-    sections: dict[float, np.ndarray] = {}
+    sections: dict[float, np.ndarray | None] = {}
     return [_route(robot, mesh, cable, guided, sections) for cable in robot.cables]
 
 
-def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: dict[float, np.ndarray]) -> Route:
-    """The route of one cable; guided (d,): the heights of the disks; known: the functionals (3, n) by height, added to."""
+def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: dict[float, np.ndarray | None]) -> Route:
+    """The route of one cable; guided (d,): the heights of the disks; known: what `_add_sections` found for other cables."""
     points, at_disk = _via_points(robot, cable, mesh.stations, guided)
     smooth = _smooth(points[:, 2], mesh.stations, at_disk, 1e-6 * robot.length)
     at_section = at_disk
-    if cable.via_points is not None or robot.body is not None:
+    from_file = robot.body is not None
+    if cable.via_points is not None or from_file:
         smooth[:] = False
-    else:
+    if from_file or cable.via_points is None:
         at_section = np.ones(len(points), dtype=bool)
-    parts = []
-    if at_section.any():
-        heights = points[at_section, 2].tolist()
-        missing = [height for height in heights if height not in known]
-        known.update(zip(missing, section_functionals(mesh, np.array(missing)).reshape(-1, 3, len(mesh.nodes))))
-        parts.append(holes(points[at_section, :2], np.array([known[height] for height in heights])))
-    if not at_section.all():
+    heights = points[:, 2].tolist()
+    _add_sections(mesh, [height for height, at in zip(heights, at_section) if at], known, from_file)
+    at_section = at_section & np.array([known.get(height) is not None for height in heights])
+    inside = None
+    if from_file or not at_section.all():  # segments have been checked: the cable runs inside the walls
         try:
-            inside = embed(mesh, mesh.axis.points(points[~at_section]))
+            inside = embed(mesh, mesh.axis.points(points if from_file else points[~at_section]))
         except MeshError as error:
             raise MeshError(f"cable '{cable.name}' leaves the body: {error}") from error
         worst = int(np.argmax(inside.outside))
-        if robot.body is not None and inside.outside[worst] > _TOLERANCE:
-            x, y, z = points[~at_section][worst] * 1e3
+        if from_file and inside.outside[worst] > _TOLERANCE:
+            x, y, z = points[worst] * 1e3
             raise MeshError(f"cable '{cable.name}' leaves the body at ({x:.3g}, {y:.3g}, {z:.3g}) mm; it must run inside")
+        if from_file:
+            inside = inside.of(~at_section)
+    parts = []
+    if at_section.any():
+        rows = np.array([known[height] for height, at in zip(heights, at_section) if at])
+        parts.append(holes(points[at_section, :2], rows))
+    if inside is not None and not at_section.all():
         parts.append(inside)
     return Route(parts[0] if len(parts) == 1 else _merged(parts, at_section), smooth)
+
+
+def _add_sections(mesh: Mesh, heights: list[float], known: dict[float, np.ndarray | None], from_file: bool) -> None:
+    """Add the functionals (3, n) of the sections at the heights to `known`; None where a body from a file has no whole one."""
+    missing = [height for height in dict.fromkeys(heights) if height not in known]
+    if not from_file:
+        known.update(zip(missing, section_functionals(mesh, np.array(missing)).reshape(-1, 3, len(mesh.nodes))))
+        return
+    for height in missing:
+        try:
+            known[height] = section_functionals(mesh, np.array([height])) if is_one_region(mesh, height) else None
+        except MeshError:
+            known[height] = None
 
 
 def _smooth(s: np.ndarray, stations: np.ndarray, at_disk: np.ndarray, slack: float) -> np.ndarray:

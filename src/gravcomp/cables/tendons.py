@@ -64,7 +64,8 @@ class Tendons:
         self._first = np.concatenate([[0], np.cumsum([len(nodes) for nodes, _ in pieces])]).astype(np.int64)
         self._nodes = np.concatenate([nodes for nodes, _ in pieces]) if pieces else np.zeros(0, dtype=np.int64)
         self._weights = np.concatenate([weights for _, weights in pieces]) if pieces else np.zeros(0)
-        self._position = _scatter_positions(self._first, self._nodes, self._n_free, pattern.layout)
+        self._together, self._group = _groups(pieces)
+        self._place = _places(self._together[self._group[:-1]], self._first, self._nodes, self._n_free, pattern.layout)
         self._rest_length = np.zeros(self.count)
         self._rest_length = -self.state(rest).displacement
         # m/N: elongation from capstan to end under unit tension without friction, zero for a cable without stretch.
@@ -100,8 +101,8 @@ class Tendons:
     def add_stiffness(self, state: TendonState, tension: np.ndarray, matrix: BlockMatrix) -> None:
         """Add the geometric stiffness of the cables under `tension` (m,) to `matrix`."""
         _add_stiffness(
-            self._cable, self._first, self._weights, state.tangent, state.length, state.share, tension, self._position,
-            matrix.values,
+            self._cable, self._first, self._weights, state.tangent, state.length, state.share, tension, self._together,
+            self._group, self._place, matrix.values,
         )  # fmt: skip
 
 
@@ -123,24 +124,39 @@ def pieces_of(route: Route) -> list[tuple[np.ndarray, np.ndarray]]:
     return pieces
 
 
+def _groups(pieces: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pieces (s,) sorted into groups that hang on the same nodes, and where each group begins (g + 1,).
+
+    Cables that move with the same sections do so: their stiffnesses are added up before they are added to the matrix.
+    """
+    groups: dict[bytes, list[int]] = {}
+    for k, (nodes, _) in enumerate(pieces):
+        groups.setdefault(nodes.tobytes(), []).append(k)
+    members = [k for group in groups.values() for k in group]
+    return np.array(members, dtype=np.int64), np.cumsum([0, *map(len, groups.values())]).astype(np.int64)
+
+
 @njit(cache=True)
-def _scatter_positions(first: np.ndarray, nodes: np.ndarray, n_free: int, layout: Layout) -> np.ndarray:
-    """Return the positions of the 3 x 3 entries of each pair of nodes a >= b of each piece; -1 if clamped or mirrored."""
+def _places(piece: np.ndarray, first: np.ndarray, nodes: np.ndarray, n_free: int, layout: Layout) -> np.ndarray:
+    """Return where (p, 2) the 3 x 3 blocks of each pair of nodes a >= b of the pieces (g,) are.
+
+    The position of a block's first entry, -1 if a node is clamped, and the distance between its columns; the entries of a column
+    lie one after the other, as the nodes of a piece are sorted.
+    """
     count = 0
-    for k in range(len(first) - 1):
+    for k in piece:
         size = first[k + 1] - first[k]
-        count += 9 * (size * (size + 1) // 2)
-    position = np.full(count, -1, dtype=np.int64)
-    entry = 0
-    for k in range(len(first) - 1):
+        count += size * (size + 1) // 2
+    place = np.full((count, 2), -1, dtype=np.int64)
+    pair = 0
+    for k in piece:
         for a in range(first[k], first[k + 1]):
             for b in range(first[k], a + 1):
                 if nodes[a] < n_free and nodes[b] < n_free:
-                    for i in range(3):
-                        for j in range(3 if b < a else i + 1):
-                            position[entry + 3 * i + j] = entry_position(3 * nodes[a] + i, 3 * nodes[b] + j, layout)
-                entry += 9
-    return position
+                    place[pair, 0] = entry_position(3 * nodes[a], 3 * nodes[b], layout)
+                    place[pair, 1] = layout.size[layout.level[3 * nodes[a]]]
+                pair += 1
+    return place
 
 
 @njit(cache=True)
@@ -181,25 +197,51 @@ def _force_jacobian(
 @njit(cache=True)
 def _add_stiffness(
     cable: np.ndarray, first: np.ndarray, weights: np.ndarray, tangent: np.ndarray, length: np.ndarray, share: np.ndarray,
-    tension: np.ndarray, position: np.ndarray, values: np.ndarray,
+    tension: np.ndarray, together: np.ndarray, group: np.ndarray, place: np.ndarray, values: np.ndarray,
 ) -> None:  # fmt: skip
-    """Add the geometric stiffness of all pieces to `values` at `position`."""
-    block = np.empty((3, 3))
-    entry = 0
-    for k in range(len(cable)):
-        factor = tension[cable[k]] * share[k] / length[k]
-        if factor == 0.0:
+    """Add the geometric stiffness of all pieces to `values`, group by group at its `place`."""
+    pair = 0
+    start, stiffness, scaled = np.empty(len(cable), np.int64), np.empty((len(cable), 6)), np.empty((len(cable), 6))
+    for g in range(len(group) - 1):
+        members, size = 0, 0
+        for k in together[group[g] : group[g + 1]]:
             size = first[k + 1] - first[k]
-            entry += 9 * (size * (size + 1) // 2)
+            factor = tension[cable[k]] * share[k] / length[k]
+            if factor == 0.0:
+                continue
+            x, y, z = tangent[k]
+            start[members], of = first[k], stiffness[members]
+            of[0], of[1], of[2] = factor * (1.0 - x * x), factor * (1.0 - y * y), factor * (1.0 - z * z)
+            of[3], of[4], of[5] = -factor * x * y, -factor * x * z, -factor * y * z
+            members += 1
+        if members == 0:
+            pair += size * (size + 1) // 2
             continue
-        for i in range(3):
-            for j in range(3):
-                block[i, j] = factor * ((1.0 if i == j else 0.0) - tangent[k, i] * tangent[k, j])
-        for a in range(first[k], first[k + 1]):
-            for b in range(first[k], a + 1):
-                pair = weights[a] * weights[b]
-                for i in range(3):
-                    for j in range(3):
-                        if position[entry] >= 0:
-                            values[position[entry]] += pair * block[i, j]
-                        entry += 1
+        for a in range(size):
+            for k in range(members):
+                for i in range(6):
+                    scaled[k, i] = weights[start[k] + a] * stiffness[k, i]
+            for b in range(a + 1):
+                at, column = place[pair]
+                pair += 1
+                if at < 0:
+                    continue
+                xx = yy = zz = xy = xz = yz = 0.0
+                for k in range(members):
+                    w = weights[start[k] + b]
+                    xx += w * scaled[k, 0]
+                    yy += w * scaled[k, 1]
+                    zz += w * scaled[k, 2]
+                    xy += w * scaled[k, 3]
+                    xz += w * scaled[k, 4]
+                    yz += w * scaled[k, 5]
+                values[at] += xx
+                values[at + 1] += xy
+                values[at + 2] += xz
+                values[at + column + 1] += yy
+                values[at + column + 2] += yz
+                values[at + 2 * column + 2] += zz
+                if b < a:
+                    values[at + column] += xy
+                    values[at + 2 * column] += xz
+                    values[at + 2 * column + 1] += yz

@@ -36,8 +36,9 @@ class MotionFit:
     """The fitted robot and its values in SI.
 
     *_interval: half width of the interval at 95 %, NaN if the value was not fitted; evaluations: number of predictions of all
-    courses, shorter ones counted by their length; rms_before and rms_after: tip error in m; predicted: tips (t, 3) of each
-    course; damping_seen: False if the courses contain too little motion to determine the damping.
+    courses, shorter ones counted by their length; rms_before and rms_after: tip error in m, the first None where the motion of
+    the robot as it is described cannot be computed; predicted: tips (t, 3) of each course; damping_seen: False if the courses
+    contain too little motion to determine the damping.
     """
 
     robot: Robot
@@ -50,7 +51,7 @@ class MotionFit:
     creep_time: float
     creep_time_interval: float
     evaluations: int
-    rms_before: float
+    rms_before: float | None
     rms_after: float
     predicted: list[np.ndarray]
     damping_seen: bool
@@ -120,7 +121,7 @@ def fit_motion(
         creep_time=final.creep_time,
         creep_time_interval=half.get("creep_time", np.nan),
         evaluations=int(np.ceil(sum(simulated) / sum(len(course.time) for course in courses))),
-        rms_before=rms_distance(before),
+        rms_before=rms_distance(before) if np.isfinite(before).all() else None,
         rms_after=rms_distance(whole.error(x)),
         predicted=whole.tips(x),
         damping_seen=bool(deviation[0] < 0.5),

@@ -61,10 +61,11 @@ def calibration_result(
                 warnings.append("creep: these data do not show any; leave --creep out")
         if not motion.damping_seen:
             warnings.append("damping time: these data contain too little motion to determine it; the robot file's is kept")
-        figures += [
-            Figure("tip error in motion before, RMS", 1e3 * motion.rms_before, "mm"),
-            Figure("tip error in motion after, RMS", 1e3 * motion.rms_after, "mm"),
-        ]
+        if motion.rms_before is None:
+            warnings.append("tip error in motion before: the motion of the robot as it is described cannot be computed")
+        else:
+            figures.append(Figure("tip error in motion before, RMS", 1e3 * motion.rms_before, "mm"))
+        figures.append(Figure("tip error in motion after, RMS", 1e3 * motion.rms_after, "mm"))
         parts.append(
             Plot("Motion", _motion(courses, motion), "The trial with the most motion, measured and modelled after the fit.")
         )

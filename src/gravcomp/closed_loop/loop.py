@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
+from gravcomp.closed_loop.loop_failed import LoopFailed
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.external_loads.base_turn import BaseTurn
@@ -84,7 +85,7 @@ class ClosedLoop:
         starts at its target temperature; tracker: of the tip, to correct the model's error; load: what to find of an unknown
         load; cells: load cells at the capstans; None: there is none; board: of the virtual robot, see there. From the first
         `hold` on the board "standalone" computes the commands and drives the motors by itself; the host then only listens, and
-        its simulator follows the board's commands. It needs a reduced model. Raises RuntimeError where the bridge does not start,
+        its simulator follows the board's commands. It needs a reduced model. Raises LoopFailed where the bridge does not start,
         ConfigError for a robot that does not fit the board.
         """
         self.setup = setup
@@ -194,7 +195,7 @@ class ClosedLoop:
         self._target, self._weightless = target, weightless
 
     def run(self, duration: float) -> None:
-        """Advance by `duration` s. Raises RuntimeError where the bridge refuses a command."""
+        """Advance by `duration` s. Raises LoopFailed where the bridge refuses a command."""
         end = self.time + duration
         while self.time < end - 1e-9:
             self._bus_step()
@@ -205,7 +206,7 @@ class ClosedLoop:
         while self._bridge.state not in DRIVING or self.shape is None:
             self._bus_step()
             if self.time > 5.0:
-                raise RuntimeError(f"the virtual robot's bridge does not start: {self._bridge.message}")
+                raise LoopFailed(f"the virtual robot's bridge does not start: {self._bridge.message}")
         self._waiting = False
         self.forget()
 
@@ -255,7 +256,7 @@ class ClosedLoop:
         if arrived is not None and not self._waiting and not self._alone:
             refused = self._bridge.command(arrived[0].tolist(), arrived[1].tolist(), self.time)
             if refused:
-                raise RuntimeError(f"the bridge refused a command at {self.time:.2f} s: {refused}")
+                raise LoopFailed(f"the bridge refused a command at {self.time:.2f} s: {refused}")
         self._record(shape)
 
     def _observed(self, shape: Shape) -> Target | None:
@@ -341,9 +342,7 @@ class ClosedLoop:
 
 def _parameters(setup: Setup) -> LoopParameters:
     """Return what the loop on the board takes from the setup."""
-    return LoopParameters(
-        setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn
-    )
+    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn)
 
 
 def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:

@@ -8,8 +8,7 @@ from typing import Any
 
 from gravcomp.config import from_mapping
 from gravcomp.description import Robot, RobotFile
-from gravcomp.description.hardware import Hardware, parse_hardware
-from gravcomp.description.pairs import check_pairs
+from gravcomp.description.hardware import Hardware
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
@@ -53,8 +52,7 @@ class Setup:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
 
         virtual = described(file, seed)
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-        check_pairs(hardware, file.robot, file.source)
+        hardware = file.hardware
         return cls(
             source=file.source,
             robot=file.robot.with_assumed_lines(),

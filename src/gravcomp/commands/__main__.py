@@ -1,10 +1,13 @@
 """`python -m gravcomp.commands COMMAND ...`: what `./gravcomp` runs inside the environment."""
 
+import errno
 import sys
 
 from gravcomp.commands import COMMANDS, output, overview
 from gravcomp.commands.parsers import module_of, parse, parser_of
 from gravcomp.environment.interrupt import run_interruptible
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def main(arguments: list[str]) -> int:
@@ -27,7 +30,7 @@ def main(arguments: list[str]) -> int:
         code = _exit_code(error)
         if code is None:
             raise
-        print(f"gravcomp {name}: {error}", file=sys.stderr)
+        print(f"gravcomp {name}: {_sentence(error)}", file=sys.stderr)
         return code
 
 
@@ -40,7 +43,16 @@ def _exit_code(error: Exception) -> int | None:
 
     if isinstance(error, SetupError):
         return 3
+    if isinstance(error, OSError) and (error.filename is not None or error.errno in _FULL):
+        return 2  # a file that cannot be read or written, in the cache as well
     return 2 if isinstance(error, (ConfigError, LaunchError, NodeDied, TimeoutError)) else None
+
+
+def _sentence(error: Exception) -> str:
+    """Return what is wrong, without Python's number of the error."""
+    if not isinstance(error, OSError) or error.strerror is None:
+        return str(error)
+    return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
 
 
 if __name__ == "__main__":

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.parsers import in_range, namespace
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -37,13 +39,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " arm's acceleration fed forward (default: both)",
     )
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
-    parser.add_argument("--hold", type=float, default=5.0, metavar="S", help="time at each pose in seconds (default: 5)")
     parser.add_argument(
-        "--travel", type=float, default=3.0, metavar="S", help="time of each motion between two poses in seconds (default: 3)"
+        "--hold",
+        type=in_range(float, 1.0, 600.0, "s"),
+        default=5.0,
+        metavar="S",
+        help="time at each pose in seconds (default: 5)",
+    )
+    parser.add_argument(
+        "--travel",
+        type=in_range(float, 0.5, 600.0, "s"),
+        default=3.0,
+        metavar="S",
+        help="time of each motion between two poses in seconds (default: 3)",
     )
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
-    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for one of several robots")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="namespace of all nodes, for one of several robots"
+    )
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
@@ -63,6 +77,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher.domain import private_domain
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
+    given_logs = made_logs(args.logs)
     builder = prepare(args.robot, virtual=True)
     xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
@@ -81,7 +96,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         specs.append(graph.node("gravcomp_hw", "virtual_robot"))
         stops = {"hold": args.hold, "travel": args.travel}
         player = graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), result_file=str(result), **stops)
-        logs, domain = Path(args.logs) if args.logs else Path(scratch) / "logs", private_domain()
+        logs, domain = given_logs or Path(scratch) / "logs", private_domain()
         with builder, Graph([*specs, player], logs, {**domain, **builder.environment}, host) as processes:
             if args.viewer:
                 processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))

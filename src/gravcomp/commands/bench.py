@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
-from gravcomp.commands.parsers import add_subcommand
+from gravcomp.commands.parsers import add_subcommand, in_range
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -56,6 +56,10 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
 }
 """Keyword arguments of a benchmark's `run` that are options of the command: default and meaning."""
 
+LEAST = {"seed": 0, "minutes": 0.01}
+MOST = 2**31 - 1
+"""What such a number is at least, where that is not 1, and at most."""
+
 LISTS: dict[str, dict[str, tuple[str, str]]] = {
     "robots": {
         "files": ("FILE", "robot files or shipped robots (default: all shipped ones and those in ../shared/robots)"),
@@ -104,13 +108,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             if default is False:
                 own.add_argument(f"--{option}", action="store_true", help=meaning)
             else:
-                own.add_argument(f"--{option}", type=type(default), default=default, help=f"{meaning} (default {default})")
+                kind = in_range(type(default), LEAST.get(option, 1), MOST)
+                own.add_argument(f"--{option}", type=kind, default=default, help=f"{meaning} (default {default})")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the benchmark. Returns 0: every figure with a limit reached it, 1: at least one missed it. Raises ConfigError."""
     from gravcomp.bench.limits import figures as headline_figures
     from gravcomp.config import ConfigError
+    from gravcomp.description.robot_file import robot_path
     from gravcomp.report import figures_table
 
     other = next((f" --{name}" for name in KINDS if getattr(args, name, False)), "")
@@ -119,6 +125,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("--write and --brief exclude each other: a document takes the figures of whole benchmarks")
     if args.write:
         figures_table.check_place(Path(args.write), command)
+    for name in getattr(args, "files", ()):
+        robot_path(name)
     module = importlib.import_module(f"gravcomp.bench.{args.benchmark}")
     options = {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
     options |= BRIEF[args.benchmark] if args.brief else {}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target, made_folder
 
 if TYPE_CHECKING:
     from gravcomp.orientation import EstimatorOptions
@@ -56,13 +57,16 @@ def run(args: argparse.Namespace) -> int:
     for direction in args.up or ():
         if not np.isfinite(direction).all() or np.linalg.norm(direction) < 1e-6:
             raise ConfigError(f"--up is {direction}; a direction other than zero is needed")
+    target = checked_target("--write", Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser())
+    bias_model = Path(args.bias_model).expanduser() if args.bias_model else None
+    if bias_model is not None:
+        checked_target("--bias-model", made_folder("--bias-model", bias_model.parent) / bias_model.name)
     columns = read_mapping(args.columns) if args.columns else None
     with output.progress(f"reading {args.file}") as progress:
         recording = read_recording(args.file, args.topic, columns, progress)
     found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
-    span = _learn_bias(recording, options, found, Path(args.bias_model)) if args.bias_model else None
-    target = Path(args.write or f"{file.robot.name}-calibrated.yaml").expanduser()
-    write_imu_calibration(file.source, target, found, Path(args.bias_model).expanduser() if args.bias_model else None)
+    span = _learn_bias(recording, options, found, bias_model) if bias_model is not None else None
+    write_imu_calibration(file.source, target, found, bias_model)
     figures = _figures(args, found, span, target)
     output.result(figures, _text(figures))
     return 0
@@ -71,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 def _learn_bias(recording: "Recording", options: "EstimatorOptions", found: "RestCalibration", path: Path) -> tuple[float, float]:
     """Learn and write the bias over temperature, relative to the fitted offset. Returns the lowest and highest temperature, degC.
 
-    Raises ConfigError when the recording has no temperature, when the IMU is not at rest, and when `path` cannot be written.
+    Raises ConfigError when the recording has no temperature, and when the IMU is not at rest.
     """
     from dataclasses import replace
 
@@ -86,11 +90,8 @@ def _learn_bias(recording: "Recording", options: "EstimatorOptions", found: "Res
         raise ConfigError(
             f"{recording.source}: the IMU was never at rest while its temperature was recorded; no bias model was learned"
         )
-    try:
-        # An existing file is replaced: its biases are relative to the previous offset.
-        estimator.learned.save(path)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}") from error
+    # An existing file is replaced: its biases are relative to the previous offset.
+    estimator.learned.save(path)
     return estimator.learned.span
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from gravcomp.arm.chain import Chain
+    from gravcomp.arm.description import read_urdf
     from gravcomp.arm.mount import fit_mount
     from gravcomp.calibration.apply import write_mount
     from gravcomp.config import ConfigError, from_mapping
@@ -42,11 +44,9 @@ def run(args: argparse.Namespace) -> int:
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
     options = from_mapping(ImuEstimatorParameters, section, source=file.source, key="nodes.imu_estimator").estimator
+    target = checked_target("--write", Path(args.write or f"{file.robot.name}-mounted.yaml").expanduser())
     recording = read_recording(args.bag, args.topic)
-    try:
-        urdf = Path(args.urdf).read_text(encoding="utf-8") if args.urdf else read_description(args.bag)
-    except OSError as error:
-        raise ConfigError(f"{args.urdf}: cannot be read: {error.strerror}") from error
+    urdf = read_urdf(args.urdf) if args.urdf else read_description(args.bag)
     if urdf is None:
         raise ConfigError(f"{args.bag}: has no robot_description; give the URDF with --urdf")
     chain = Chain(urdf, args.base_frame, args.world_frame, args.urdf or "robot_description")
@@ -57,7 +57,6 @@ def run(args: argparse.Namespace) -> int:
     accel = np.array([fit.scale * (pose.accel - fit.offset) for pose in poses])
     base = np.array([chain.pose(dict(zip(chain.moving, pose.alongside)))[:3, :3] for pose in poses])
     found = fit_mount(accel, base, with_tilt=args.tilt)
-    target = Path(args.write or f"{file.robot.name}-mounted.yaml").expanduser()
     write_mount(file.source, target, (found.roll, found.pitch, found.yaw))
     change = found.rotation.as_matrix() @ file.robot.imu_mount.rotation.T
     degrees = [round(math.degrees(angle), 3) for angle in (found.roll, found.pitch, found.yaw)]

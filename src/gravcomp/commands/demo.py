@@ -5,10 +5,11 @@ import json
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gravcomp.commands import output
 from gravcomp.commands.composition import add_composed_argument
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
@@ -80,39 +81,16 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
     from gravcomp.virtual.described import described
 
-    if not _SHORTEST <= args.duration <= 86400.0:
-        raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
-    if args.screenshots and args.headless:
-        raise ConfigError("--screenshots and --headless exclude each other: the pictures show the page")
-    if args.screenshots and args.duration > _LONGEST_LOOKED_BACK:
-        raise ConfigError(
-            f"--screenshots looks back over the run: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
-        )
+    _check(args)
+    given_logs = made_logs(args.logs)
+    times = _Times.of(args)
+    parameters: dict[str, dict] = {"virtual_robot": _motion(args, times)}
+    pictures = PagePictures(Path(args.screenshots), times.of_pictures()) if args.screenshots else None
     builder = prepare(args.robot, virtual=True, seed=seed_of(args))
-    relax_time = min(8.0, 0.3 * args.duration)
-    start = _begin_of_motion(args.imu) - relax_time if args.imu else 0.0
-    compensate_until = relax_time + 0.45 * (args.duration - relax_time)
-    # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
-    motion: dict[str, Any] = {
-        "truth_rate": 50.0,
-        "feedback_rate": 125,
-        "steerable": True,
-        "board": args.board,
-    } | tracker_parameters(args)
-    if args.imu:
-        motion |= {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": max(0.0, start)}
-    else:
-        motion |= {"motion": "tilt", "hold": compensate_until}
-    pictures = None
-    if args.screenshots:
-        compensated = relax_time + 0.75 * (compensate_until - relax_time)  # before the base turns
-        moments = {"sagging": 0.9 * relax_time, "compensated": compensated, "tilted": 0.95 * args.duration}
-        pictures = PagePictures(Path(args.screenshots), moments)
     channels = private_channels(args.robot)
     alone = args.board == "standalone"
     if args.board != "virtual":
         output.note(f"The board is on the bus `--interface udp_multicast --channel {channels.split(',')[0]}`")
-    parameters: dict[str, dict] = {"virtual_robot": motion}
     if alone:
         _prepare_alone(args.robot)
         parameters["fem_simulator"] = {"cables_from": "state"}  # the model follows the motors that the board drives
@@ -122,12 +100,12 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         result_file = Path(scratch) / "result.json"
         judge = graph.node(
-            "gravcomp_hw", "judge", duration=args.duration, relax_time=relax_time, settle_time=min(4.0, 0.15 * args.duration),
+            "gravcomp_hw", "judge", duration=args.duration, relax_time=times.relaxed, settle_time=min(4.0, 0.15 * args.duration),
             start_timeout=_START_TIMEOUT, result_file=str(result_file), nodes=nodes, standalone=alone, measure_delay=not alone,
         )  # fmt: skip
         specs = [*loop, judge]
         pictured = {"look_back": args.duration + _BROWSER_TIME, "graphics": "full"} if args.screenshots else {}
-        logs = Path(args.logs) if args.logs else Path(scratch) / "logs"
+        logs = given_logs or Path(scratch) / "logs"
         domain = private_domain()
         with builder, Graph(specs, logs, {**domain, **builder.environment}, host) as processes:
             if not args.headless:
@@ -157,6 +135,50 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if problem:
         raise ConfigError(problem)
     return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Raise ConfigError for options that cannot be, or not together."""
+    from gravcomp.config import ConfigError
+
+    if not _SHORTEST <= args.duration <= 86400.0:
+        raise ConfigError(f"--duration is {args.duration:g}; allowed: {_SHORTEST:g} to 86400 s")
+    if args.screenshots and args.headless:
+        raise ConfigError("--screenshots and --headless exclude each other: the pictures show the page")
+    if args.screenshots and args.duration > _LONGEST_LOOKED_BACK:
+        raise ConfigError(
+            f"--screenshots looks back over the run: --duration is {args.duration:g}; allowed: up to {_LONGEST_LOOKED_BACK:g} s"
+        )
+
+
+class _Times(NamedTuple):
+    """Times of the scenario in s from its begin: cables released until, base at rest until, end; begin: in the recording."""
+
+    relaxed: float
+    at_rest: float
+    end: float
+    begin: float
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> "_Times":
+        """Return the times of the options. Raises ConfigError for a recording that cannot be used."""
+        relaxed = min(8.0, 0.3 * args.duration)
+        begin = max(0.0, _begin_of_motion(args.imu) - relaxed) if args.imu else 0.0
+        return cls(relaxed, relaxed + 0.45 * (args.duration - relaxed), args.duration, begin)
+
+    def of_pictures(self) -> dict[str, float]:
+        """Return the name and the moment of each picture."""
+        compensated = self.relaxed + 0.75 * (self.at_rest - self.relaxed)
+        return {"sagging": 0.9 * self.relaxed, "compensated": compensated, "tilted": 0.95 * self.end}
+
+
+def _motion(args: argparse.Namespace, times: _Times) -> dict[str, Any]:
+    """Return the parameters of virtual_robot. Raises ConfigError for a tracker that it cannot have."""
+    # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
+    given = {"truth_rate": 50.0, "feedback_rate": 125, "steerable": True, "board": args.board} | tracker_parameters(args)
+    if args.imu:
+        return given | {"motion": "recording", "recording": str(Path(args.imu).resolve()), "recording_start": times.begin}
+    return given | {"motion": "tilt", "hold": times.at_rest}
 
 
 def _prepare_alone(robot: str) -> None:

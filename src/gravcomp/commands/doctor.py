@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import made_folder
+from gravcomp.commands.parsers import namespace
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--current", type=float, default=0.2, metavar="A", help="current of that step (default: 0.2)")
     parser.add_argument("--out", metavar="DIR", help="with --board: write the report page board.html into this folder")
     parser.add_argument("--graph", action="store_true", help="also check the running graph: rates, latencies, matching QoS")
-    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of the running graph, e.g. /left")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="namespace of the running graph, e.g. /left"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

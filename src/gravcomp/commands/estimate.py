@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target
 
 if TYPE_CHECKING:
     from gravcomp.orientation import EstimatedRecording, EstimatorOptions
@@ -55,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.average < 1:
         raise ConfigError(f"--average is {args.average}; 1 or more is needed")
+    if args.out:
+        checked_target("--out", Path(args.out))
     try:
         columns = read_mapping(args.columns) if args.columns else None
         with output.progress(f"reading {args.file}") as reading:
@@ -95,10 +98,7 @@ def run(args: argparse.Namespace) -> int:
         rmse = inclination_rmse(result.orientation, recording.orientation, recording.movement)
         figures["inclination_rmse_deg"] = None if np.isnan(rmse) else float(np.degrees(rmse))
     if args.out:
-        try:
-            _write(Path(args.out), result)
-        except OSError as error:
-            raise ConfigError(f"{args.out}: cannot be written: {error.strerror}") from error
+        _write(Path(args.out), result)
         figures["out"] = str(args.out)
     output.result(figures, _text(figures))
     return 0

@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 
 from gravcomp.commands import output
-from gravcomp.commands.parsers import add_subcommand
+from gravcomp.commands.folders import made_folder
+from gravcomp.commands.parsers import add_subcommand, in_range
 
 _TESTS = tuple(
     f"src/test/test_{name}.py"
@@ -28,13 +29,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     flash.add_argument("--tool", choices=("pyocd", "openocd", "dfu-util"), help="programme that writes (default: what is there)")
     flash.add_argument("--show", action="store_true", help="print what would be run, and run nothing")
     test = add_subcommand(choices, "test", "run the firmware's tests and the fuzzer; print which lines of the C code they reach")
-    test.add_argument("--frames", type=int, default=50_000, metavar="N", help="frames of the fuzzer (default: 50000)")
-    test.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the fuzzer (default: 1)")
+    test.add_argument(
+        "--frames", type=in_range(int, 1, 10**9), default=50_000, metavar="N", help="frames of the fuzzer (default: 50000)"
+    )
+    test.add_argument("--seed", type=in_range(int, 0, 2**31 - 1), default=1, metavar="N", help="seed of the fuzzer (default: 1)")
     model = add_subcommand(choices, "model", "turn a robot's reduced model into the blob of the loop on the board")
     model.add_argument("robot", metavar="ROBOT", help="robot file or shipped robot")
     model.add_argument("--output", metavar="DIR", default=_FOLDER, help=f"folder of the blob (default: {_FOLDER})")
     model.add_argument(
-        "--joystick-bend", type=float, default=60.0, metavar="DEG", help="bend at full deflection of the joystick (default: 60)"
+        "--joystick-bend",
+        type=in_range(float, 1.0, 180.0, "deg"),
+        default=60.0,
+        metavar="DEG",
+        help="bend at full deflection of the joystick (default: 60)",
     )
     send = add_subcommand(
         choices, "send", "send a model to the loop on the board over CAN; the board keeps the old one until it is whole"
@@ -87,9 +94,8 @@ def _built(args: argparse.Namespace) -> tuple[dict, str]:
     from gravcomp.firmware.image import build_image
     from gravcomp.firmware.stack import largest_stack
 
+    folder = made_folder("--output", Path(args.output).expanduser())
     image = build_image(standalone=args.standalone)
-    folder = Path(args.output)
-    folder.mkdir(parents=True, exist_ok=True)
     for name, data in (("image.elf", image.path.read_bytes()), ("boot.bin", image.boot), ("code.bin", image.code)):
         (folder / name).write_bytes(data)
     stack = largest_stack(image)
@@ -113,18 +119,14 @@ def _model(args: argparse.Namespace) -> int:
     import math
 
     from gravcomp.commands.model.build import prepare
-    from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
     from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit
     from gravcomp.firmware.model_settings import LoopParameters
 
-    if not 0.0 < args.joystick_bend <= 180.0:
-        raise ConfigError(f"--joystick-bend is {args.joystick_bend:g}; allowed: above 0 to 180 deg")
     file = load_robot_file(args.robot)
+    path = made_folder("--output", Path(args.output).expanduser()) / f"{file.robot.name}.model"
     model, reduction, _ = prepare(args.robot)
     found = fit(model, reduction, LoopParameters.of(file), math.radians(args.joystick_bend))
-    path = Path(args.output) / f"{file.robot.name}.model"
-    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(found.blob)
     figures = {
         "robot": file.robot.name,
@@ -155,7 +157,7 @@ def _send(args: argparse.Namespace) -> int:
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_transfer import forgetting, sending
 
-    path = Path(args.model)
+    path = Path(args.model).expanduser()
     try:
         blob = path.read_bytes()
     except OSError as error:
@@ -177,7 +179,7 @@ def _flash(args: argparse.Namespace) -> int:
 
     figures, sentence = _built(args)
     output.note(sentence)
-    lines = commands_for(Path(args.output), args.tool, needed=not args.show)
+    lines = commands_for(Path(args.output).expanduser(), args.tool, needed=not args.show)
     for line in lines:
         output.note(" ".join(line))
         if not args.show and subprocess.run(line).returncode != 0:
@@ -220,13 +222,12 @@ def _test(args: argparse.Namespace) -> int:
 
 def _parameters(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
-    from gravcomp.description.hardware import parse_hardware
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_settings import LoopParameters
     from gravcomp.firmware.settings import WITH_HOST, settings_alone, settings_of
 
     file = load_robot_file(args.robot)
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     if len(hardware.all_buses) == 1:
         hardware = hardware.on(args.interface, args.channel)
     settings = settings_of(hardware, between=not args.one_bus)

@@ -6,6 +6,7 @@ import webbrowser
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.parsers import in_range
 
 if TYPE_CHECKING:
     from gravcomp.launcher import Graph
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
 
 def add_page_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the page's port and whether a browser is opened."""
-    parser.add_argument("--port", type=int, default=8080, help="port of the live page on this machine (default: 8080)")
+    parser.add_argument(
+        "--port", type=in_range(int, 1, 65535), default=8080, help="port of the live page on this machine (default: 8080)"
+    )
     parser.add_argument("--no-open", action="store_true", help="print the address of the page, but open no browser")
 
 

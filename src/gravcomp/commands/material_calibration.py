@@ -1,7 +1,6 @@
 """`gravcomp calibrate TABLE --material`: the Prony series of the robot's material from a relaxation or creep test."""
 
 import argparse
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,24 +9,19 @@ if TYPE_CHECKING:
     from gravcomp.report.result import Result
 
 
-def fit_material(args: argparse.Namespace, file: "RobotFile") -> tuple["Result", Path, Path]:
-    """Fit, and write robot file and page. Returns the result, the robot file and the page. Raises ConfigError."""
-    from gravcomp.calibration.apply import overlay_path, write_calibrated
+def fit_material(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Result":
+    """Fit, write the robot file `target`, and return the result. Raises ConfigError."""
+    from gravcomp.calibration.apply import write_calibrated
     from gravcomp.calibration.material_recording import read_material_recording
     from gravcomp.calibration.material_report import material_result
     from gravcomp.calibration.measured import MeasurementError
     from gravcomp.calibration.prony_fit import fit_series
     from gravcomp.config import ConfigError
-    from gravcomp.report.page import write_report
 
-    target = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
-    started = time.perf_counter()
     try:
         test = read_material_recording(args.data)
         fit = fit_series(test)
     except MeasurementError as error:
         raise ConfigError(str(error)) from error
     write_calibrated(file.source, target, file.robot, file.robot.with_material(prony=fit.prony, creep_ratio=0.0), None)
-    result = material_result(test, fit, str(target))
-    result.seconds = time.perf_counter() - started
-    return result, target, write_report(result, Path(args.out).expanduser())
+    return material_result(test, fit, str(target))

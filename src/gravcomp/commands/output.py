@@ -57,6 +57,17 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
     yield line
 
 
+@contextlib.contextmanager
+def stages(first: str) -> Iterator[Callable[[str], None]]:
+    """Show on stderr the present stage of something, in a line with the time that has passed; the function changes the stage."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console(), transient=True) as shown:
+        task = shown.add_task(first)
+        yield lambda stage: shown.update(task, description=stage)
+
+
 def result(figures: Mapping[str, Any], readable: Any) -> None:
     """Print the result of a command.
 

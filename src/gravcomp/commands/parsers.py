@@ -5,6 +5,8 @@ Only the standard library is imported here and, outside of functions, by the mod
 
 import argparse
 import importlib
+import re
+from collections.abc import Callable
 from typing import Any
 
 from gravcomp.commands import COMMANDS
@@ -53,6 +55,29 @@ def add_subcommand(choices: Any, name: str, summary: str) -> argparse.ArgumentPa
 def parse(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Namespace:
     """Parse the words of a command line; `json` and `quiet` are always set."""
     return parser.parse_args(words, argparse.Namespace(json=False, quiet=False))
+
+
+def in_range(kind: type, least: float, most: float, unit: str = "") -> Callable[[str], Any]:
+    """Return the type of an option for argparse: a number of `kind`, int or float, from `least` to `most`."""
+    allowed = f"allowed: {least:g} to {most:.10g} {unit}".rstrip()
+
+    def read(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"is '{text}'; {allowed}{', whole numbers' if kind is int else ''}") from None
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"is {text}; {allowed}")
+        return value
+
+    return read
+
+
+def namespace(text: str) -> str:
+    """Return a namespace of nodes, as the type of an option for argparse."""
+    if text and not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", text):
+        raise argparse.ArgumentTypeError(f"is '{text}'; a name that begins with / is needed, e.g. /left")
+    return text
 
 
 def _common() -> argparse.ArgumentParser:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder
+from gravcomp.commands.parsers import in_range, namespace
 
 _RECORDER_TIMEOUT = 20.0  # s that the recorder has to write the end of the bag
 
@@ -21,20 +23,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", metavar="DIR", help="new folder for the bag (default: gravcomp_DATE_TIME in the current folder)")
     parser.add_argument("--topics", nargs="+", default=[], metavar="TOPIC", help="record these topics only (default: all)")
-    parser.add_argument("--namespace", default="", metavar="NS", help="record the robot in this namespace (default: /)")
-    parser.add_argument("--duration", type=float, metavar="S", help="stop after this time in seconds (default: at Ctrl-C)")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="record the robot in this namespace (default: /)"
+    )
+    parser.add_argument(
+        "--duration",
+        type=in_range(float, 0.1, 1e6, "s"),
+        metavar="S",
+        help="stop after this time in seconds (default: at Ctrl-C)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Record. Returns 0: the bag is written, 2: it could not be written."""
     from datetime import datetime
 
-    from gravcomp.config import ConfigError
     from gravcomp.launcher import NodeSpec
 
-    if args.duration is not None and args.duration <= 0.0:
-        raise ConfigError(f"--duration is {args.duration:g}; more than 0 s is needed")
     out = Path(args.out or f"gravcomp_{datetime.now():%Y%m%d_%H%M%S}").resolve()
+    made_folder("--out", out.parent)
     parameters = {"out": str(out), **({"topics": args.topics} if args.topics else {})}
     spec = NodeSpec("gravcomp_fem", "recorder", parameters, args.namespace)
     # In a session of its own: Ctrl-C reaches this process only, which passes it on once.

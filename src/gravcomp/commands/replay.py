@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import made_folder, made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.parsers import namespace
 
 if TYPE_CHECKING:
     from gravcomp.launcher import Graph
@@ -41,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="record the output of the graph into a new bag")
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
     add_page_arguments(parser)
-    parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes")
+    parser.add_argument("--namespace", type=namespace, default="", metavar="NS", help="namespace of all nodes")
     parser.add_argument("--logs", metavar="DIR", help="folder for the nodes' output (default: a temporary one)")
 
 
@@ -66,6 +68,9 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         raise ConfigError(f"--speed is {args.speed:g}; allowed: 0 (as fast as the graph processes it) to 1000")
     if args.out and Path(args.out).exists():
         raise ConfigError(f"{args.out}: exists and is not overwritten; name another folder")
+    if args.out:
+        made_folder("--out", Path(args.out).parent)
+    logs = made_logs(args.logs)
     bag = _whole(args.bag)
     with output.progress(f"reading {args.bag}") as progress:
         recording = read_recording(bag, args.topic or None, progress=progress)
@@ -85,7 +90,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
         wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
-    with builder, Graph([*specs, replay], Path(args.logs) if args.logs else None, builder.environment, host) as processes:
+    with builder, Graph([*specs, replay], logs, builder.environment, host) as processes:
         if viewer:
             processes.start_one(viewer[0])
         processes.start()

@@ -1,6 +1,7 @@
 """`gravcomp reproduce NAME`: run one of the article's experiments, or `all`; writes a report page with plots, and JSON."""
 
 import argparse
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,7 +137,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measured(args: argparse.Namespace, folder: Path) -> int:
-    """Evaluate what others measured. Returns the exit code."""
+    """Evaluate what others measured. Returns the exit code: 2 where a folder could not be used, although others were."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from gravcomp.experiments import measured
@@ -157,7 +158,10 @@ def _measured(args: argparse.Namespace, folder: Path) -> int:
         result.notes.insert(0, "Run with --brief: fewer cases on coarser meshes.")
     if args.write:
         figures_table.renew(Path(args.write), "reproduce measured", result.figures)
-    return _print([result], [write_report(result, folder)])
+    code = _print([result], [write_report(result, folder)])
+    for failure in result.failures:
+        print(f"gravcomp reproduce: {failure}", file=sys.stderr)
+    return 2 if result.failures else code
 
 
 def _evaluate_bag(args: argparse.Namespace, setup: "Setup", folder: Path) -> int:
@@ -194,12 +198,13 @@ def _unless_left_out(find: "Callable[[str], Any]", name: str, subject: Any, amon
     find: returns the module of a name, whose `run` takes the subject. Raises ConfigError for one that was asked for alone.
     """
     from gravcomp.calibration.measured import MeasurementError
+    from gravcomp.closed_loop.loop_failed import LoopFailed
     from gravcomp.config import ConfigError
 
     try:
         result: Result = find(name).run(subject)
         return result
-    except (ConfigError, MeasurementError) as error:
+    except (ConfigError, MeasurementError, LoopFailed) as error:
         if not among_all:
             raise ConfigError(str(error)) from error
         output.note(f"{name}: {error}")

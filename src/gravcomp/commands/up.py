@@ -2,12 +2,13 @@
 
 import argparse
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.composition import add_composed_argument
+from gravcomp.commands.folders import made_logs
 from gravcomp.commands.live_page import add_page_arguments, show_page
+from gravcomp.commands.parsers import namespace
 from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
 
@@ -31,7 +32,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_tracker_argument(parser, "with --virtual: ")
     add_seed_argument(parser, "; with --virtual")
     parser.add_argument(
-        "--namespace", default="", metavar="NS", help="namespace of all nodes, e.g. /left, for several robots in one graph"
+        "--namespace",
+        type=namespace,
+        default="",
+        metavar="NS",
+        help="namespace of all nodes, e.g. /left, for several robots in one graph",
     )
     add_composed_argument(parser)
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
@@ -55,10 +60,9 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
-    if args.namespace and not args.namespace.startswith("/"):
-        raise ConfigError(f"--namespace is '{args.namespace}'; a name that begins with / is needed, e.g. /left")
     if args.tracker and not args.virtual:
         raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
+    logs = made_logs(args.logs)
     builder = prepare(args.robot, args.virtual, seed_of(args))
     interface, channel = args.interface, args.channel
     if args.virtual and not (interface or channel):
@@ -70,7 +74,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     specs = graph.loop(args.virtual, args.composed)
     if args.virtual:
         specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic", **tracker_parameters(args)))
-    with builder, Graph(specs, Path(args.logs) if args.logs else None, builder.environment, host) as processes:
+    with builder, Graph(specs, logs, builder.environment, host) as processes:
         if args.viewer:
             processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))
         begin = time.monotonic()

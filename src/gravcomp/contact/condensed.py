@@ -20,10 +20,10 @@ when the robot tilts there: D = -lambda / g''. These forces D v on the last rows
 The limits are those of a pyramid around Coulomb's cone: exact along the two tangents, up to the root of 2 too large between them.
 With given limits the conditions are those of a quadratic programme with bounds, min f^T S f / 2 + f^T v over tensions, normal
 forces and friction together. Its states, at a bound or between, are changed all at once, with one linear solve for each change
-(J. Judice, F. Pires, 1994). Where that does not end, sweeps over the forces and Newton steps of those between their bounds,
-clipped and halved until they lower the sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient
-steps). The limits follow from the normal forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is
-bounded.
+(J. Judice, F. Pires, 1994), and one at a time, the last wrong one, where that leaves as many wrong ones (K. Murty, 1974). Where
+that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped and halved until they lower the
+sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The limits follow from the normal
+forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ from numba import njit
 
 OPEN, STICKING, SLIDING = 0, 1, 2
 _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among places that the model cannot move on their own
-_SWITCHES = 15  # changes of all wrong states at once
+_SWITCHES, _PATIENCE = 40, 4  # changes of wrong states; those of all at once that may leave as many wrong ones as before
 _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
 _SMALL = 1e-12  # m of slack that is rounding error
 _AT_LIMIT = 1e-4  # of the limit: friction nearer to it slides
@@ -189,11 +189,12 @@ def _bounded(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, fo
 
 @njit(cache=True)
 def _switched(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
-    """Look for the minimum by changing every force that is wrongly at a bound, or beyond one, at once."""
+    """Look for the minimum by changing every force that is wrongly at a bound, or beyond one: all at once, or only the last."""
     n = len(q)
-    index, side = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    index, side, wanted = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     for a in range(n):
         side[a] = -1 if force[a] <= low[a] else (1 if force[a] >= high[a] else 0)
+    fewest, patience = n + 1, _PATIENCE
     for _ in range(_SWITCHES):
         count = 0
         for a in range(n):
@@ -205,19 +206,25 @@ def _switched(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, f
                 force[a] = low[a] if side[a] < 0 or low[a] == high[a] else high[a]
         _solve_free(w, q, index[:count], force)
         slope = q + w @ force
-        wrong, rounding = False, 1e-12 * np.abs(force).max()
+        wrong, last, rounding = 0, -1, 1e-12 * np.abs(force).max()
         for a in range(n):
+            wanted[a] = side[a]
             if low[a] == high[a]:
                 continue
-            following = side[a]
             if side[a] == 0:
-                following = -1 if force[a] < low[a] - rounding else (1 if force[a] > high[a] + rounding else 0)
+                wanted[a] = -1 if force[a] < low[a] - rounding else (1 if force[a] > high[a] + rounding else 0)
             elif (side[a] < 0 and slope[a] < -_SMALL) or (side[a] > 0 and slope[a] > _SMALL):
-                following = 0
-            wrong |= following != side[a]
-            side[a] = following
-        if not wrong:
+                wanted[a] = 0
+            if wanted[a] != side[a]:
+                wrong, last = wrong + 1, a
+        if wrong == 0:
             return True
+        patience = _PATIENCE if wrong < fewest else patience - 1
+        fewest = min(fewest, wrong)
+        if patience > 0:
+            side[:] = wanted
+        else:
+            side[last] = wanted[last]
     return False
 
 

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from gravcomp.contact.places import Places, positions
+from gravcomp.contact.moved_places import positions
+from gravcomp.contact.places import Places
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import SceneArrays, gap_to
 
@@ -17,19 +18,6 @@ class Pressed(NamedTuple):
     along: np.ndarray
     position: np.ndarray
     gap: np.ndarray
-
-
-@njit(cache=True)
-def missed(scene: SceneArrays, places: Places, softness: np.ndarray, pressed: np.ndarray, sections: np.ndarray) -> float:
-    """Return by how much in m the places are off the wall that presses them, or in one that does not, at most.
-
-    softness (c,): m/N of walls that yield; pressed (c,): normal forces in N; sections (s, 3, 3): of the stations now.
-    """
-    point, normal, worst = positions(places, sections), np.empty(3), 0.0
-    for i in range(len(point)):
-        gap = gap_to(scene, places.row[i], point[i], normal) + softness[i] * pressed[i]
-        worst = max(worst, abs(gap) if pressed[i] > 0.0 else -gap)
-    return worst
 
 
 @njit(cache=True)
@@ -56,21 +44,36 @@ def pressed_places(
 
 @njit(cache=True)
 def rubbing(
-    scene: SceneArrays, surface: ContactSurface, places: Places, start: np.ndarray, sections: np.ndarray, touched: float
+    scene: SceneArrays,
+    surface: ContactSurface,
+    places: Places,
+    start: np.ndarray,
+    sections: np.ndarray,
+    touched: float,
+    pressed: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the coefficients of friction (c,), and how far the places have slid since the last equilibrium (2 c,) in m.
 
-    start and sections (s, 3, 3): then and now. Only places rub that touched then: whose gap was below `touched` radii. The
-    motions are along the tangents `around` and `along` of each place.
+    start and sections (s, 3, 3): then and now. Only places rub that touched then: whose gap was below `touched` radii, or which
+    were pressed (k, slots). The motions are along the tangents `around` and `along` of each place.
     """
-    before, now = positions(places, start), positions(places, sections)
-    friction, slid, normal = np.zeros(len(before)), np.empty(2 * len(before)), np.empty(3)
+    before = positions(places, start)
+    friction, normal = np.zeros(len(before)), np.empty(3)
     for i in range(len(before)):
-        if gap_to(scene, places.row[i], before[i], normal) < touched * surface.radius[places.station[i]]:
+        near = gap_to(scene, places.row[i], before[i], normal) < touched * surface.radius[places.station[i]]
+        if near or pressed[places.row[i], places.slot[i]]:
             friction[i] = scene.friction[places.row[i]]
-        slid[2 * i] = places.around[i] @ (now[i] - before[i])
-        slid[2 * i + 1] = places.along[i] @ (now[i] - before[i])
-    return friction, slid
+    return friction, slid_by(places, start, sections)
+
+
+@njit(cache=True)
+def slid_by(places: Places, start: np.ndarray, sections: np.ndarray) -> np.ndarray:
+    """Return how far in m the places go along both tangents (2 c,) where the stations go from `start` to `sections` (s, 3, 3)."""
+    way = positions(places, sections) - positions(places, start)
+    slid = np.empty(2 * len(way))
+    for i in range(len(way)):
+        slid[2 * i], slid[2 * i + 1] = places.around[i] @ way[i], places.along[i] @ way[i]
+    return slid
 
 
 @njit(cache=True)

@@ -1,9 +1,12 @@
 """Places where the robot's surface is near an obstacle; compiled.
 
 At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
-half of g'^2 / g'': where it is a minimum along the robot, the place moves there, so that no point of the surface is deeper in
-a wall than at these places, within a few micrometres. Where a wall is across the robot, the points on the rim of the tip's face
-are places too; the nearest one of the rim is one then only where it is deeper than they are, as in a small tilt.
+an eighth of g''. Where that is much and the gap is a minimum along the robot, the place moves there, so that no point of the
+surface is deeper in a wall than at these places, within a few micrometres. Whether places move follows from g'' alone: if it
+followed from the slope, a force would hop between a station and the minimum next to it, and no equilibrium would be found.
+
+Where a wall is across the robot, the points on the rim of the tip's face are places too; the nearest one of the rim is one then
+only where it is deeper than they are, as in a small tilt.
 """
 
 from typing import NamedTuple
@@ -15,10 +18,10 @@ from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
 
 _TURNS = 4  # corrections of the direction in which the outline is nearest
-_SETTLED = 1e-7  # of the radius
+_SETTLED = 1e-5  # of the radius: what it changes of the gap is the square of that
 _MOVES = 3  # corrections of the place along the robot
 _ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
-_WORTH = 1e-4  # of the radius: a place moves along the robot if that makes the gap smaller by this
+_WORTH = 3e-4  # of the radius: places move along the robot where that can make the gap smaller by this
 
 
 class Places(NamedTuple):
@@ -52,9 +55,17 @@ def deepest(
     scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
 ) -> float:
     """Return the smallest gap of a section (3, 3) p, f_1, f_2, and write where it is in the section and the normal there."""
+    gap_to(scene, row, section[0], normal)
+    return _deepest_from(scene, row, surface, station, section, own, normal)
+
+
+@njit(cache=True)
+def _deepest_from(
+    scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
+) -> float:
+    """Do as `deepest`, where the normal at the section's middle is known."""
     corners, radius = surface.outline.shape[1], surface.radius[station]
-    point = section[0].copy()
-    gap = gap_to(scene, row, point, normal)
+    point, gap = np.empty(3), np.inf
     for turn in range(_TURNS):
         x = -(normal[0] * section[1, 0] + normal[1] * section[1, 1] + normal[2] * section[1, 2])
         y = -(normal[0] * section[2, 0] + normal[1] * section[2, 1] + normal[2] * section[2, 2])
@@ -107,7 +118,7 @@ def all_gaps(
             if middle - size[s] > reach[s]:
                 gap[k, s] = middle - size[s]
             else:
-                gap[k, s] = deepest(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
+                gap[k, s] = _deepest_from(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
     return gap
 
 
@@ -203,7 +214,7 @@ def _write_place(
     before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
     bend = gap[k, first] - 2.0 * gap[k, first + 1] + gap[k, first + 2]
     slope = 0.5 * (gap[k, first + 2] - gap[k, first]) + (place - 1.0) * bend
-    if best <= before and best <= after and bend > 0.0 and slope * slope > 2.0 * bend * _WORTH * surface.radius[s]:
+    if best <= before and best <= after and bend > 8.0 * _WORTH * surface.radius[s]:
         low, high = max(place - 0.5, 0.0), min(place + 0.5, 2.0)
         moved, other, across = place - slope / bend, np.empty(2), np.empty(3)
         for _ in range(_MOVES):
@@ -219,7 +230,8 @@ def _write_place(
                 curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
                 ahead += across[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
             moved -= ahead / bend
-        result.rocking[i] = -1.0 / bend
+        if 0.0 < min(max(moved, low), high) < 2.0:  # at an end of the robot the place stays when it tilts
+            result.rocking[i] = -1.0 / bend
     _section_at(sections, first, place, share, section)
     tilt = result.tilt[i]
     tilt[0], tilt[1], tilt[2] = place - 1.5, 2.0 - 2.0 * place, place - 0.5
@@ -233,7 +245,22 @@ def _write_frame(
 ) -> None:  # fmt: skip
     """Write gap, normal, tangents and curvature of place i, which is at own (2,) in a section (3, 3)."""
     result.own[i], result.gap[i], result.normal[i] = own, gap, normal
-    axis = _cross(section[1], section[2])
+    write_tangents(section, result, i)
+    if scene.kind[result.row[i]] == PLANE:
+        result.curvature[i] = 0.0
+        return
+    h, around = 0.02 * surface.radius[result.station[i]], result.around[i]
+    one, other = np.empty(3), np.empty(3)
+    gap_to(scene, result.row[i], section[0] + h * around, one)
+    gap_to(scene, result.row[i], section[0] - h * around, other)
+    bend = ((one - other) @ around) / (2.0 * h)
+    result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
+
+
+@njit(cache=True)
+def write_tangents(section: np.ndarray, result: Places, i: int) -> None:
+    """Write the tangents of place i, whose normal is known, in a section (3, 3)."""
+    axis, normal = _cross(section[1], section[2]), result.normal[i]
     around = _cross(axis, normal)
     length = _length(around)
     if length < 1e-6 * _length(axis):  # the wall is across the robot
@@ -241,15 +268,6 @@ def _write_frame(
         length = _length(around)
     around /= length
     result.around[i], result.along[i] = around, _cross(normal, around)
-    if scene.kind[result.row[i]] == PLANE:
-        result.curvature[i] = 0.0
-        return
-    h = 0.02 * surface.radius[result.station[i]]
-    one, other = np.empty(3), np.empty(3)
-    gap_to(scene, result.row[i], section[0] + h * around, one)
-    gap_to(scene, result.row[i], section[0] - h * around, other)
-    bend = ((one - other) @ around) / (2.0 * h)
-    result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
 
 
 @njit(cache=True)
@@ -272,19 +290,6 @@ def _section_at(sections: np.ndarray, first: int, place: float, share: np.ndarra
             section[v, j] = (
                 share[0] * sections[first, v, j] + share[1] * sections[first + 1, v, j] + share[2] * sections[first + 2, v, j]
             )
-
-
-@njit(cache=True)
-def positions(places: Places, sections: np.ndarray) -> np.ndarray:
-    """Return where the material points of the places (c, 3) are for sections (s, 3, 3)."""
-    result = np.zeros((len(places.row), 3))
-    for i in range(len(places.row)):
-        x, y = places.own[i]
-        for n in range(3):
-            section = sections[places.first[i] + n]
-            for j in range(3):
-                result[i, j] += places.share[i, n] * (section[0, j] + x * section[1, j] + y * section[2, j])
-    return result
 
 
 @njit(cache=True)

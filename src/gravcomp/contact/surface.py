@@ -39,11 +39,11 @@ def contact_surface(robot: Robot) -> ContactSurface:
     """Return the surface of a robot of segments. Raises ValueError for a body from a file."""
     if robot.body is not None:
         raise ValueError("contact needs a robot of segments; a body from a file has no outlines along its axis")
-    middle = robot.piece_at(0.5 * robot.length).section(0.5 * robot.length)[0]
+    middle = robot.piece_at(0.5 * robot.length).visible.section(0.5 * robot.length)[0]
     radius = min(middle.half_width, middle.half_height)
     count = int(np.clip(np.ceil(robot.length / radius), _FEWEST, _MOST))
     place = robot.length * np.arange(1, count + 1) / count
-    outlines = [robot.piece_at(s).section(min(s, robot.length))[0] for s in place]
+    outlines = [robot.piece_at(s).visible.section(min(s, robot.length))[0] for s in place]
     length = np.full(count, robot.length / count)
     length[-1] = 0.5 * length[-1] + radius
     size = np.array([max(outline.half_width, outline.half_height) for outline in outlines])

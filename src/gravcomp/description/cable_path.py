@@ -126,7 +126,7 @@ def _check_wall(key: str, piece: Piece, x: float, y: float, s: float) -> None:
 
 def _check_disks(key: str, piece: Piece, segment: Segment, x: float, y: float, s: float) -> None:
     assert segment.disks is not None  # the caller
-    outline = piece.section(s)[0] if segment.spring is None else segment.hole_of_disks(0.0)
+    outline = piece.visible.section(s)[0]
     radius, reach = math.hypot(x, y), segment.disks.outer_diameter / 2
     if radius > reach:
         raise ValueError(

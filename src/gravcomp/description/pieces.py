@@ -30,7 +30,7 @@ class Piece:
 
     segment: the name of its segment; kind: "transition", "cap" or nothing; start: arc length (m) of its base; length (m);
     outer: outlines at its base and its tip; lumens: the same for each lumen; marks: arc lengths (m) from its base, its ends not
-    among them, where layers of elements must end.
+    among them, where layers of elements must end; coils: outer and inner outline of the spring in whose place it is a tube.
     """
 
     segment: str
@@ -41,6 +41,15 @@ class Piece:
     lumens: tuple[tuple[Outline, Outline], ...]
     material: Material
     marks: tuple[float, ...] = ()
+    coils: tuple[Outline, Outline] | None = None
+
+    @property
+    def visible(self) -> "Piece":
+        """The piece as it is seen and touched: of a spring the coils, not the tube in its place, which is wider."""
+        if self.coils is None:
+            return self
+        outer, inner = self.coils
+        return dataclasses.replace(self, outer=(outer, outer), lumens=((inner, inner),), coils=None)
 
     @property
     def name(self) -> str:
@@ -90,7 +99,8 @@ def pieces_of_segments(segments: Sequence[Segment]) -> list[Piece]:
         if segment.cap:
             outer, lumens = segment.outline(1.0), segment.lumen_outlines(1.0)
             pairs = tuple((lumen, lumen) for lumen in lumens)
-            pieces.append(Piece(segment.name, "cap", start, segment.cap.length, (outer, outer), pairs, segment.cap.material))
+            cap, coils = segment.cap, segment.coils
+            pieces.append(Piece(segment.name, "cap", start, cap.length, (outer, outer), pairs, cap.material, coils=coils))
             start += segment.cap.length
     return pieces
 
@@ -113,7 +123,8 @@ def _piece(segment: Segment, start: float, low: float, high: float) -> Piece:
     outer = segment.outline(low), segment.outline(high)
     lumens = tuple(zip(segment.lumen_outlines(low), segment.lumen_outlines(high)))
     start, length = start + low * segment.length, (high - low) * segment.length
-    return Piece(segment.name, "", start, length, outer, lumens, segment.body_material, _marks(segment, low, high))
+    marks = _marks(segment, low, high)
+    return Piece(segment.name, "", start, length, outer, lumens, segment.body_material, marks, segment.coils)
 
 
 def _marks(segment: Segment, low: float, high: float) -> tuple[float, ...]:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
 from gravcomp.description.default_hardware import has_motors, with_motors
+from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.overlay import on_base, with_whole_path
+from gravcomp.description.pairs import check_pairs
 from gravcomp.description.robot import Robot
 from gravcomp.scene import SceneSection
 
@@ -41,6 +43,13 @@ class RobotFile:
             raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
         section = dict(self.sections.get(name) or {})
         return section if name != "hardware" or has_motors(section) else with_motors(section, self.robot)
+
+    @functools.cached_property
+    def hardware(self) -> Hardware:
+        """The section `hardware`, checked against the robot's cables. Raises ConfigError."""
+        hardware = parse_hardware(self.section("hardware"), source=self.source, cables=self.robot.cable_names)
+        check_pairs(hardware, self.robot, self.source)
+        return hardware
 
     @functools.cached_property
     def scene(self) -> "Scene":
@@ -90,7 +99,7 @@ def load_robot_file(name_or_path: str | Path) -> RobotFile:
     >>> robot.length  # m
     0.1
     """
-    path = _resolve(name_or_path)
+    path = robot_path(name_or_path)
     document = _document(path, ())
     if "robot" not in document:
         raise ConfigError(f"{path}: key 'robot' is missing (the body, its cables and limits)")
@@ -117,7 +126,7 @@ def _document(path: Path, above: tuple[Path, ...]) -> dict:
         raise ConfigError(f"{path}: base is {name!r}; the path of a robot file or the name of a shipped robot is needed")
     near = path.resolve().parent / Path(name).expanduser()
     try:
-        base = (near if near.is_file() else _resolve(name)).resolve()
+        base = (near if near.is_file() else robot_path(name)).resolve()
     except ConfigError as error:
         raise ConfigError(f"{path}: base: {error}") from error
     if base in (*above, path.resolve()):
@@ -130,7 +139,8 @@ def _scene_section(document: dict, source: str) -> SceneSection:
     return from_mapping(SceneSection, document.get("scene"), source=source, key="scene")
 
 
-def _resolve(name_or_path: str | Path) -> Path:
+def robot_path(name_or_path: str | Path) -> Path:
+    """Return the path of a shipped robot's file, or of any other by its path. Raises ConfigError where there is no such file."""
     text = str(name_or_path)
     shipped = shipped_robots()
     if text in shipped:

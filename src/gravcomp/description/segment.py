@@ -105,6 +105,13 @@ class Segment:
         width, height = self._size("width", s.width, s.tip_width, part), self._size("height", s.height, s.tip_height, part)
         return Outline(s.shape, width / 2, height / 2)
 
+    @property
+    def coils(self) -> tuple[Outline, Outline] | None:
+        """Outer and inner outline of a spring; None for any other segment."""
+        if self.spring is None:
+            return None
+        return Outline.circle(self.outer_diameter), Outline.circle(self.outer_diameter - 2 * self.spring.wire_diameter)
+
     def hole_of_disks(self, part: float) -> Outline:
         """Return the outline of the backbone where a disk holds it, at `part` of the length: of a spring its own."""
         return Outline.circle(self.outer_diameter) if self.spring is not None else self.outline(part)

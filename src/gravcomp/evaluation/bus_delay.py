@@ -5,6 +5,7 @@ command's IMU sample. The latency is the time between the last frame of the samp
 kernel of the listener.
 """
 
+import contextlib
 import threading
 import time
 
@@ -57,11 +58,12 @@ class DelayListener:
 
 def delays_during(settings: CanInterface, duration: float) -> list[float]:
     """Listen to a bus for `duration` (s) and return the latencies (s). Raises BusError when it cannot be opened."""
-    link, frames, end = CanLink(settings, _frame_ids()), [], time.monotonic() + duration
-    link.open()
-    while time.monotonic() < end:
-        frames += link.receive(0.05)
-    link.close()
+    frames: list[can.Message] = []
+    with contextlib.closing(CanLink(settings, _frame_ids())) as link:
+        link.open()
+        end = time.monotonic() + duration
+        while time.monotonic() < end:
+            frames += link.receive(0.05)
     return delays_of(frames)
 
 

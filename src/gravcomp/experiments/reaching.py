@@ -1,6 +1,7 @@
 """Runs, figures, tables and drawings that the two experiments in lumens share."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from gravcomp.trials.context import Context
 from gravcomp.trials.holding import GROUND
 from gravcomp.trials.lumen import FED, HELD, WITHOUT, Reach, Reached, run_reach
 
+_WAYS = (WITHOUT, HELD, FED)
+_Triple = tuple[Reached, Reached, Reached]  # of a reach, in these ways
 _BRIEF_REST, _BRIEF_DURATION = 1.0, 1.0  # s, of a reach
 
 
@@ -20,10 +23,44 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
     setup = context.once(calibrate_on_virtual_robot).setup
     if context.brief:
         reaches = (dataclasses.replace(reaches[-1], rest=_BRIEF_REST, duration=_BRIEF_DURATION),)
-    ways = (WITHOUT, HELD, FED)
-    results = context.map(run_reach, [(setup, reach, way) for reach in reaches for way in ways], "reaching through lumens")
+    results = context.map(run_reach, [(setup, reach, way) for reach in reaches for way in _WAYS], "reaching through lumens")
     triples = list(zip(results[::3], results[1::3], results[2::3]))
     pairs = [triple[:2] for triple in triples]
+    return Result(
+        name=name,
+        title=title,
+        question=question,
+        ground=GROUND,
+        figures=_figures(triples),
+        parts=[
+            Plot(
+                "Bodies in the lumen",
+                _bodies(pairs),
+                "Section of the lumen in its plane of bending (first of each pair) and across it; vermilion with compensation,"
+                " pink without; at three times.",
+            ),
+            Plot(
+                "Over the depth",
+                _courses(pairs),
+                "Smallest clearance to the wall and camera axis error over the depth of the tip.",
+            ),
+            _table(triples),
+        ],
+        parameters={reach.name: _parameters(reach) for reach in reaches},
+        notes=[
+            "Cables only pull: bending the robot also shortens it, by some millimetres at the end of a bend, with compensation"
+            " and without. No cable can compensate this; advancing the base can, by the shortening that the model predicts"
+            " (base fed). The shortening is part of the tip error, not of the lateral error.",
+            "Bodies in the lumen, clearance and tip errors: the base moves as given, and there is no wall, so that only the"
+            " compensation forms the robot. A negative clearance is the depth by which the robot would enter a wall; none of"
+            " these runs counts as reached. The runs in which a person steers have the wall.",
+            "Without compensation: the cables that bend the weightless robot along the lumen are pulled in, the others are"
+            " released.",
+        ],
+    )
+
+
+def _figures(triples: list[_Triple]) -> list[Figure]:
     figures = []
     for without, held, fed in triples:
         gain = float(without.tip_error.mean() / held.tip_error.mean())
@@ -49,6 +86,10 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
             ),
             Figure(f"{held.reach.name}: camera axis error, mean", float(np.degrees(held.camera.mean())), "deg"),
         ]
+    return figures
+
+
+def _table(triples: list[_Triple]) -> Table:
     rows = [
         (
             r.reach.name,
@@ -62,71 +103,41 @@ def reaching(context: Context, name: str, title: str, question: str, reaches: tu
             float(np.degrees(r.camera.max())),
         )
         for triple in triples
-        for kind, r in zip(ways, triple)
+        for kind, r in zip(_WAYS, triple)
     ]
-    return Result(
-        name=name,
-        title=title,
-        question=question,
-        ground=GROUND,
-        figures=figures,
-        parts=[
-            Plot(
-                "Bodies in the lumen",
-                _bodies(pairs),
-                "Section of the lumen in its plane of bending (first of each pair) and across it; vermilion with compensation,"
-                " pink without; at three times.",
-            ),
-            Plot(
-                "Over the depth",
-                _courses(pairs),
-                "Smallest clearance to the wall and camera axis error over the depth of the tip.",
-            ),
-            Table(
-                "With and without compensation",
-                (
-                    "lumen",
-                    "compensation",
-                    "smallest clearance, mm",
-                    "mean clearance, mm",
-                    "tip from centreline, mm",
-                    "tip error, mm",
-                    "lateral, mm",
-                    "camera error, deg",
-                    "largest, deg",
-                ),
-                rows,
-                "Tip error: distance to the target in soft_base; lateral: its part across the target direction, without the"
-                " shortening. Base fed: the base is advanced by the shortening that the model predicts. Tip from centreline"
-                " and clearance: in the lumen's frame, so they include the tremor of the base, which no cable can compensate.",
-            ),
-        ],
-        parameters={
-            reach.name: {
-                "inlet_mm": 1e3 * reach.lumen.inlet,
-                "radius_mm": 1e3 * reach.lumen.radius,
-                "plane_deg": float(np.degrees(reach.lumen.plane)),
-                "diameter_mm": 1e3 * reach.lumen.diameter,
-                "inclination_deg": reach.inclination,
-                "roll_deg": reach.roll,
-                "tip from mm": 1e3 * reach.first,
-                "to mm": 1e3 * reach.last,
-                "duration_s": reach.duration,
-                "trembling hand": reach.hand,
-            }
-            for reach in reaches
-        },
-        notes=[
-            "Cables only pull: bending the robot also shortens it, by some millimetres at the end of a bend, with compensation"
-            " and without. No cable can compensate this; advancing the base can, by the shortening that the model predicts"
-            " (base fed). The shortening is part of the tip error, not of the lateral error.",
-            "Bodies in the lumen, clearance and tip errors: the base moves as given, and there is no wall, so that only the"
-            " compensation forms the robot. A negative clearance is the depth by which the robot would enter a wall; none of"
-            " these runs counts as reached. The runs in which a person steers have the wall.",
-            "Without compensation: the cables that bend the weightless robot along the lumen are pulled in, the others are"
-            " released.",
-        ],
+    return Table(
+        "With and without compensation",
+        (
+            "lumen",
+            "compensation",
+            "smallest clearance, mm",
+            "mean clearance, mm",
+            "tip from centreline, mm",
+            "tip error, mm",
+            "lateral, mm",
+            "camera error, deg",
+            "largest, deg",
+        ),
+        rows,
+        "Tip error: distance to the target in soft_base; lateral: its part across the target direction, without the"
+        " shortening. Base fed: the base is advanced by the shortening that the model predicts. Tip from centreline"
+        " and clearance: in the lumen's frame, so they include the tremor of the base, which no cable can compensate.",
     )
+
+
+def _parameters(reach: Reach) -> dict[str, Any]:
+    return {
+        "inlet_mm": 1e3 * reach.lumen.inlet,
+        "radius_mm": 1e3 * reach.lumen.radius,
+        "plane_deg": float(np.degrees(reach.lumen.plane)),
+        "diameter_mm": 1e3 * reach.lumen.diameter,
+        "inclination_deg": reach.inclination,
+        "roll_deg": reach.roll,
+        "tip from mm": 1e3 * reach.first,
+        "to mm": 1e3 * reach.last,
+        "duration_s": reach.duration,
+        "trembling hand": reach.hand,
+    }
 
 
 def _bodies(pairs: list[tuple[Reached, Reached]]) -> str:

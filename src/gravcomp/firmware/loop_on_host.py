@@ -33,7 +33,7 @@ def run_on_host(model: RobotModel, parameters: LoopParameters, gravities: np.nda
 
     Before that the first one rises from zero over LOADING_STEPS, and the command with it. rise: these steps are rows, too.
     """
-    simulator, target = Simulator(model), parameters.straight
+    simulator, target = Simulator(model), parameters.at_rest
     controller = InverseController(model.robot, parameters.controller.inverse)
     wound = np.zeros(len(model.robot.cables))
     controller.reset(wound)

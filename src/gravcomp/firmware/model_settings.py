@@ -7,13 +7,14 @@ import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.external_loads.options import BaseTurnOptions
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
-from gravcomp.inverse.target import Target, direction_weight, straight_target
+from gravcomp.inverse.rest_target import rest_target
+from gravcomp.inverse.target import Target, direction_weight
 from gravcomp.orientation import quaternion as quat
 
 SAMPLE_PERIOD = 0.01  # s, of the board's IMU
@@ -46,16 +47,14 @@ class LoopParameters:
                 f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
                 " that on the board has neither"
             )
-        hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
         turn = section(FemSimulatorParameters, "fem_simulator").turn
-        return cls(file.source, file.robot, estimator, controller, hardware, turn)
+        return cls(file.source, file.robot, estimator, controller, file.hardware, turn)
 
     @property
-    def straight(self) -> Target:
-        """The straight robot with the controller's weights, which the board keeps until another target arrives."""
-        length = self.robot.length
-        weight = direction_weight(length, self.controller.tip_direction_weight)
-        return straight_target(length, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight)
+    def at_rest(self) -> Target:
+        """The shape at rest with the controller's weights, which the board keeps until another target arrives."""
+        weight = direction_weight(self.robot.length, self.controller.tip_direction_weight)
+        return rest_target(self.robot, tip_position_weight=self.controller.tip_position_weight, tip_direction_weight=weight)
 
 
 def least_tensions(parameters: LoopParameters) -> np.ndarray:
@@ -80,10 +79,10 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
 def settings(parameters: LoopParameters, reach: float, joystick_bend: float, turn: BaseTurn, law_share: int = 1) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
-    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; turn: of the robot's model; law_share: points of a law of rubber of which
-    a step computes the stiffness. Raises ConfigError for motors that are shared.
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; turn: of the robot's model; law_share: points
+    of a law of rubber of which a step computes the stiffness. Raises ConfigError for motors that are shared.
     """
-    robot, wanted = parameters.robot, parameters.straight
+    robot, wanted = parameters.robot, parameters.at_rest
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
     calibration, prediction = parameters.estimator.calibration, parameters.estimator.prediction
     numbers = motor_numbers(parameters)

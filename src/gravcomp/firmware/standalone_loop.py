@@ -39,9 +39,9 @@ class RawResult(ctypes.Structure):
 class LoopResult:
     """What the loop computed.
 
-    gravity (3,) and turning (3,), what turns of the base add, in m/s^2; tip (3,) in m; all in soft_base; displacement (m,) in m and tension (m,) in N of the command; left:
-    estimated distance of the model's tip from its equilibrium in m; code: of gravcomp_msgs/ControllerStatus; solver_steps: of the
-    quadratic programme.
+    gravity (3,) and turning (3,), what turns of the base add, in m/s^2, and tip (3,) in m, all in soft_base; displacement (m,) in
+    m and tension (m,) in N of the command; left: estimated distance of the model's tip from its equilibrium in m; code: of
+    gravcomp_msgs/ControllerStatus; solver_steps: of the quadratic programme.
     """
 
     gravity: np.ndarray
@@ -110,9 +110,9 @@ class StandaloneLoop:
         return self._library.gc_loop_weigh(self._at, stamp_us, _floats(gyro), _floats(accel))
 
     def follow(self, interval: float, gravity: Sequence[float] | None = None) -> bool:
-        """Go to the estimated gravity with what turns of the base add, or to a given one (3,) in m/s^2, `interval` s after the last step.
+        """Go to the estimated gravity with what turns of the base add, `interval` s after the last step.
 
-        Returns whether there is a command.
+        gravity (3,) in m/s^2: in place of these. Returns whether there is a command.
         """
         return self._library.gc_loop_follow(self._at, None if gravity is None else _floats(gravity), interval)
 

@@ -63,6 +63,7 @@ class FullContact:
         """Forget the forces: nothing touches."""
         self.force = np.zeros((len(self.arrays.kind), self.surface.slots, 3))
         self._start = self.sections_at_rest
+        self._none_pressed = np.zeros(self.force.shape[:2], dtype=np.bool_)  # here those that press have no gap
         self.longest = np.inf
         self.pull, self.settled = np.zeros(3 * self._model.n_free), True
         self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -119,7 +120,7 @@ class FullContact:
         directions, friction, slid = self._directions(places, turns, moves), np.zeros(0), np.zeros(0)
         arrays, count = self.arrays, len(places.row)
         if self.rubbing:
-            friction, slid = rubbing(arrays, self.surface, places, self._start, sections, TOUCHED)
+            friction, slid = rubbing(arrays, self.surface, places, self._start, sections, TOUCHED, self._none_pressed)
         columns = np.hstack([answer, factor.solve(directions.T)])
         rows = np.vstack([jacobian, directions])
         whole = rows @ columns

@@ -15,14 +15,25 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh import MeshError
 from gravcomp.mesh.refinement import refined
 
+# The most multiplications of one factor of the finer mesh, about five seconds of one core: a load takes some ten to a hundred.
+_MOST_WORK = 2e11
+
 
 def error_of_mesh(robot: Robot) -> float:
     """Return the largest distance of the tips over the robot's length, over the loads of `mesh_loads`.
 
-    Raises MeshError where one of the meshes finds no equilibrium, and for a mesh of hexahedra from a file.
+    Raises MeshError where one of the meshes finds no equilibrium, for a mesh of hexahedra from a file, and where the finer mesh
+    is too large to be solved in a few minutes.
     """
     model = RobotModel(robot)
-    finer, loads = _twice_as_fine(model), mesh_loads(model)
+    finer = _twice_as_fine(model)
+    work = float((finer.pattern.size.astype(float) ** 3).sum())
+    if work > _MOST_WORK:
+        raise MeshError(
+            f"the mesh twice as fine has {finer.pattern.n} unknowns in {len(finer.pattern.size)} levels: a step takes"
+            f" {work / _MOST_WORK:.1f} times as long as allowed, and the error is not measured; `model info` prints an estimate"
+        )
+    loads = mesh_loads(model)
     for _ in range(TIMES):
         coarse = shapes_under(model, loads)
         here, there = coarse.tips, shapes_under(finer, loads, near=coarse).tips

@@ -23,8 +23,9 @@ _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
 _SAFE = 0.7
-# A load is followed in steps of its parts: the first one, the largest and the smallest; Newton's iterations of each.
-_STEP, _LARGEST, _SMALLEST, _ITERATIONS = 0.125, 0.25, 1.0 / 256.0, 10
+# A load is followed in steps of its parts: the first one, the largest and the smallest; Newton's iterations of each, and the
+# most steps, with those that fail.
+_STEP, _LARGEST, _SMALLEST, _ITERATIONS, _MOST_STEPS = 0.125, 0.25, 1.0 / 256.0, 10, 40
 # The tension grows by this factor from step to step, from this part of its limit; by the small one where that is too much.
 _FACTOR, _SMALL_FACTOR, _FIRST = 1.35, 1.08, 0.01
 
@@ -104,17 +105,19 @@ def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape:
 
 
 def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
-    """Follow the equilibrium of the straight robot up to the load; returns whether there is one."""
+    """Follow the equilibrium of the straight robot up to the load; returns whether there is one within the steps allowed."""
     done, step = 0.0, _STEP
-    while done < 1.0:
+    for _ in range(_MOST_STEPS):
         before, part = solver.state, min(1.0, done + step)
         if solver.track(part * load.gravity, CableInput(tension=part * load.tension), _ITERATIONS).converged:
             done, step = part, min(1.5 * step, _LARGEST)
+            if done >= 1.0:
+                return True
             continue
         solver.state, step = before, step / 2.0
         if step < _SMALLEST:
-            return False
-    return True
+            break
+    return False
 
 
 def _bending_tension(model: MeshedModel) -> np.ndarray | None:

@@ -56,13 +56,15 @@ class Viscosity:
         else:
             rate, past = 1.5 / h, (4.0 * strain - strain_before) / (2.0 * h)
         creep = self.creep(strain, held, h)
-        return ViscousStrain(creep.factor + rate * self._damping_time[:, 0, 0], creep.past + self._damping_time * past)
+        damping_time = self._damping_time[:, 0, 0]
+        return ViscousStrain(creep.factor + rate * damping_time, creep.past + self._damping_time * past, damping_time > 0.0)
 
     def creep(self, strain: np.ndarray, held: np.ndarray, h: float) -> ViscousStrain:
         """Return the viscous strain at the end of a step of h s from `strain` (k, p, 6) and `held`, at rest."""
         decay, gain = branch(h, self._time)
         past = (self._ratio * (gain * strain - decay * held)).sum(axis=0) if self.creeps else np.zeros_like(strain)
-        return ViscousStrain((self._ratio * gain).sum(axis=0)[:, 0, 0], past)
+        factor = (self._ratio * gain).sum(axis=0)[:, 0, 0]
+        return ViscousStrain(factor, past, np.zeros(len(factor), bool))
 
     def relaxed(self, strain: np.ndarray) -> np.ndarray:
         """Return what the branches hold when they have relaxed: zeros (b, k, p, 6) for the strain (k, p, 6)."""

@@ -1,4 +1,4 @@
-"""A first estimate of the tensions that hold the straight robot, from its linear response at rest to gravity and cables.
+"""A first estimate of the tensions that keep the robot's shape at rest, from its linear response there to gravity and cables.
 
 One factorisation gives the responses to gravity along three axes and to every cable; then each direction of gravity takes one
 quadratic programme.
@@ -12,15 +12,15 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.programme import build_programme
+from gravcomp.inverse.rest_target import rest_target
 from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver
-from gravcomp.inverse.target import straight_target
 
 _INVERSE = InverseOptions(axial_weight=0.0, proximal_weight=0.0)
 
 
 class LinearHolding:
-    """The straight robot's linear response, for any direction of gravity."""
+    """The linear response of the robot at rest, for any direction of gravity."""
 
     def __init__(self, model: RobotModel, answer: np.ndarray, limits: Limits):
         """answer (3 n_free, 3 + m): as `Tangent.answer`; limits: within which tensions are searched for, without rates."""
@@ -32,7 +32,8 @@ class LinearHolding:
         lengths = tendons.jacobian @ answer
         self._path_by_gravity = lengths[:, :3]
         self._compliance = lengths[:, 3:] + np.diag(model.tendons.stretch(tendons))
-        self._target = straight_target(model.length)
+        self._target = rest_target(model.robot)
+        self._along = self._target.direction_or_zeros
         self._solver = ProgrammeSolver()
 
     def tension(self, gravity: np.ndarray) -> tuple[np.ndarray, float]:
@@ -59,4 +60,4 @@ class LinearHolding:
             solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper
         )
         error = self._by_tension[:3] @ tension + self._by_gravity[:3] @ gravity
-        return tension, float(np.hypot(error[0], error[1]))
+        return tension, float(np.linalg.norm(error - (error @ self._along) * self._along))

@@ -9,7 +9,8 @@ from gravcomp.holdability.limits import unlimited_rates
 from gravcomp.holdability.linear import LinearHolding
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.path import HoldPath, PathPoint
-from gravcomp.inverse.target import Target, straight_target
+from gravcomp.inverse.rest_target import rest_target
+from gravcomp.inverse.target import Target
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 # A path that ends with an eigenvalue that reaches zero within this many of its least steps ends by buckling.
@@ -23,12 +24,12 @@ class HoldSearch:
     """Finds answers for one robot and target. The answer for a direction does not depend on those before it."""
 
     def __init__(self, model: RobotModel, target: Target | None = None, options: HoldOptions | None = None):
-        """target: default the straight tip; options: default `HoldOptions()`. Raises ValueError for a robot without cables."""
+        """target: default the tip at rest; options: default `HoldOptions()`. Raises ValueError for a robot without cables."""
         if not model.robot.cables:
             raise ValueError(f"robot '{model.robot.name}' has no cables, so nothing holds it")
         self.model, self.robot = model, model.robot
         self.options = options or HoldOptions()
-        self.target = target or straight_target(model.length)
+        self.target = target or rest_target(model.robot)
         self.path = HoldPath(model, self.target, self.options)
         self.limits = unlimited_rates(self.robot.limits)
         self.wide = unlimited_rates(self.robot.limits, self.options.beyond)

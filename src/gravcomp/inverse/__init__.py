@@ -9,6 +9,7 @@ configure_numba()
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.rest_target import rest_target
 from gravcomp.inverse.solver import SolverFailed
 from gravcomp.inverse.status import ControllerCode, Holdable
 from gravcomp.inverse.target import Target, TargetError, bend_target, direction_weight, straight_target
@@ -25,6 +26,7 @@ __all__ = [
     "TargetError",
     "bend_target",
     "direction_weight",
+    "rest_target",
     "straight_target",
     "warm_up",
 ]

@@ -73,11 +73,8 @@ def private_channels(robot: str) -> str:
     """Return channels for the buses of a robot that no other run on this host uses, separated by commas. Raises ConfigError."""
     from gravcomp.canbus.multicast import private_channel
     from gravcomp.description import load_robot_file
-    from gravcomp.description.hardware import parse_hardware
 
-    file = load_robot_file(robot)
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-    return ",".join(private_channel() for _ in hardware.all_buses)
+    return ",".join(private_channel() for _ in load_robot_file(robot).hardware.all_buses)
 
 
 def check_robot_file(robot: str, seed: int | None = None) -> str:
@@ -86,11 +83,8 @@ def check_robot_file(robot: str, seed: int | None = None) -> str:
     Returns what the virtual robot is, in one sentence; `seed` replaces the file's.
     """
     from gravcomp.description import load_robot_file
-    from gravcomp.description.hardware import parse_hardware
-    from gravcomp.description.pairs import check_pairs
     from gravcomp.virtual.described import described
 
     file = load_robot_file(robot)
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
-    check_pairs(hardware, file.robot, file.source)
+    _ = file.hardware  # reading it checks it
     return described(file, seed).draw().summary()

@@ -27,7 +27,7 @@ from gravcomp.load_estimation.load_filter import LoadFilter
 from gravcomp.load_estimation.options import LoadEstimationOptions
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.load_estimation.tension_check import TensionCheck
-from gravcomp.mesh.robot_axis import rest_axis
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _KEPT = 2.0  # s of predictions, for measurements that arrive late
@@ -75,7 +75,7 @@ class LoadObserver:
 
     def __init__(self, robot: Robot, options: LoadEstimationOptions):
         self._robot, self.options = robot, options
-        self._rest_tip = rest_axis(robot).frames(np.array([robot.length]))[0][0]
+        self._rest_tip = rest_tip(robot)[0]
         self.reset()
 
     def reset(self) -> None:

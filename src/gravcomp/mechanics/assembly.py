@@ -1,7 +1,7 @@
 """Internal forces, tangent stiffness and energy, summed over the quadrature points of all elements; compiled by Numba.
 
-Arguments that all functions share: u (n, 3) displacements; solid; moving: whether damping and creep act, with factor (k,) and
-past (k, p, 6) of `ViscousStrain`.
+Arguments that all functions share: u (n, 3) displacements; solid; moving: whether damping and creep act, with factor (k,),
+past (k, p, 6) and damped (k,) of `ViscousStrain`.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,6 @@ from gravcomp.mechanics.kinematics import deformation_gradient, green_strain, st
 from gravcomp.mechanics.viscous_strain import add_viscous_stress
 from gravcomp.rounding import REORDERED
 
-_OF_CREEP = 1.0  # of the stiffness: branches of creep stiffen a body by less, damping over a short step by more
 _LARGEST_FIRST = 9.0  # lambda / mu of damping and creep: that of Poisson's ratio 0.45
 
 
@@ -78,8 +77,8 @@ def add_internal_force(
 
 @njit(cache=True, fastmath=REORDERED)
 def add_force_and_stiffness(
-    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, origin: np.ndarray, foreseen: bool, solid: Solid,
-    force: np.ndarray, position: np.ndarray, values: np.ndarray,
+    u: np.ndarray, moving: bool, factor: np.ndarray, past: np.ndarray, damped: np.ndarray, origin: np.ndarray, foreseen: bool,
+    solid: Solid, force: np.ndarray, position: np.ndarray, values: np.ndarray,
 ) -> None:  # fmt: skip
     """Add internal forces to force (n, 3) and the tangent stiffness to `values` at `position` (of `scatter_positions`).
 
@@ -147,7 +146,7 @@ def add_force_and_stiffness(
                     pressure = bulk_modulus(solid.constants[k]) * mean_step
                     for m in range(6):
                         s[m] += pressure * slope[m]
-                if moving and factor[k] < _OF_CREEP:
+                if moving and not damped[k]:
                     for m in range(6):
                         e[m] += step[m]
                     add_viscous_stress(factor[k], past[k, p], first, shear, e, s)

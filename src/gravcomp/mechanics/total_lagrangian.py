@@ -47,7 +47,8 @@ class SolidElements:
             self.averaged,
         )
         self._position = scatter_positions(mesh.elements, pattern)
-        self._elastic = ViscousStrain(np.zeros(len(self.weights)), np.zeros((*self.weights.shape, 6)))
+        count = len(self.weights)
+        self._elastic = ViscousStrain(np.zeros(count), np.zeros((*self.weights.shape, 6)), np.zeros(count, bool))
 
     def scale_stiffness(self, factor: np.ndarray) -> None:
         """Multiply the modulus of every element by `factor` (k,), that of its fibres as well."""
@@ -73,14 +74,14 @@ class SolidElements:
         With `origin` (n, 3), the displacements of the last iterate, the stress in grad N . S grad N is the one that the last
         Newton step predicted, S + D B du with S and D at its origin. Then the spurious stretch of a straight step along a curved
         path does not stiffen the next step (Magisano, Leonetti, Garcea 2017, mixed integration points). The stress of creep is
-        predicted alike. That of damping is then left out of that term: along the axis it is an artefact of the iteration and can
-        make the tangent indefinite.
+        predicted alike. In elements with damping both are left out of that term: the stress of damping along the axis is an
+        artefact of the iteration and can make the tangent indefinite.
         """
         force = np.zeros_like(u)
         strain = viscous or self._elastic
         assembly.add_force_and_stiffness(
-            u, viscous is not None, strain.factor, strain.past, u if origin is None else origin, origin is not None, self._solid,
-            force, self._position, matrix.values,
+            u, viscous is not None, strain.factor, strain.past, strain.damped, u if origin is None else origin,
+            origin is not None, self._solid, force, self._position, matrix.values,
         )  # fmt: skip
         return force
 

@@ -16,10 +16,14 @@ from gravcomp.rounding import REORDERED
 
 @dataclasses.dataclass(frozen=True)
 class ViscousStrain:
-    """factor (k,) of the present strain of each element, past (k, p, 6) to subtract at each quadrature point."""
+    """factor (k,) of the present strain of each element, past (k, p, 6) to subtract at each quadrature point.
+
+    damped (k,): whether damping is in both; if not, they are those of creep alone.
+    """
 
     factor: np.ndarray
     past: np.ndarray
+    damped: np.ndarray
 
 
 @njit(cache=True, fastmath=REORDERED)

@@ -39,6 +39,10 @@ class Embedding:
         rank[order] = np.arange(len(order))
         return dataclasses.replace(self, nodes=rank[self.nodes])
 
+    def of(self, which: np.ndarray) -> "Embedding":
+        """Return the points that are `which` (p,)."""
+        return Embedding(self.nodes[which], self.weights[which], self.outside[which])
+
 
 def embed(mesh: Mesh, points: np.ndarray) -> Embedding:
     """Attach each of the points (p, 3) to the mesh.

@@ -1,5 +1,7 @@
 """The axis of a robot at rest, from its segments or from the file of its body."""
 
+import numpy as np
+
 from gravcomp.description import Robot
 from gravcomp.rest_axis import Arc, RestAxis
 
@@ -16,3 +18,9 @@ def rest_axis(robot: Robot) -> RestAxis:
             arcs.append(Arc(segment.cap.length))
     axis = RestAxis(tuple(arcs))
     return axis if axis.bent else RestAxis()
+
+
+def rest_tip(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return position (3,) in m and direction (3,) of the tip at rest. Raises MeshError."""
+    position, rotation = rest_axis(robot).frames(np.array([robot.length]))
+    return position[0], rotation[0, :, 2]

@@ -42,6 +42,21 @@ def section_functionals(mesh: Mesh, heights: np.ndarray) -> np.ndarray:
     return np.concatenate([known[height] for height in heights.tolist()] or [np.zeros((0, len(mesh.nodes)))])
 
 
+def is_one_region(mesh: Mesh, height: float) -> bool:
+    """Return whether the elements at a height are connected: a body that forks has sections of several regions."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    z = mesh.straight[mesh.elements][:, :, 2]
+    slack = 1e-9 * mesh.length
+    cut = mesh.elements[(z.min(axis=1) <= height + slack) & (z.max(axis=1) >= height - slack)]
+    used, numbers = np.unique(cut, return_inverse=True)
+    element = np.repeat(np.arange(len(cut)), cut.shape[1])
+    shape = (len(cut) + len(used),) * 2
+    links = coo_array((np.ones(cut.size), (element, len(cut) + numbers.ravel())), shape=shape)
+    return len(cut) > 0 and int(connected_components(links, directed=False)[0]) == 1
+
+
 def _known_of(mesh: Mesh) -> dict[float, np.ndarray]:
     """Return the known functionals by height of a mesh with these nodes and elements, to be added to."""
     if mesh.axis.bent or len(mesh.nodes) > _LARGEST:  # a bent axis is more than the nodes

@@ -85,7 +85,9 @@ def _mesh(path: Path) -> RawMesh:
         # meshio prints its warnings.
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             content = meshio.read(path)
-    except (Exception, SystemExit) as error:  # its readers pass on what fails in them, and may ask to exit
+    except SystemExit as error:  # where none of its readers reads the file, it prints so and asks to exit
+        raise MeshError(f"{path}: cannot be read as a mesh: its content is not what '{path.suffix}' stands for") from error
+    except Exception as error:  # its readers pass on what fails in them
         raise MeshError(f"{path}: cannot be read as a mesh: {error or type(error).__name__}") from error
     nodes = np.asarray(content.points, dtype=float)
     if nodes.ndim != 2 or nodes.shape[1] != 3:

@@ -103,7 +103,11 @@ class BiasTemperatureModel:
                 model._bins[round(values[1])] = values
         except FileNotFoundError:
             return model
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except OSError as error:
+            raise BiasModelError(f"{path}: cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise BiasModelError(f"{path}: is not a bias model: it is not a UTF-8 text file") from error
+        except (ValueError, KeyError, TypeError) as error:
             raise BiasModelError(f"{path}: is not a bias model ({error}); delete it to learn the bias again") from error
         return model
 

@@ -1,8 +1,17 @@
 """Contact of the reduced model with the obstacles of a scene: the method of `full_model.contact` in r unknowns, compiled.
 
 The stations' p, f_1 and f_2 are linear in q. A factor is used for a second step where the first one was short. The equilibrium is
-reached when a step moves no station by more than the tolerance, or, after a short one, when neither the forces out of balance, by
-the last factor, nor the gaps at the new shape ask for more than a part of that.
+reached when a step moves no station by more than the tolerance.
+
+A step that is near is followed by corrections, which keep its places, its factor and its compliance S: only the forces out of
+balance are new, and the gaps and normals at the same stations. Let C_0 be the rows of the places in S, and C_1 those with
+the new normals. The forces f of the last solution act along C_1; those of the next one are sought along C_0,
+
+    A dq = w - f_el(q) + (C_1 - C_0)^T f + C_0^T f',        v = S f' + C_0 A^-1 (w - f_el(q) + (C_1 - C_0)^T f),
+
+so that the forces act along C_1 where they change no more. Corrections shrink like the part by which normals and stiffness have
+changed, and take a fifth of the time of a step. After a step that is longer than the margin within which places are candidates,
+it is seen whether another station has come into an obstacle.
 """
 
 from typing import NamedTuple
@@ -12,14 +21,15 @@ from numba import njit
 
 from gravcomp.contact.condensed import contact_forces
 from gravcomp.contact.contacts import Contacts
+from gravcomp.contact.moved_places import follow, unseen_depth
 from gravcomp.contact.place_forces import (
     Pressed,
     forces_at,
-    missed,
     pressed_places,
     remember,
     remembered,
     rubbing,
+    slid_by,
     turning,
     yielding,
 )
@@ -28,22 +38,24 @@ from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import TOUCHED, FullContact
 from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.contact_rows import directions_of, pull_of
 from gravcomp.reduction.law_deviation import KeptStiffness, forget
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
+from gravcomp.reduction.reduced_cables import add_stiffness, stretch
 from gravcomp.rounding import REORDERED
 from gravcomp.scene.distance import SceneArrays
 
 # A factor is used again after a step below this part of the longest one.
 _SHORT = 0.05
-# Of the tolerance: what is left after a step that is not repeated.
-_LEFT = 0.2
+# Corrections of a step, and the part of the last one to which each has to shrink.
+_CORRECTIONS, _CONTRACTION = 4, 0.3
 
 
 class Touching(NamedTuple):
     """What contact needs: scene, surface, rest (s, 3, 3) and change (9 s, r) of the stations' p, f_1, f_2; and the memory.
 
-    start (s, 3, 3): stations at the last equilibrium; force (k, slots, 3) in N: of `places.remember`; pull (1, r): force of
-    contact on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer places are candidates.
+    start (s, 3, 3): stations at the last equilibrium; pressed (k, slots): what pressed there; force (k, slots, 3) in N: of
+    `remember`; pull (1, r): force of contact on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer
+    places are candidates.
     """
 
     scene: SceneArrays
@@ -51,10 +63,33 @@ class Touching(NamedTuple):
     rest: np.ndarray
     change: np.ndarray
     start: np.ndarray
+    pressed: np.ndarray
     force: np.ndarray
     pull: np.ndarray
     rubs: bool
     margin: float
+
+
+class Step(NamedTuple):
+    """What a Newton step from q (r,) with k rows of cables, places and turning has found, for its corrections.
+
+    q (r,); moving: first of the rows of places that move along the robot; factor (r, r) of the stiffness; rows (k, r); answers
+    (r, k) = A^-1 rows^T; compliance (k, k); cable_force (m, r): Jacobian of the cables' forces; bend, friction and softness of
+    `contact.condensed`; wound and given: of `CableInput.arrays`.
+    """
+
+    q: np.ndarray
+    moving: int
+    factor: np.ndarray
+    rows: np.ndarray
+    answers: np.ndarray
+    compliance: np.ndarray
+    cable_force: np.ndarray
+    bend: np.ndarray
+    friction: np.ndarray
+    softness: np.ndarray
+    wound: np.ndarray
+    given: np.ndarray
 
 
 class ReducedContact:
@@ -89,8 +124,8 @@ class ReducedContact:
         full = self._full
         scene = full.place(gravity)
         return Touching(
-            scene, full.surface, self._rest, self._change, self.sections(q), self.force.copy(), self._pull.copy(),
-            full.rubbing, full.margin,
+            scene, full.surface, self._rest, self._change, self.sections(q), self.force.any(axis=2), self.force.copy(),
+            self._pull.copy(), full.rubbing, full.margin,
         )  # fmt: skip
 
     def keep(
@@ -164,14 +199,16 @@ def tracked_touching(
         turns, moves, bend = turning(places, pressed)
         friction, slid = np.zeros(0), np.zeros(0)
         if touching.rubs:
-            friction, slid = rubbing(touching.scene, touching.surface, places, touching.start, sections, TOUCHED)
-        directions = _directions(places, change, len(slid) > 0, turns, moves)
+            friction, slid = rubbing(
+                touching.scene, touching.surface, places, touching.start, sections, TOUCHED, touching.pressed
+            )
+        directions = directions_of(places, change, len(slid) > 0, turns, moves)
         rows = np.empty((m + len(directions), r))
         rows[:m], rows[m:] = point.tendons.jacobian, directions
-        moved = np.ascontiguousarray(directions.T)
-        solve(factor, moved)
+        of_places = np.ascontiguousarray(directions.T)
+        solve(factor, of_places)
         answers = np.empty((r, len(rows)))
-        answers[:, :m], answers[:, m:] = of_cables, moved
+        answers[:, :m], answers[:, m:] = of_cables, of_places
         whole = rows @ answers
         free = rows @ y
         for a in range(m):
@@ -182,38 +219,55 @@ def tracked_touching(
         force, by_tension, held, settled = contact_forces(
             whole, free, wound, given, tension, places.gap, softness, friction, bend, pressed, rub
         )
+        plain = count + len(slid)  # rows of the places' forces; the others are those of turning
         touching.pull[0] = force[m:] @ directions
-        forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + count + len(slid)].copy())
-        remember(places, forces, touching.force)
-        pressing = by_tension[m : m + count].copy()
-        compliance = np.ascontiguousarray(whole[:m]) @ by_tension
-        answer = np.ascontiguousarray((answers @ by_tension).T)
-        step = y + answers @ force
+        forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + plain].copy())
+        step, cable_force = y + answers @ force, point.tendons.force_jacobian
         wide = (change @ step).reshape(stations, 3, 3)[:, 0]
         size = np.sqrt((wide**2).sum(axis=1).max())
         if not np.isfinite(size):
             break
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
+        origin = q
         q, tension = q + share * step, tension + share * (force[:m] - tension)
         point = point_at(body, q, pulling)
         sections = rest + (change @ q).reshape(stations, 3, 3)
         before = share * size
         reuse = not rough and before < _SHORT * longest_step
-        if rough or not settled or size >= near:
-            continue
-        out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
-        out += touching.pull[0]
-        if size >= tolerance:
-            further = out.copy()
-            solve(factor, further.reshape(r, 1))
-            if not len(given):
-                further += lacking(cables, point.tendons, tension, compliance, wound) @ answer
-            wide = (change @ further).reshape(stations, 3, 3)[:, 0]
-            off = missed(touching.scene, places, softness, force[m : m + count], sections)
-            if max(np.sqrt((wide**2).sum(axis=1).max()), off) > _LEFT * tolerance:
-                continue
-        converged, residual = True, np.sqrt(out @ (body.force_norm @ out))
-        break
+        if not rough and settled and size < near:
+            linear = Step(
+                origin, m + plain + len(turns), factor, rows, answers, whole, cable_force, bend, friction, softness, wound, given
+            )
+            way = size
+            for _ in range(_CORRECTIONS):
+                if size < tolerance:
+                    break
+                out = weight - elastic_force(point, scale * point.strain + offset)
+                lag, step, corrected, by_tension, held, settled = _corrected(
+                    linear, touching, places, out, point, q, tension, force, sections
+                )
+                wide = (change @ step).reshape(stations, 3, 3)[:, 0]
+                shift = np.sqrt((wide**2).sum(axis=1).max())
+                if not settled or not shift < _CONTRACTION * size:
+                    break
+                force, size, way = corrected, shift, way + shift
+                touching.pull[0] = lag + force[m:] @ directions
+                forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + plain].copy())
+                q, tension = q + step, force[:m].copy()
+                point = point_at(body, q, pulling)
+                sections = rest + (change @ q).reshape(stations, 3, 3)
+            converged = size < tolerance and (
+                way < touching.margin or unseen_depth(touching.scene, touching.surface, places, sections, tolerance) < tolerance
+            )
+        remember(places, forces, touching.force)
+        if converged:
+            pressing = by_tension[m : m + count].copy()
+            compliance = np.ascontiguousarray(whole[:m]) @ by_tension
+            answer = np.ascontiguousarray((answers @ by_tension).T)
+            out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
+            out += touching.pull[0]
+            residual = np.sqrt(out @ (body.force_norm @ out))
+            break
     if not converged:
         point = start
         forget(kept)
@@ -223,43 +277,32 @@ def tracked_touching(
 
 
 @njit(cache=True)
-def _directions(places: Places, change: np.ndarray, rubs: bool, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """Rows (k, r) of `contact.condensed`: normals, both tangents of each place if `rubs`, then those of `turning`."""
-    count, r = len(places.row), change.shape[1]
-    first = 3 * count if rubs else count
-    result = np.zeros((first + len(turns) + len(moves), r))
-    for i in range(count):
-        for n in range(3):
-            share = places.share[i, n]
-            if share == 0.0:
-                continue
-            base = 9 * (places.first[i] + n)
-            for j in range(3):
-                middle = change[base + j]
-                one, two = change[base + 3 + j], change[base + 6 + j]
-                x, y = places.own[i]
-                for a in range(r):
-                    here = share * (middle[a] + x * one[a] + y * two[a])
-                    result[i, a] += places.normal[i, j] * here
-                    if rubs:
-                        result[count + 2 * i, a] += places.around[i, j] * here
-                        result[count + 2 * i + 1, a] += places.along[i, j] * here
-    for k in range(len(turns)):
-        i = turns[k]
-        for n in range(3):
-            base = 9 * (places.first[i] + n)
-            for j in range(3):
-                weight = places.share[i, n] * places.around[i, j]
-                for a in range(r):
-                    result[first + k, a] += weight * change[base + j, a]
-    for k in range(len(moves)):
-        i = moves[k]
-        x, y = places.own[i]
-        for n in range(3):
-            base = 9 * (places.first[i] + n)
-            for j in range(3):
-                weight = places.tilt[i, n] * places.normal[i, j]
-                for a in range(r):
-                    here = change[base + j, a] + x * change[base + 3 + j, a] + y * change[base + 6 + j, a]
-                    result[first + len(turns) + k, a] += weight * here
-    return result
+def _corrected(
+    linear: Step, touching: Touching, places: Places, out: np.ndarray, point: Point, q: np.ndarray, tension: np.ndarray,
+    force: np.ndarray, sections: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:  # fmt: skip
+    """Return (C_1 - C_0)^T f (r,), the correction (r,), and forces, changes, states and end of `contact.condensed`.
+
+    out (r,): weight less internal force; point, q (r,), tension (m,), force (k,) and sections (s, 3, 3): after the last step.
+    Lets the places follow the sections.
+    """
+    m, count, rubs = len(tension), len(places.row), len(linear.friction) > 0
+    plain = 3 * count if rubs else count
+    follow(touching.scene, touching.surface, places, sections)
+    normal, tangential = force[m : m + count].copy(), force[m + count : m + plain].copy()
+    lag = (
+        pull_of(places, forces_at(places, normal, tangential), touching.change)
+        - force[m : m + plain] @ linear.rows[m : m + plain]
+    )
+    step = out + lag + tension @ (point.tendons.force_jacobian - linear.cable_force)
+    solve(linear.factor, step.reshape(len(step), 1))
+    free = linear.rows @ step
+    free[:m] += point.tendons.displacement
+    free[linear.moving :] += linear.rows[linear.moving :] @ (q - linear.q)
+    if rubs:
+        free[m + count : m + plain] += slid_by(places, touching.start, sections)
+    found, by_tension, held, settled = contact_forces(
+        linear.compliance, free, linear.wound, linear.given, tension, places.gap, linear.softness, linear.friction, linear.bend,
+        normal, tangential.reshape(-1, 2),
+    )  # fmt: skip
+    return lag, step + linear.answers @ found, found, by_tension, held, settled

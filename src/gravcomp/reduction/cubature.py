@@ -65,12 +65,12 @@ class Cubature:
 
 
 def choose(
-    elements: SolidElements, basis: np.ndarray, coordinates: np.ndarray, sections: np.ndarray, tolerance: float
+    elements: SolidElements, basis: np.ndarray, coordinates: np.ndarray, sections: np.ndarray, tolerance: float, most: int
 ) -> Cubature:
     """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
 
     sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length; tolerance: largest `error` of
-    the result.
+    the result, unless it needs more than `most` points.
     """
     observed = sections.reshape(-1, basis.shape[1])
     metric = observed.T @ observed / len(sections)
@@ -89,22 +89,24 @@ def choose(
         columns.append(forces[:, is_candidate[part]])
     forces = np.hstack(columns)
     root = np.sqrt(len(coordinates))
-    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root)
+    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root, most)
     at = candidates[chosen]
     return Cubature(element[at], point[at], found, left / root)
 
 
-def sparse_weights(gram: np.ndarray, products: np.ndarray, square: float, allowed: float) -> tuple[np.ndarray, np.ndarray, float]:
+def sparse_weights(
+    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, most: int
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Return indices (p,), positive weights (p,) and remaining |A w - b| of few columns of A for which it is at most `allowed`.
 
-    gram A^T A (c, c); products A^T b (c,); square b^T b.
+    gram A^T A (c, c); products A^T b (c,); square b^T b; most: columns, even if more remains then.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     weights = np.zeros(len(products))
     active = np.zeros(len(products), dtype=bool)
     left = np.sqrt(square)
     for _ in range(3 * len(products)):
-        if left <= max(allowed, 1e-7 * np.sqrt(square)):
+        if left <= max(allowed, 1e-7 * np.sqrt(square)) or active.sum() >= most:
             break
         gain = np.where(active, -np.inf, (products - gram @ weights) / scale)
         best = int(np.argmax(gain))

@@ -106,7 +106,7 @@ def _sections(robot: Robot) -> list[tuple[Outline | BlendedOutline, tuple[Outlin
     found: list[tuple[Outline | BlendedOutline, tuple[Outline, ...], float]] = []
     for piece in robot.pieces:
         for s in (piece.start, piece.start + piece.length):
-            outline, lumens = piece.section(s)
+            outline, lumens = piece.visible.section(s)
             if not found or (outline, lumens) != found[-1][:2]:
                 found.append((outline, lumens, s))
     if len(found) > _MOST_SECTIONS:

@@ -41,9 +41,11 @@ def markdown_table(figures: Sequence[Figure]) -> str:
 def check_place(path: Path, command: str) -> None:
     """Raise ConfigError when the document cannot be read or has no markers for the table; called before measuring."""
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"--write is {path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"--write is {path}: is not a UTF-8 text file; a Markdown document is needed") from error
     if not _place(command).search(text):
         raise ConfigError(
             f"--write is {path}: no markers for the table; needed: '<!-- figures {command} -->' and after it '<!-- end -->'"
@@ -57,7 +59,9 @@ def renew(path: Path, command: str, figures: Sequence[Figure], typed: str = "") 
     """
     check_place(path, command)
     where = f"\n`./gravcomp {typed or command}`, {datetime.date.today().isoformat()}, {os.cpu_count()} cores of {_processor()}.\n"
-    path.write_text(_place(command).sub(lambda match: match[1] + markdown_table(figures) + where + match[2], path.read_text()))
+    text = path.read_text(encoding="utf-8")
+    table = markdown_table(figures) + where
+    path.write_text(_place(command).sub(lambda match: match[1] + table + match[2], text), encoding="utf-8")
 
 
 def _cells(figures: Sequence[Figure], words: dict) -> tuple[list[str], list[list[str]]]:

@@ -66,7 +66,7 @@ class Result:
     """Result of one experiment.
 
     ground: what was run, and on which robot; parts: tables and plots in reading order; bag: the recording that was evaluated,
-    empty for the virtual robot.
+    empty for the virtual robot; failures: why parts of the experiment could not be run.
     """
 
     name: str
@@ -80,6 +80,7 @@ class Result:
     data: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
     bag: str = ""
+    failures: list[str] = field(default_factory=list)
 
     @property
     def file(self) -> str:
@@ -117,6 +118,7 @@ class Result:
                 "data": self.data,
                 "parameters": self.parameters,
                 "notes": self.notes,
+                "failures": self.failures,
             }
         )
 

@@ -124,20 +124,19 @@ def _box(own: np.ndarray, half: np.ndarray, normal: np.ndarray) -> float:
 def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> float:
     """Return the gap to the wall of a tube."""
     first, last, places = scene.first[k], scene.last[k], scene.samples.shape[1]
+    x, y, z = own[0], own[1], own[2]
     best, place = -np.inf, 0.0
     for piece in range(first, last):
         for s in range(places):
             c = scene.samples[piece, s]
-            value = c[3] - np.sqrt((own[0] - c[0]) ** 2 + (own[1] - c[1]) ** 2 + (own[2] - c[2]) ** 2)
+            value = c[3] - np.sqrt((x - c[0]) ** 2 + (y - c[1]) ** 2 + (z - c[2]) ** 2)
             if value > best:
                 best, place = value, piece + s / (places - 1)
     width = 1.0 / (places - 1)
     low, high = max(place - width, float(first)), min(place + width, float(last))
     t = place
-    d = np.empty(3)
-    slope = 0.0
     for _ in range(_NEWTON_STEPS):
-        value, slope, curvature = _along(scene, last, t, own, d)
+        _, slope, curvature, _ = _along(scene, last, t, x, y, z)
         if slope > 0.0:
             low = t
         else:
@@ -148,12 +147,12 @@ def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> fl
         change, t = abs(following - t), following
         if change < within:
             break
-    value, slope, _ = _along(scene, last, t, own, d)
+    value, slope, _, d = _along(scene, last, t, x, y, z)
     length = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
     if scene.sign[k] < 0.0:
         end = (t <= first + 1e-12 and slope < 0.0) or (t >= last - 1e-12 and slope > 0.0 and not scene.closed[k])
         if end:
-            beyond = _past_end(scene, last, t, t > 0.5 * (first + last), d, value + length, normal)
+            beyond = _past_end(scene, last, t, t > 0.5 * (first + last), np.array(d), value + length, normal)
             if beyond > 0.0:
                 return beyond
     for i in range(3):
@@ -164,17 +163,22 @@ def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> fl
 
 
 @njit(cache=True)
-def _along(scene: SceneArrays, last: int, t: float, own: np.ndarray, d: np.ndarray) -> tuple[float, float, float]:
-    """Return r - |x - c| and its first and second derivatives at the place t (piece + share), and write d = x - c."""
+def _along(
+    scene: SceneArrays, last: int, t: float, x: float, y: float, z: float
+) -> tuple[float, float, float, tuple[float, float, float]]:
+    """Return r - |x - c| and its first and second derivatives at the place t (piece + share), and d = x - c."""
     piece = min(int(t), last - 1)
     s = t - piece
     a = scene.curve[piece]
+    d = (
+        x - (((a[0, 0] * s + a[1, 0]) * s + a[2, 0]) * s + a[3, 0]),
+        y - (((a[0, 1] * s + a[1, 1]) * s + a[2, 1]) * s + a[3, 1]),
+        z - (((a[0, 2] * s + a[1, 2]) * s + a[2, 2]) * s + a[3, 2]),
+    )
     square, along, bend, moved = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        c = ((a[0, i] * s + a[1, i]) * s + a[2, i]) * s + a[3, i]
         c1 = (3.0 * a[0, i] * s + 2.0 * a[1, i]) * s + a[2, i]
         c2 = 6.0 * a[0, i] * s + 2.0 * a[1, i]
-        d[i] = own[i] - c
         square += d[i] * d[i]
         along += d[i] * c1
         bend += d[i] * c2
@@ -184,8 +188,8 @@ def _along(scene: SceneArrays, last: int, t: float, own: np.ndarray, d: np.ndarr
     r2 = 6.0 * a[0, 3] * s + 2.0 * a[1, 3]
     length = np.sqrt(square)
     if length < 1e-12:
-        return r - length, r1, 0.0
-    return r - length, r1 + along / length, r2 + (bend - moved) / length + along * along / length**3
+        return r - length, r1, 0.0, d
+    return r - length, r1 + along / length, r2 + (bend - moved) / length + along * along / length**3, d
 
 
 @njit(cache=True)

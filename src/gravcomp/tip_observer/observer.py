@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from gravcomp.description import Robot
 from gravcomp.first_order_lag import lag_share
 from gravcomp.inverse import Target
-from gravcomp.mesh.robot_axis import rest_axis
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.tip_observer.causes import wild, wrong_axes, wrong_stamp
 from gravcomp.tip_observer.error_filter import GATE, ErrorFilter
 from gravcomp.tip_observer.history import History, Prediction
@@ -70,7 +70,7 @@ class TipObserver:
     def __init__(self, robot: Robot, options: TipObserverOptions | None = None, base_frame: str = "soft_base"):
         """options: default `TipObserverOptions()`; base_frame: frame of the model's shapes."""
         self._length, self._base_frame = robot.length, base_frame
-        self._rest_tip = rest_axis(robot).frames(np.array([robot.length]))[0][0]
+        self._rest_tip = rest_tip(robot)[0]
         options = options or TipObserverOptions()
         self.configure(options)
 

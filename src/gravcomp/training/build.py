@@ -31,6 +31,8 @@ from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_o
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
+# The share of new shapes that the modes have to represent: a few may lie near the end of the equilibria.
+_MOST = 0.95
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,9 @@ class BuildOptions:
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
     to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose the
-    cubature of the law's deviation with, and cubature its tolerance; training and test: motions to train and to test with.
+    cubature of the law's deviation with, cubature its tolerance and points their largest number; represented: the training ends
+    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to test
+    with.
     """
 
     modes: int = 44
@@ -47,7 +51,9 @@ class BuildOptions:
     strains: int = 36
     decomposed: int = 1100
     integrated: int = 150
-    cubature: float = 3e-4
+    cubature: float = 1.5e-4
+    points: int = 120
+    represented: float = 2e-4
     training: TrainingOptions = field(default_factory=TrainingOptions)
     test: TrainingOptions = field(default_factory=lambda: TrainingOptions(paths=6, steps=20, seed=1000))
 
@@ -89,27 +95,39 @@ def trained(
     reason = why_not(model)
     if reason:
         raise MeshError(reason)
-    found = samples(model, options.training, lambda share: progress("training", share), kept)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
+    matrix = model.new_matrix()
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+
+    def enough(earlier: list[Sample], new: list[Sample]) -> bool:
+        """Return whether the modes of the earlier samples represent the new ones."""
+        if len(earlier) < modes or not new:
+            return False
+        basis = energy_basis(evenly(_shapes(earlier), options.decomposed), matrix.multiply, modes)
+        shapes = _shapes(new).T
+        missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
+        apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
+        return bool(np.quantile(apart, _MOST) <= options.represented)
+
+    found = samples(model, options.training, lambda share: progress("training", share), kept, enough)
     if len(found) < modes:
         raise MeshError(
             f"only {len(found)} equilibria were found for the training, at least {modes} are needed;"
             " the robot may be too soft for its weight"
         )
     progress("decomposing", 0.0)
-    shapes = evenly(np.array([sample.unknowns for sample in found]), options.decomposed)
-    matrix = model.new_matrix()
-    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    shapes = evenly(_shapes(found), options.decomposed)
     basis = energy_basis(shapes, matrix.multiply, modes)
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
-    coordinates = np.array([sample.unknowns for sample in found]) @ matrix.multiply(basis)
+    coordinates = _shapes(found) @ matrix.multiply(basis)
     cubature = Cubature.none()
     if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
         sections = section_changes(model, basis)[:, 0] / model.length
-        cubature = choose(model.elements, basis, evenly(coordinates, options.integrated), sections, options.cubature)
+        shown = evenly(coordinates, options.integrated)
+        cubature = choose(model.elements, basis, shown, sections, options.cubature, options.points)
     return Reduction(
         basis=basis,
         elasticity=elasticity,
@@ -122,6 +140,11 @@ def trained(
         error_median=np.nan,
         error_worst=np.nan,
     )
+
+
+def _shapes(of: list[Sample]) -> np.ndarray:
+    """Return the displacements (s, 3 n_free) of samples."""
+    return np.array([sample.unknowns for sample in of])
 
 
 def evenly(rows: np.ndarray, count: int) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import ShapeStatus
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.inverse import InverseController, bend_target, direction_weight
+from gravcomp.inverse import InverseController, direction_weight, rest_target
 from gravcomp.simulation.simulator import Simulator
 
 GRAVITY = 9.81
@@ -36,15 +36,21 @@ _LOADED, _AT_TIP = 0.7, 0.6
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Random paths: paths, and steps of each; modulus_range: relative to the robot's modulus; bend: largest in rad; seed."""
+    """Random paths: at most `paths`, at least `least`; steps of each; bend: largest in rad; seed.
+
+    modulus_range: relative to the robot's modulus.
+    """
 
     paths: int = 75
+    least: int = 25
     steps: int = 30
     modulus_range: tuple[float, float] = (0.6, 1.6)
     bend: float = np.radians(50.0)
     seed: int = 1
 
 
+# After so many paths it is asked again whether they are enough.
+_NEW = 10
 _ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
 
 
@@ -68,13 +74,16 @@ def samples(
     options: TrainingOptions,
     progress: Callable[[float], None] = lambda share: None,
     kept: Path | None = None,
+    enough: Callable[[list[Sample], list[Sample]], bool] | None = None,
 ) -> list[Sample]:
     """Return equilibria along random paths. progress: called with the completed share.
 
-    kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples.
+    kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples. enough:
+    asked every few paths with the samples of earlier paths and those of the last ones, whether more are needed; None: all paths.
     """
     rng = np.random.default_rng(options.seed)
     found: list[Sample] = []
+    begins: list[int] = []  # of each path, in `found`
     for number in range(options.paths):
         file = None if kept is None else kept / f"{number:04}.npz"
         path = _stored(file, rng) if file else None
@@ -82,8 +91,15 @@ def samples(
             path = list(_path(model, options, rng))
             if file:
                 _store(path, file, rng)
+        begins.append(len(found))
         found += path
         progress((number + 1) / options.paths)
+        more = number + 1 - options.least
+        if enough is not None and more >= 0 and more % _NEW == 0 and number + 1 > _NEW:
+            last = begins[-_NEW]
+            if enough(found[:last], found[last:]):
+                progress(1.0)
+                break
     return found
 
 
@@ -116,7 +132,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     if kind >= _RELEASED:
         bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
         weight = rng.choice([0.0, direction_weight(model.length)])
-        target = bend_target(model.length, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
+        target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
     gravity, displacement = size * _direction(rng), None
     largest = _largest_load(model, rng)

@@ -19,6 +19,7 @@ from gravcomp.calibration.measured import Measured, still_windows
 from gravcomp.calibration.plan import ORIENTATIONS, Plan, PlanOptions, creep_times, make_plan
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuStream
+from gravcomp.closed_loop.loop_failed import LoopFailed
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
@@ -66,7 +67,7 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
 
 
 def measure(context: Context, plan: Plan) -> Measured:
-    """Return the measurements in all poses of the plan. Raises RuntimeError where the bridge does not start."""
+    """Return the measurements in all poses of the plan. Raises LoopFailed where the bridge does not start."""
     stage = f"measuring the virtual robot for calibration, {plan.duration:.0f} s of its time"
     return context.map(run_plan, [(context.setup, plan)], stage)[0]
 
@@ -149,13 +150,13 @@ class _Rig:
         self.rows: list[tuple] = []
 
     def start(self) -> None:
-        """Advance until the bridge drives. Raises RuntimeError where it does not."""
+        """Advance until the bridge drives. Raises LoopFailed where it does not."""
         self._bridge.configure()
         self._bridge.activate(0.0)
         while self._bridge.state not in DRIVING or not self._gravity.any():
             self._step(None, None)
             if self._virtual.time > _LONGEST_START:
-                raise RuntimeError(f"the virtual robot's bridge does not start: {self._bridge.message}")
+                raise LoopFailed(f"the virtual robot's bridge does not start: {self._bridge.message}")
 
     def pull(self, displacement: np.ndarray, tension: np.ndarray, end: float) -> None:
         """Move the cables to `displacement` (m,) m within their limits and keep them there until `end` s; record."""
@@ -186,7 +187,7 @@ class _Rig:
         self._sent = self._transmission.possible(moved, tension)
         refused = self._bridge.command(self._sent.tolist(), tension.tolist(), now)
         if refused:
-            raise RuntimeError(f"the bridge refused a command at {now:.2f} s: {refused}")
+            raise LoopFailed(f"the bridge refused a command at {now:.2f} s: {refused}")
         truth = self._virtual.truth
         direction = Rotation.from_quat(truth.tip_orientation).apply((0.0, 0.0, 1.0))
         self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, direction))

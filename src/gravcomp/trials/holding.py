@@ -12,8 +12,7 @@ from gravcomp.description import Robot
 from gravcomp.evaluation import metrics
 from gravcomp.holdability import holdability
 from gravcomp.holdability.text import sentence
-from gravcomp.inverse import Target, bend_target
-from gravcomp.inverse.target import arc_points
+from gravcomp.inverse import Target, rest_target
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 # In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
@@ -30,7 +29,7 @@ GROUND = (
 
 @dataclass(frozen=True)
 class Case:
-    """Pose and target. Angles in degrees, bend 0: straight; options: of `bend_target`; brief: shorter phases."""
+    """Pose and target. Angles in degrees, bend: from the shape at rest; options: of `rest_target`; brief: shorter phases."""
 
     inclination: float
     roll: float = 0.0
@@ -77,7 +76,15 @@ def lasting(setup: Setup, shortest: float, periods: float) -> float:
 def target_of(setup: Setup, case: Case) -> Target:
     """Return the target of a case, with the weights of the controller."""
     options = {"tip_direction_weight": setup.direction_weight, **case.options}
-    return bend_target(setup.robot.length, np.radians(case.bend), np.radians(case.plane), **options)
+    return rest_target(setup.robot, np.radians(case.bend), np.radians(case.plane), **options)
+
+
+def _backbone(robot: Robot, case: Case, station: np.ndarray) -> np.ndarray:
+    """Return the places (k, 3) in m of the target's backbone at the stations (k,)."""
+    shape = rest_target(
+        robot, np.radians(case.bend), np.radians(case.plane), backbone_station=station, backbone_weight=np.zeros(len(station))
+    )
+    return shape.backbone_position
 
 
 def run_case(job: tuple[Setup, Case]) -> Outcome:
@@ -94,7 +101,7 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
     trace = loop.trace
     before, after = trace.between(start - settled, start), trace.between(loop.time - settled)
     station = setup.robot.effectors.backbone_station
-    wanted = arc_points(setup.robot.length, np.radians(case.bend), np.radians(case.plane), station)
+    wanted = _backbone(setup.robot, case, station)
     change = trace.between(start - settled)
     distance = np.linalg.norm(change.tip_position - target.tip_position, axis=1)
     return Outcome(

@@ -8,7 +8,7 @@ from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
-from gravcomp.inverse import straight_target
+from gravcomp.inverse import rest_target
 from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions
 from gravcomp.trials.holding import errors_to, lasting
 from gravcomp.virtual.motion import StaticMotion, base_orientation
@@ -50,7 +50,7 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     share = _BRIEF if case.brief else 1.0
     options = LoadEstimationOptions(kind=kind)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
-    target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
+    target = rest_target(setup.robot, tip_direction_weight=setup.direction_weight)
     loop.hold(target)
     settling, learnt, finding, measured = (share * lasting(setup, *one) for one in (_SETTLING, _LEARNT, _FINDING, _MEASURED))
     loop.run(settling)

@@ -9,7 +9,7 @@ from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
-from gravcomp.inverse import straight_target
+from gravcomp.inverse import rest_target
 from gravcomp.trials.holding import errors_to, lasting
 from gravcomp.virtual.motion import BaseMotion, RotationMotion, StaticMotion, base_orientation
 
@@ -66,7 +66,7 @@ def run_tracked(job: tuple[Setup, TrackedCase]) -> TrackedOutcome:
     if case.turning:
         motion = RotationMotion(start, np.array([0.0, 1.0, 0.0]), np.radians(case.turning), released + settling)
     loop = ClosedLoop(setup, motion, tracker=case.tracker)
-    target = straight_target(setup.robot.length, tip_direction_weight=setup.direction_weight)
+    target = rest_target(setup.robot, tip_direction_weight=setup.direction_weight)
     loop.release()
     loop.run(released)
     begin = loop.time

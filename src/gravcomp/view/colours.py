@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from gravcomp.description import Robot
+
 Rgb = tuple[int, int, int]
 
 PROXIMAL: Rgb = (236, 226, 208)
@@ -20,14 +22,19 @@ PLACED: Rgb = (245, 158, 11)
 TISSUE: Rgb = (226, 150, 136)
 LOAD: Rgb = (168, 85, 247)
 
-# Full scale of the colours; compensation of the robot's own weight needs less.
-TENSION_SCALE = 1.0  # N
+# Full scale of the colours, over the largest tension; compensation of the robot's own weight needs a small part of that.
+_TENSION_SHARE = 0.2
 
 _STOPS = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
 _PLASMA = np.array([[13, 8, 135], [106, 0, 168], [177, 42, 144], [225, 100, 98], [252, 166, 54], [240, 249, 33]], float)
 
 
-def tension_colour(tension: float, scale: float = TENSION_SCALE) -> Rgb:
+def tension_scale(robot: Robot) -> float:
+    """Return the tension (N) at the full scale of the colours."""
+    return _TENSION_SHARE * robot.limits.tension_max
+
+
+def tension_colour(tension: float, scale: float) -> Rgb:
     """Return the colour of a tension (N); scale: N, full scale."""
     x = min(max(tension / scale, 0.0), 1.0)
     red, green, blue = (int(np.interp(x, _STOPS, _PLASMA[:, i])) for i in range(3))

@@ -39,7 +39,7 @@ class Page:
             self._server = viser.ViserServer(host=options.host, port=port, label=f"gravcomp · {robot.name}", verbose=False)
         shown = "localhost" if options.host in ("127.0.0.1", "0.0.0.0", "::") else options.host
         self.address = f"http://{shown}:{self._server.get_port()}"
-        self._names = robot.cable_names
+        self._names, self._full_tension = robot.cable_names, colours.tension_scale(robot)
         self._frame, self._idle_frames = 0, max(1, round(options.rate))
         self._has_model = False  # whether the last snapshot had one
         self._shown: Snapshot | None = None  # while the page shows an earlier state
@@ -123,7 +123,7 @@ class Page:
     def _write(self, snapshot: Snapshot, held_at: float | None) -> None:
         """Update texts and figures."""
         self._status.content = status_html(snapshot, held_at)
-        self._cables.content = cables_html(snapshot, self._names)
+        self._cables.content = cables_html(snapshot, self._names, self._full_tension)
         touches = touches_html(snapshot)
         self._inset.show(snapshot)
         self._touches.content, self._touches.visible = touches, bool(touches)

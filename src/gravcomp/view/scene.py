@@ -29,7 +29,7 @@ from gravcomp.view.world import BaseInWorld, quaternion_wxyz
 if TYPE_CHECKING:
     from gravcomp.view.obstacle_shapes import ObstacleShape
 
-GRAVITY_LENGTH = 0.045  # m, of the arrow for 9.81 m/s^2
+GRAVITY_LENGTH = 0.45  # of the arrow for 9.81 m/s^2, over the robot's length
 WORLD, BASE = "world: gravity points down", "robot base: gravity turns"
 _BASE_WXYZ = (0.5, 0.5, -0.5, 0.5)  # z of the base along x of the scene
 
@@ -57,9 +57,10 @@ class Scene:
         self._add_body(rest)
         self._truth = TruthMarker(self._scene, rest, 0.5 * diameter)
         self.target = TargetMarker(self._scene, rest, 0.5 * diameter)
+        unit = SCALE * robot.length
         self._gravity = self._scene.add_arrows(
             "/robot/gravity", np.zeros((1, 2, 3)), colours.GRAVITY,
-            shaft_radius=SCALE * 0.0009, head_radius=SCALE * 0.0026, head_length=SCALE * 0.007)  # fmt: skip
+            shaft_radius=unit * 0.009, head_radius=unit * 0.026, head_length=unit * 0.07)  # fmt: skip
         self._obstacles = Obstacles(self._scene, shapes)
         self._forces = Forces(self._scene, robot.length, 0.5 * diameter, robot.limits.tension_max)
         frame = BaseFrame(self._root)
@@ -94,7 +95,7 @@ class Scene:
                 handle.vertices = vertices[part]
         if snapshot.tension is not None:
             for handle, tension in zip(self._cables, snapshot.tension):
-                handle.color = colours.tension_colour(tension)
+                handle.color = colours.tension_colour(tension, colours.tension_scale(self._robot))
         self._show_gravity(snapshot)
         self._truth.show(None if "truth" in self._hidden else snapshot.truth)
         self.target.show(None if "target" in self._hidden else snapshot.target)
@@ -116,7 +117,8 @@ class Scene:
         middle = 0.5 * self._robot.length * np.array([0.0, 0.0, 1.0])
         if snapshot.backbone is not None:
             middle = snapshot.backbone.at(np.array([0.5]))[0][0]
-        self._gravity.points = scaled(np.array([[middle, middle + snapshot.gravity / 9.81 * GRAVITY_LENGTH]]))
+        arrow = self._robot.length * GRAVITY_LENGTH / 9.81 * snapshot.gravity
+        self._gravity.points = scaled(np.array([[middle, middle + arrow]]))
         if self._obstacles.in_world:
             from gravcomp.scene.scene import world_rotation  # imports Numba
 
@@ -142,7 +144,7 @@ class Scene:
         self._cables: list[viser.MeshHandle] = []
         for cable in self._robot.cables:
             skins.append(cable_skin(self._robot, cable))
-            colour = colours.tension_colour(0.0)
+            colour = colours.tension_colour(0.0, colours.tension_scale(self._robot))
             self._cables.append(add_skin(scene, f"/robot/cable_{cable.name}", skins[-1], rest, colour, cast_shadow=False))
         self.body += self._cables
         self._body_skin, self._body_parts = joined(skins)

@@ -76,7 +76,7 @@ def cable_line(robot: Robot, cable: Cable) -> Skin:
 
 def half_width(robot: Robot) -> float:
     """Return half the largest width (m) of the body, disks included; for a body from a file, a part of its length."""
-    widths = [max(o.half_width, o.half_height) for piece in robot.pieces for o in piece.outer]
+    widths = [max(o.half_width, o.half_height) for piece in robot.pieces for o in piece.visible.outer]
     widths += [segment.disks.outer_diameter / 2 for segment in robot.segments if segment.disks]
     return max(widths, default=0.045 * robot.length)
 

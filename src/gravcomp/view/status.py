@@ -59,16 +59,16 @@ def _sentence(dot: str, sentence: str, name: str) -> str:
     )
 
 
-def cables_html(snapshot: Snapshot, names: tuple[str, ...]) -> str:
-    """Return one bar per cable in its colour of the scene, and the colour scale."""
+def cables_html(snapshot: Snapshot, names: tuple[str, ...], full: float) -> str:
+    """Return one bar per cable in its colour of the scene, and the colour scale, whose end is at the tension `full` (N)."""
     if snapshot.tension is None or snapshot.displacement is None:
         return '<div style="padding:.4em .9em;font-size:.85em;opacity:.7">no model yet</div>'
     rows = []
     for i, name in enumerate(names):
         tension = float(snapshot.tension[i])
-        width = min(100.0, 100.0 * tension / colours.TENSION_SCALE)
+        width = min(100.0, 100.0 * tension / full)
         measured = "" if snapshot.motors_tension is None else f"{snapshot.motors_tension[i]:.2f}"
-        bar = f"height:100%;border-radius:.3em;width:{width:.0f}%;background:{colours.css(colours.tension_colour(tension))}"
+        bar = f"height:100%;border-radius:.3em;width:{width:.0f}%;background:{colours.css(colours.tension_colour(tension, full))}"
         rows.append(
             f'<tr style="white-space:nowrap"><td style="padding-right:.5em">{html.escape(name)}</td><td style="width:34%">'
             f'<div style="height:.62em;border-radius:.3em;background:rgba(128,140,160,.22)"><div style="{bar}"></div></div></td>'
@@ -80,7 +80,7 @@ def cables_html(snapshot: Snapshot, names: tuple[str, ...]) -> str:
         '<div style="padding:.3em .9em .5em;font-size:.8em;font-variant-numeric:tabular-nums">'
         f'<table style="width:100%;border-spacing:0 .14em">{"".join(rows)}</table>'
         '<div style="display:flex;align-items:center;gap:.5em;margin-top:.4em;font-size:.92em"><span>slack</span>'
-        f'<div style="{scale}"></div><span>{colours.TENSION_SCALE:g} N</span></div></div>'
+        f'<div style="{scale}"></div><span>{full:g} N</span></div></div>'
     )
 
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from gravcomp.scene.scene import Scene
 
 HAND = "hand"
-"""Source of a hand's force on the virtual robot."""
+"""Source of a hand's force on the virtual robot, in the message VirtualForces as well."""
 
 
 @dataclasses.dataclass(frozen=True)

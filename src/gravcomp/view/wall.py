@@ -25,7 +25,7 @@ def wall_skins(robot: Robot, around: int = AROUND, rings: int = _RINGS) -> list[
     skins = []
     before: Outline | None = None
     for segment in robot.segments:
-        pieces = [piece for piece in robot.pieces if piece.segment == segment.name]
+        pieces = [piece.visible for piece in robot.pieces if piece.segment == segment.name]
         last = segment is robot.segments[-1]
         parts = [_wall(robot, pieces, before, around, rings, last)]
         if last and len(pieces[-1].lumens) > 1:
@@ -41,7 +41,7 @@ def lumen_skin(robot: Robot) -> Skin | None:
     """Return the walls of the lumens, facing inward; None for a solid body and for one from a file."""
     parts = []
     angle = _angles(_AROUND_LUMEN)
-    for piece in robot.pieces:
+    for piece in (piece.visible for piece in robot.pieces):
         heights = _heights(robot, piece, _RINGS)[::-1]
         for base, tip in piece.lumens:
             share = ((heights - piece.start) / piece.length)[:, None, None]

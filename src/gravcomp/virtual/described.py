@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile, load_robot_file
-from gravcomp.description.hardware import Hardware, parse_hardware
+from gravcomp.description.hardware import Hardware
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.true_robot import TrueRobot
@@ -51,5 +51,5 @@ def described(file: RobotFile, seed: int | None = None) -> Described:
             )
         own = file.section("virtual_robot").get("seed")
         return described(origin, given.seed if seed is None and own is not None else seed)
-    hardware = parse_hardware(file.section("hardware"), source=file.source, cables=file.robot.cable_names)
+    hardware = file.hardware
     return Described(given, file.robot, hardware, given.seed if seed is None else seed)

@@ -108,7 +108,7 @@ def _outline(stretch: Stretch, s: float) -> Outline | np.ndarray:
     """The outline of a stretch at the arc length s, or the corners (c, 2) of its convex hull."""
     if isinstance(stretch.source, MeshBody):
         return _hull(slice_boundary(stretch.source, (s - stretch.start) / stretch.length))
-    outline, _ = stretch.source.section(s)
+    outline, _ = stretch.source.visible.section(s)
     if isinstance(outline, Outline):
         return outline
     return _hull(outline.boundary(np.linspace(0.0, 2 * math.pi, _POINTS, endpoint=False)))

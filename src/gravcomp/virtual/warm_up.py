@@ -1,7 +1,6 @@
 """Compilation of the virtual robot's kernels into the cache before the first run, which would otherwise wait half a minute."""
 
 from gravcomp.config import from_mapping
-from gravcomp.description.hardware import parse_hardware
 from gravcomp.description.robot_file import load_robot_file
 from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
@@ -10,5 +9,4 @@ from gravcomp.virtual.robot import VirtualRobot
 def warm_up() -> None:
     """Compile all kernels that the article's robot needs."""
     file = load_robot_file("article")
-    hardware = parse_hardware(file.section("hardware"), source=file.source)
-    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, hardware).step(0.02)
+    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, file.hardware).step(0.02)

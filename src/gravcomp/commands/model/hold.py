@@ -26,19 +26,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--picture", metavar="FILE", help="draw the sphere of directions: .png, .svg or .pdf")
 
 
-def answer(args: argparse.Namespace, model: "RobotModel") -> "Holdability | None":
-    """Return the answer, with progress and a first answer on stderr; None with --no-hold and for a robot without cables.
+def check(args: argparse.Namespace, length: float) -> None:
+    """Raise ValueError for arguments out of range, TargetError for a target out of reach of a robot of `length` (m)."""
+    if not 4 <= args.directions <= 180:
+        raise ValueError(f"--directions is {args.directions}; allowed: 4 to 180")
+    _target(args, length)
 
-    Raises ValueError for arguments out of range, TargetError for a target out of reach.
-    """
+
+def answer(args: argparse.Namespace, model: "RobotModel") -> "Holdability | None":
+    """Return the answer, with progress and a first answer on stderr; None with --no-hold and for a robot without cables."""
     if args.no_hold or not model.robot.cables:
         return None
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from gravcomp.holdability import HoldOptions, holdability
 
-    if not 4 <= args.directions <= 180:
-        raise ValueError(f"--directions is {args.directions}; allowed: 4 to 180")
     columns = TextColumn("{task.description:<40}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=output.console(), transient=True) as progress:
         task = progress.add_task("can it be held: linear estimate", total=None)

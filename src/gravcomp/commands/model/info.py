@@ -2,9 +2,11 @@
 
 import argparse
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target
 from gravcomp.commands.model import hold
 from gravcomp.commands.model.reach import reach
 from gravcomp.commands.model.reach import text as reach_text
@@ -36,7 +38,10 @@ def run(args: argparse.Namespace) -> int:
 
     if args.picture and args.no_hold:
         raise ValueError("--picture draws whether the robot can be held, which --no-hold leaves out; give one of them")
+    if args.picture:
+        checked_target("--picture", Path(args.picture))
     file = load_robot_file(args.robot)
+    hold.check(args, file.robot.length)
     simulator = Simulator(file.robot, reduced=False)
     robot, model = simulator.robot, simulator.model
     quality = mesh_quality(model.mesh)

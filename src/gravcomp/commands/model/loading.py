@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from gravcomp.full_model.wrench import Wrench
-    from gravcomp.inverse import Command
+    from gravcomp.inverse import Command, Target
     from gravcomp.scene.scene import Scene
     from gravcomp.simulation import Shape, Simulator
 
@@ -54,14 +54,17 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
 
     if args.direction is not None and args.target is None:
         raise ValueError("--direction needs --target, which is not given")
+    if not np.isfinite(args.gravity).all():
+        raise ValueError(f"--gravity is {args.gravity}; finite numbers are needed")
     wrenches = wrenches_of(args)
     file = load_robot_file(args.robot)
+    wanted = _wanted(args, file.robot.length)
     if file.scene or file.zones:
-        compile_parts(("model", "contact") if args.target is None else compilation.LOOP + compilation.SURROUNDED)
+        compile_parts(("model", "contact") if wanted is None else compilation.LOOP + compilation.SURROUNDED)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
-    if args.target is not None:
-        shape, command = _reached(simulator, gravity, args.target, args.direction, wrenches, file.zones)
+    if wanted is not None:
+        shape, command = _reached(simulator, gravity, wanted, wrenches, file.zones)
         return simulator, shape, command
     displacement = None if args.displacement is None else 1e-3 * np.array(args.displacement)
     shape = simulator.solve(gravity, displacement, args.tension, wrench=wrenches)
@@ -71,22 +74,33 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     return simulator, shape, None
 
 
+def _wanted(args: argparse.Namespace, length: float) -> "Target | None":
+    """Return the target of the arguments for a robot of `length` (m), or None. Raises TargetError."""
+    if args.target is None:
+        return None
+    import numpy as np
+
+    from gravcomp.inverse import Target
+
+    weight = 0.01 if args.direction is not None else 0.0
+    towards = None if args.direction is None else np.array(args.direction)
+    wanted = Target(1e-3 * np.array(args.target), tip_direction=towards, tip_direction_weight=weight)
+    wanted.check_reach(length)
+    return wanted
+
+
 def _reached(
     simulator: "Simulator",
     gravity: "np.ndarray",
-    target: list[float],
-    direction: list[float] | None,
+    wanted: "Target",
     wrenches: "tuple[Wrench, ...]",
     zones: "Scene",
 ) -> "tuple[Shape, Command]":
-    """Run the closed loop of model and inverse problem until the tip is at rest. `target` in mm."""
+    """Run the closed loop of model and inverse problem until the tip is at rest."""
     import numpy as np
 
-    from gravcomp.inverse import InverseController, Target
+    from gravcomp.inverse import InverseController
 
-    weight = 0.01 if direction is not None else 0.0
-    towards = None if direction is None else np.array(direction)
-    wanted = Target(1e-3 * np.array(target), tip_direction=towards, tip_direction_weight=weight)
     controller = InverseController(simulator.robot, scene=simulator.scene, zones=zones)
     shape = simulator.solve(gravity, wrench=wrenches)
     before = shape.tip_position

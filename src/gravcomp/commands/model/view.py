@@ -1,9 +1,11 @@
 """`gravcomp model view ROBOT`: draw the robot at rest and deformed, or with its sections as it is described."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.folders import checked_target
 from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: the image is written. Raises ConfigError, ValueError, MeshError."""
     from gravcomp.environment.packages import provide_extra
 
+    checked_target("--out", Path(args.out))
     provide_extra("reports")
     if args.rest:
         return _draw_described(args)

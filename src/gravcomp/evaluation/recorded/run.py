@@ -80,9 +80,7 @@ class RecordedRun:
         time, poses = time[keep], poses[keep]
         if len(time) < 2:
             raise ConfigError(f"{self.bag}: the tips of '{self.tip.topic}' and of the model do not overlap in time")
-        position, direction = targets_over(
-            time, self.streams["pose_target"], self.streams["shape_target"], self.setup.robot.length
-        )
+        position, direction = targets_over(time, self.streams["pose_target"], self.streams["shape_target"], self.setup.robot)
         return Course(
             time=time - time[0],
             tip_position=poses[:, :3],

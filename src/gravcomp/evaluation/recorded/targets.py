@@ -3,27 +3,28 @@
 import numpy as np
 
 from gravcomp.calibration.bag import direction_of_poses
+from gravcomp.description import Robot
 from gravcomp.evaluation.recorded.course import last_known
-from gravcomp.inverse import TargetError, bend_target, straight_target
+from gravcomp.inverse import TargetError, bend_target
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.recordings.bags.streams import Stream
 
 
-def targets_over(time: np.ndarray, poses: Stream | None, shapes: Stream | None, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return target positions (t, 3) m and directions (t, 3) of the tip at the times (t,) s; straight before the first message.
+def targets_over(time: np.ndarray, poses: Stream | None, shapes: Stream | None, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return target positions (t, 3) m and directions (t, 3) of the tip at the times (t,) s; at rest before the first message.
 
-    poses, shapes: messages of `target` and of `target/shape`, None without any; length: of the robot, m.
+    poses, shapes: messages of `target` and of `target/shape`, None without any; robot: the modelled one.
     """
     received, rows = [], []
     for stream, target in ((poses, _pose_target), (shapes, _shape_target)):
         for moment, values in zip(stream.received, stream.values) if stream else ():
             try:
-                rows.append(target(values, length))
+                rows.append(target(values, robot.length))
                 received.append(moment)
             except TargetError:  # the controller refused it, too
                 continue
     order = np.argsort(received, kind="stable")
-    straight = straight_target(length)
-    first = np.concatenate([straight.tip_position, straight.tip_direction])
+    first = np.concatenate(rest_tip(robot))
     targets = last_known(time, np.array(received)[order], np.array(rows).reshape(-1, 6)[order], first)
     return targets[:, :3], targets[:, 3:]
 

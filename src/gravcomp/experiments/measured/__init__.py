@@ -1,7 +1,7 @@
 """The model against what others measured or computed: `reproduce measured DATA`.
 
 Each module of this package evaluates one folder of DATA and returns a `Part`. None of the measurements belongs to this
-repository; a folder that is missing is left out, with a note.
+repository; a folder that is missing is left out, with a note, and one that cannot be used does not take the others with it.
 """
 
 import os
@@ -26,10 +26,13 @@ def default_folder() -> Path:
 def run(
     folder: Path, progress: Callable[[str], None] = lambda stage: None, names: tuple[str, ...] = PARTS, brief: bool = False
 ) -> Result:
-    """Evaluate the parts whose data are in the folder. Raises ConfigError if there is none, and for data that cannot be used."""
+    """Evaluate the parts whose data are in the folder. Those that cannot be used are the `failures` of the result.
+
+    Raises ConfigError if there is none, or none that can be used.
+    """
     from gravcomp.calibration.measured import MeasurementError
 
-    found, notes = [], []
+    found, notes, failures = [], [], []
     for name in names:
         if not (folder / name).is_dir():
             notes.append(f"{name}: {folder / name} does not exist; left out")
@@ -42,7 +45,9 @@ def run(
         try:
             found.append(module.evaluate(folder / name, show, brief))
         except (MeasurementError, RuntimeError) as error:
-            raise ConfigError(str(error)) from error
+            failures.append(str(error))
+    if failures and not found:
+        raise ConfigError("\n".join(failures))
     if not found:
         raise ConfigError(f"{folder}: contains none of the folders {', '.join(names)}")
     return Result(
@@ -52,7 +57,8 @@ def run(
         ground="Measurements and computations of other authors, named in the README of each folder. Computed in the core.",
         figures=[figure for part in found for figure in part.figures],
         parts=[entry for part in found for entry in part.parts],
-        notes=notes + [note for part in found for note in part.notes],
+        failures=failures,
+        notes=notes + [f"left out: {failure}" for failure in failures] + [note for part in found for note in part.notes],
         data={key: value for part in found for key, value in part.data.items()},
         parameters={"folder": str(folder)},
     )

@@ -144,11 +144,17 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     without = max((_loaded_error(bare_plate, r, held[r.name], mesh) for r in loaded), default=np.nan)
     heaviest = max((r.mass for r in loaded), default=0.0)
     interval = 1e3 * prediction_interval(fit, heaviest, mesh) if heaviest else np.nan
+    moved = ""
+    if loaded:
+        moved = (
+            f" What it leaves open of modulus and plate moves the heaviest loaded beam by ± {interval:.1f} mm (95 %); without a"
+            f" plate the worst marker under load is off by {without:.2f} mm."
+        )
     aside_mm = float(np.sqrt(np.mean([hand["aside_mm"] ** 2 for hand in hands.values()])))
     part = Part(
         figures=[
             Figure("beam: markers at rest under load, worst", worst, "mm", "2.0 mm, the mean marker with their modulus", 0.8)
-        ],
+        ][: len(loaded)],
         parts=[
             Table(
                 "Beam: at rest",
@@ -169,8 +175,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         ],
         notes=[
             f"beam: the mass of the plate with the markers is not written down; {1e3 * PLATE:g} ± {1e3 * PLATE:g} g are assumed,"
-            f" and the bare beam leaves it open. What it leaves open of modulus and plate moves the heaviest loaded beam by"
-            f" ± {interval:.1f} mm (95 %); without a plate the worst marker under load is off by {without:.2f} mm.",
+            f" and the bare beam leaves it open.{moved}",
             f"beam: the hand holds the face aside by {aside_mm:.1f} mm (RMS of the recordings). Its error in height is not"
             " measured, and remains in the error of the markers at rest.",
         ],

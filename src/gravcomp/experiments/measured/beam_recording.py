@@ -1,15 +1,18 @@
 """Recordings of a silicone beam that a hand releases, and what they show without a model."""
 
-import csv
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
 
+from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import MeasurementError
 
-_KINDS = {"gravity": 0.0, "load52": 52e-3, "load101": 101e-3}
+_KIND = re.compile(r"gravity|load(?P<grams>\d+)")  # how the name of a file begins
 _QUIET = 2.0  # s after the release, when the beam no longer swings
+_REST = 1.0  # s at the end, in which it rests
+_HAND = 0.1  # s before the release, in which the hand may already move
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +28,7 @@ class Recording:
     @property
     def rest(self) -> np.ndarray:
         """Mean places (3, 3) of the markers in the last second."""
-        return self.markers[self.time > self.time[-1] - 1.0].mean(axis=0)
+        return self.markers[self.time > self.time[-1] - _REST].mean(axis=0)
 
     @property
     def rest_time(self) -> float:
@@ -35,23 +38,27 @@ class Recording:
 
 def read(path: Path) -> Recording:
     """Read a recording. Raises MeasurementError."""
-    mass = next((mass for kind, mass in _KINDS.items() if path.stem.startswith(kind)), None)
-    if mass is None:
-        raise MeasurementError(f"{path}: the name begins with none of {', '.join(_KINDS)}")
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        time = np.array([float(row["time_s"]) for row in rows])
-        markers = 1e-3 * np.array([[[float(row[f"tip{i}_{axis}_mm"]) for axis in "xyz"] for i in (1, 2, 3)] for row in rows])
-    except (OSError, KeyError, ValueError) as error:
-        raise MeasurementError(f"{path}: cannot be read: {error}") from error
+    kind = _KIND.match(path.stem)
+    if kind is None:
+        raise MeasurementError(f"{path}: the name begins with neither gravity nor load and the grams of the weight, as load52")
+    table = CsvTable.read(path)
+    names = [f"tip{i}_{axis}_mm" for i in (1, 2, 3) for axis in "xyz"]
+    table.require(["time_s", *names])
+    time = table.numbers("time_s")
+    order = np.argsort(time, kind="stable")
+    time, markers = time[order], table.vectors(names, 1e-3)[order].reshape(-1, 3, 3)
     height = markers[:, :, 0].mean(axis=1)
     fallen = np.flatnonzero(height < height[:10].mean() - 2e-3)
     if not len(fallen):
         raise MeasurementError(f"{path}: the markers never fall by 2 mm")
-    release = time[fallen[0]] - np.sqrt(2 * 2e-3 / 9.81)
-    held = markers[time < release - 0.1].mean(axis=0)
-    return Recording(path.stem, mass, time - release, markers, held)
+    release = float(time[fallen[0]] - np.sqrt(2 * 2e-3 / 9.81))
+    before, after = time < release - _HAND, time[-1] - release
+    if not before.any() or after < _QUIET + _REST:
+        raise MeasurementError(
+            f"{path}: begins {release - time[0]:.2f} s before the release and ends {after:.2f} s after it;"
+            f" needed: more than {_HAND:g} s and at least {_QUIET + _REST:g} s"
+        )
+    return Recording(path.stem, 1e-3 * float(kind["grams"] or 0), time - release, markers, markers[before].mean(axis=0))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,7 +4,6 @@ The fit uses the chain of constant curvatures (`calibration.chain`), whose bends
 known: 1600 poses are too many for the full model.
 """
 
-import csv
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from gravcomp.calibration.chain import Chain
 from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_fit import PoseEstimate
 from gravcomp.calibration.pose_report import error_bars, fitted_table, views
+from gravcomp.experiments.measured.folder_table import folder_table
 from gravcomp.experiments.measured.part import Part
 from gravcomp.report.result import Figure
 
@@ -57,16 +57,12 @@ class Pulls:
         return Pulls(self.pattern[which], self.displacement[which], self.tip[which])
 
 
-def read(path: Path) -> Pulls:
-    """Read the table. Raises MeasurementError."""
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        displacement = [[float(row[f"servo_{number}_mm"]) for number in SERVOS] for row in rows]
-        tip = [[float(row[f"tip_{axis}"]) for axis in "xyz"] for row in rows]
-        return Pulls(np.array([row["pattern_label"] for row in rows]), 1e-3 * np.array(displacement), 1e-3 * np.array(tip))
-    except (OSError, KeyError, ValueError) as error:
-        raise MeasurementError(f"{path}: cannot be read: {error}") from error
+def read(folder: Path) -> Pulls:
+    """Read the table of a folder. Raises MeasurementError."""
+    table = folder_table(folder, "train.csv")
+    servos, tip = [f"servo_{number}_mm" for number in SERVOS], [f"tip_{axis}" for axis in "xyz"]
+    table.require(["pattern_label", *servos, *tip])
+    return Pulls(np.array(table.texts("pattern_label")), table.vectors(servos, 1e-3), table.vectors(tip, 1e-3))
 
 
 def angles(x: np.ndarray) -> np.ndarray:
@@ -110,12 +106,17 @@ def repeatability(pulls: Pulls, near: float = 0.3e-3) -> float:
 
 def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part:
     """Fit to all poses, with five-fold cross-validation by whole patterns."""
-    pulls = read(folder / "train.csv")
+    pulls = read(folder)
     if brief:
         pulls = pulls.rows(np.arange(len(pulls.tip)) % 5 == 0)
     progress("fit to all poses")
     x, half = fit(pulls)
     patterns = np.array(sorted(set(pulls.pattern)))
+    if len(patterns) < _FOLDS or pulls.single.all():
+        raise MeasurementError(
+            f"{folder}: contains {len(patterns)} patterns of pulls, {len(set(pulls.pattern[~pulls.single]))} of them of several"
+            f" tendons; at least {_FOLDS} are needed, and one of several tendons"
+        )
     fold_of = dict(zip(patterns, np.random.default_rng(0).permutation(np.arange(len(patterns)) % _FOLDS)))
     fold = np.array([fold_of[pattern] for pattern in pulls.pattern])
     predicted = np.empty_like(pulls.tip)
@@ -128,8 +129,12 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     inside = predict(x, several.displacement)
     alone = rms_distance((predicted - pulls.tip)[pulls.single]) if pulls.single.any() else float("nan")
     same = repeatability(several)
-    groups = sorted({pattern.split("_")[1] for pattern in several.pattern})
-    group = np.array([pattern.split("_")[1] for pattern in several.pattern])
+    scatters = {
+        "tdcr: pulls of single tendons, five-fold, RMSE": alone,
+        "tdcr: repeatability, tips of equal commands, standard deviation": same,
+    }
+    group = np.array([pattern.split("_")[1] if "_" in pattern else pattern for pattern in several.pattern])
+    groups = sorted(set(group))
     factor = np.concatenate(
         [np.full(3, 180 / np.pi), np.ones(9), np.full(9, 1e3), [1.0], np.full(3, 180 / np.pi), np.full(3, 1e3)]
     )
@@ -149,8 +154,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
                 4.0,
             ),
             Figure("tdcr: tip, fitted, RMSE", 1e3 * rms_distance(inside - several.tip), "mm"),
-            Figure("tdcr: pulls of single tendons, five-fold, RMSE", 1e3 * alone, "mm"),
-            Figure("tdcr: repeatability, tips of equal commands, standard deviation", 1e3 * same, "mm"),
+            *(Figure(name, 1e3 * value, "mm") for name, value in scatters.items() if np.isfinite(value)),
         ],
         parts=[
             views(
@@ -168,7 +172,8 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
             fitted_table("Nine tendons: fitted", estimates),
         ],
         notes=[
-            f"tdcr: tips of equal commands (within 0.3 mm) scatter by {1e3 * same:.1f} mm: friction and the order of the pulls,"
+            "tdcr: tips of equal commands (within 0.3 mm)"
+            f" {f'scatter by {1e3 * same:.1f} mm' if np.isfinite(same) else 'scatter'}: friction and the order of the pulls,"
             " which a model of the resting shape does not contain. Backlash of 0.3 mm and more between servo and tendon made the"
             " fit worse.",
             "tdcr: the fit uses a chain of constant curvatures with elastic tendons that only pull, not the full model.",

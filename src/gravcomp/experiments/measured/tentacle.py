@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.calibration.mapping import load_mapping
-from gravcomp.calibration.measured import rms_distance
+from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_fit import fit_poses, held_out
 from gravcomp.calibration.pose_report import error_bars, fitted_table, views
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
 from gravcomp.description import Cable, Elements, Material, Robot, Segment
+from gravcomp.experiments.measured.folder_table import folder_table
 from gravcomp.experiments.measured.part import Part
 from gravcomp.report.result import Figure
 
@@ -37,10 +38,14 @@ def robot() -> Robot:
 def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part:
     """Fit to all poses, and predict each by a fit to the others (brief: each pair)."""
     cone, mapping = robot(), load_mapping(_MAPPING)
-    poses = read_poses(folder / "poses.csv", mapping, cone.cable_names)
+    poses = read_poses(folder_table(folder, "poses.csv").path, mapping, cone.cable_names)
+    if poses.count < 2:
+        raise MeasurementError(
+            f"{poses.source}: contains one pose; needed: at least 2, as each is predicted by a fit to the others"
+        )
     unknowns = unknowns_of(mapping.fit, cone)
     fit = fit_poses(cone, poses, unknowns, progress=progress)
-    count = poses.count // 2 if brief else poses.count
+    count = max(2, poses.count // 2) if brief else poses.count
     folds = [np.arange(poses.count)[k::count] for k in range(count)]
     left_out = held_out(cone, poses, unknowns, folds, start=fit.x, progress=progress)
     inside, outside = fit.predicted - poses.measured, left_out - poses.measured

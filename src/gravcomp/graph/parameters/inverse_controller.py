@@ -12,9 +12,9 @@ class InverseControllerParameters:
     """Parameters of the node; the limits of the cables are in the robot file under `robot.limits`."""
 
     enabled: bool = parameter(True, description="send commands; ~/enable changes it")
-    hold_straight: bool = parameter(True, description="keep the robot straight until the first target arrives")
+    hold_straight: bool = parameter(True, description="keep the shape at rest, straight or bent, until the first target arrives")
     tip_position_weight: float = parameter(
-        1.0, minimum=0.0, maximum=1e3, description="weight of the tip position for a target pose and for the straight robot"
+        1.0, minimum=0.0, maximum=1e3, description="weight of the tip position for a target pose and for the shape at rest"
     )
     tip_direction_weight: float | None = parameter(
         None, unit="m^2", minimum=0.0, maximum=10.0,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gravcomp.recordings.bags.errors import BagError
+from gravcomp.recordings.bags.rows import stamp_ns
 
 _JOINTS = "sensor_msgs/msg/JointState"
 _TEXT = "std_msgs/msg/String"
@@ -36,8 +37,7 @@ def read_joint_positions(path: str | Path, names: Sequence[str]) -> tuple[np.nda
             continue
         last.update((name, x) for name, x in zip(message.name, message.position) if name in names and np.isfinite(x))
         if len(last) == len(names):
-            stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-            stamps.append(stamp or received)
+            stamps.append(stamp_ns(message) or received)
             rows.append([last[name] for name in names])
     if not rows:
         missing = ", ".join(name for name in names if name not in last)

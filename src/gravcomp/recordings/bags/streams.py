@@ -1,6 +1,5 @@
 """Topics of a bag as arrays, one row for each message."""
 
-from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gravcomp.recordings.bags.errors import BagError
+from gravcomp.recordings.bags.rows import Rows, stamp_ns
 
 VECTOR = "geometry_msgs/msg/Vector3Stamped"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -46,21 +46,6 @@ class Stream:
         return np.column_stack([np.interp(time, self.stamp[order], column[order]) for column in self.values.T])
 
 
-class _Rows:
-    """Stamp, time of reception and values of each message of a topic, 8 bytes each: a long recording has millions."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.widths: set[int] = set()
-        self.numbers = array("d")
-
-    def append(self, stamp: float, received: float, values: tuple[float, ...]) -> None:
-        """Add a message: stamp and time of reception in s, values (n,)."""
-        self.count += 1
-        self.widths.add(len(values))
-        self.numbers.extend((stamp, received, *values))
-
-
 def read_streams(path: str | Path, wanted: Mapping[str, Wanted]) -> dict[str, Stream | None]:
     """Return the topics by the keys of `wanted`, None for an optional one that is missing or empty. A damaged bag is recovered.
 
@@ -78,20 +63,19 @@ def read_streams(path: str | Path, wanted: Mapping[str, Wanted]) -> dict[str, St
         with AnyReader([readable(path).path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             found = {c.topic: c.msgtype for c in reader.connections}
             topics = {key: _topic(path, found, want) for key, want in wanted.items()}
-            rows = {topic: _Rows() for topic in topics.values() if topic}
+            rows = {topic: Rows() for topic in topics.values() if topic}
             for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
                 message: Any = reader.deserialize(raw, connection.msgtype)
-                stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-                rows[connection.topic].append(stamp, 1e-9 * received, _VALUES[connection.msgtype](message))
+                rows[connection.topic].append(stamp_ns(message), received, _VALUES[connection.msgtype](message))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
         raise BagError(f"{path}: is not a readable bag: {error}") from error
     streams: dict[str, Stream | None] = {}
     for key, topic in topics.items():
-        if topic is None or (wanted[key].optional and not rows[topic].count):
+        if topic is None or (wanted[key].optional and not len(rows[topic])):
             streams[key] = None
             continue
-        if not wanted[key].optional and rows[topic].count < _LEAST:
-            raise BagError(f"{path}: '{topic}' has {rows[topic].count} messages; at least {_LEAST} are needed")
+        if not wanted[key].optional and len(rows[topic]) < _LEAST:
+            raise BagError(f"{path}: '{topic}' has {len(rows[topic])} messages; at least {_LEAST} are needed")
         streams[key] = _stream(path, topic, rows[topic])
     return streams
 
@@ -121,11 +105,11 @@ def _topic(path: str | Path, found: dict[str, str], want: Wanted) -> str | None:
     )
 
 
-def _stream(path: str | Path, topic: str, rows: _Rows) -> Stream:
-    if len(rows.widths) > 1:
+def _stream(path: str | Path, topic: str, rows: Rows) -> Stream:
+    if not rows.even:
         raise BagError(f"{path}: the messages of '{topic}' have different numbers of values; those of one robot are needed")
-    table = np.frombuffer(rows.numbers).reshape(rows.count, -1)
-    return Stream(topic, table[:, 0], table[:, 1], table[:, 2:])
+    stamps, received, values = rows.arrays()
+    return Stream(topic, 1e-9 * stamps, 1e-9 * received, values)
 
 
 def _vector(v: Any) -> tuple[float, ...]:

@@ -26,9 +26,12 @@ def read_recording(
     path = Path(path).expanduser()
     if not path.exists():
         raise RecordingError(f"{path}: does not exist; {_KINDS} is needed")
+    is_bag = path.suffix in (".mcap", ".db3") or (path.is_dir() and not is_csv(path))
+    if topic is not None and not is_bag:
+        raise RecordingError(f"{path}: is no bag, so that it has no topic '{topic}' to choose")
     if is_csv(path):
         return read_csv(path, columns)
-    if path.is_dir() or path.suffix in (".mcap", ".db3"):
+    if is_bag:
         return read_rosbag(path, topic, progress)
     if path.suffix != ".npz":
         raise RecordingError(f"{path}: is of no known kind; {_KINDS} is needed")

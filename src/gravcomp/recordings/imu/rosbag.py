@@ -5,13 +5,11 @@ namespace and, as ground truth, `virtual/base_orientation` (geometry_msgs/Quater
 `stamps.py` repairs those that cannot be used.
 """
 
-from array import array
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from gravcomp.recordings.bags.rows import Rows, stamp_ns
 from gravcomp.recordings.imu.recording import Recording, RecordingError
 from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
@@ -23,26 +21,6 @@ TEMPERATURE = "sensor_msgs/msg/Temperature"
 TRUTH = "geometry_msgs/msg/QuaternionStamped"
 _CHECKED = 0.5  # share of the search for damage in the time to read a bag
 _REPORTED = 1000  # messages between two reports of progress
-
-
-class _Rows:
-    """Stamps, times of reception and values of a topic, in 8 bytes each: a long recording has millions."""
-
-    def __init__(self, width: int):
-        self._width = width
-        self._times = (array("q"), array("q"))
-        self._values = array("d")
-
-    def append(self, stamp: int, received: int, values: tuple[float, ...]) -> None:
-        """Add a message: stamp and time of reception in ns, values (width,)."""
-        self._times[0].append(stamp)
-        self._times[1].append(received)
-        self._values.extend(values)
-
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return stamps (k,) and times of reception (k,) in ns, and values (k, width)."""
-        stamp, received = (np.frombuffer(times, dtype=np.int64) for times in self._times)
-        return stamp, received, np.frombuffer(self._values).reshape(len(stamp), self._width)
 
 
 def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[float], None] | None = None) -> Recording:
@@ -73,13 +51,12 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
             truths = [
                 c.topic for c in reader.connections if c.msgtype == TRUTH and c.topic == f"{prefix}virtual/base_orientation"
             ]
-            rows = {t: _Rows(width) for t, width in ((name, 6), *((t, 1) for t in temperatures[:1]), *((t, 4) for t in truths))}
+            rows = {t: Rows(width) for t, width in ((name, 6), *((t, 1) for t in temperatures[:1]), *((t, 4) for t in truths))}
             for i, (connection, received, raw) in enumerate(reader.messages([c for c in reader.connections if c.topic in rows])):
                 if progress is not None and i % _REPORTED == 0:
                     progress(_CHECKED + (1.0 - _CHECKED) * share_read(reader, received))
                 message: Any = reader.deserialize(raw, connection.msgtype)
-                stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-                rows[connection.topic].append(stamp, received, _values(message))
+                rows[connection.topic].append(stamp_ns(message), received, _values(message))
     except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
         if isinstance(error, RecordingError):
             raise

@@ -1,0 +1,51 @@
+"""Places that move on with the robot, and keep where they are along it; compiled."""
+
+import numpy as np
+from numba import njit
+
+from gravcomp.contact.places import Places, all_gaps, deepest, write_tangents
+from gravcomp.contact.surface import ContactSurface
+from gravcomp.scene.distance import SceneArrays, gap_to
+
+
+@njit(cache=True)
+def positions(places: Places, sections: np.ndarray) -> np.ndarray:
+    """Return where the material points of the places (c, 3) are for sections (s, 3, 3)."""
+    result = np.zeros((len(places.row), 3))
+    for i in range(len(places.row)):
+        x, y = places.own[i]
+        for n in range(3):
+            section = sections[places.first[i] + n]
+            for j in range(3):
+                result[i, j] += places.share[i, n] * (section[0, j] + x * section[1, j] + y * section[2, j])
+    return result
+
+
+@njit(cache=True)
+def follow(scene: SceneArrays, surface: ContactSurface, places: Places, sections: np.ndarray) -> None:
+    """Write gaps, normals and tangents where the stations are now at `sections` (s, 3, 3).
+
+    Places stay where they are along the robot, and go to the nearest point around it; those of the rim stay.
+    """
+    section = np.empty((3, 3))
+    for i in range(len(places.row)):
+        section[:] = 0.0
+        for n in range(3):
+            section += places.share[i, n] * sections[places.first[i] + n]
+        row, station, own, normal = places.row[i], places.station[i], places.own[i], places.normal[i]
+        if places.slot[i] < len(surface.place):
+            places.gap[i] = deepest(scene, row, surface, station, section, own, normal)
+        else:
+            places.gap[i] = gap_to(scene, row, section[0] + own[0] * section[1] + own[1] * section[2], normal)
+        write_tangents(section, places, i)
+
+
+@njit(cache=True)
+def unseen_depth(scene: SceneArrays, surface: ContactSurface, places: Places, sections: np.ndarray, allowed: float) -> float:
+    """Return how deep in m a station at `sections` (s, 3, 3) is that is none of the places, or less than `allowed` m."""
+    shape = len(scene.kind), len(surface.place)
+    own, normal, seen = np.zeros((shape[0], shape[1], 2)), np.zeros((shape[0], shape[1], 3)), np.zeros(shape, dtype=np.bool_)
+    gap = all_gaps(scene, surface, sections, np.full(shape[1], -allowed), seen, own, normal)
+    for i in range(len(places.row)):
+        gap[places.row[i], places.station[i]] = np.inf
+    return -gap.min()
