@@ -115,7 +115,7 @@ def blob_of(modes: int = 4, motion: float = 1.0, law_points: int = 0, branches: 
     settings[14:22] = 0.0, 0.0, 0.1, 0.0, 0.0, 1.0, 1.0, 1e-3
     settings[23], settings[27:30] = 1.0, 1.0
     settings[36:40], settings[55:57] = (9.81, 1e-3, 1e-3, 0.05), (35.0, 60.0)
-    settings[-10:] = 4, 1, 2, 3, 4, 5, 6, 0, 0, 0
+    settings[-12:] = 0.07, 0.05, 4, 1, 2, 3, 4, 5, 6, 0, 0, 0
     tables = (
         np.zeros((modes, pairs)), np.zeros((pairs, cables)), change, np.eye(3, modes), section,
         (0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), np.tile((0.0, 0.0, 0.1), (cables, 1)), np.zeros((points, 3, modes)),

@@ -37,6 +37,7 @@ def has_model(bench) -> bool:
         (lambda b: b[:-8], "cut off"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 32, 52), "more modes"),
+        (lambda b: changed(b, 44, model_blob.PIECES_MAX + 1), "pieces of cables"),
         (lambda b: b + bytes(model_transfer.SLOT), "384 KB"),
         (lambda b: b"XXXX" + b[4:], "no blob"),
     ],
@@ -67,7 +68,9 @@ def test_a_model_comes_over_the_bus_though_frames_are_lost(board):
 
 
 def test_a_supply_lost_at_any_word_leaves_a_whole_model(board):
-    for words in (0, 1, 5, 100, 391):
+    """The last two: before the first word, which makes the new model a whole one, and before the old one's is taken away."""
+    every = len(blob_of(8)) // 4
+    for words in (0, 1, 100, every - 1, every):
         board.run(20)
         board.board.lose_supply_after(words)
         with pytest.raises(ConfigError):

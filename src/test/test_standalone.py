@@ -13,6 +13,7 @@ from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import PronyTerm, load_robot_file
+from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware import model_blob
 from gravcomp.firmware.cycles import MEMORY_AT, Processor, sample_bytes
 from gravcomp.firmware.host_library import load as library
@@ -23,6 +24,7 @@ from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopPara
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.guard import Problem
 from gravcomp.simulation import RobotModel
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
@@ -95,6 +97,22 @@ def test_a_lost_equilibrium_holds_the_robot_at_its_last_one(found):
     assert loop.read().converged and np.all(np.isfinite(loop.read().displacement))
 
 
+def test_a_jolt_that_loses_the_equilibrium_does_not_lose_it_for_good(found):
+    lost, left = 0, []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        gravity, jolt = (size * axis / np.linalg.norm(axis) for size, axis in zip((9.81, 100.0), rng.normal(size=(2, 3))))
+        loop, steps = started(found.blob, gravity), int(rng.integers(5, 60))
+        for k in range(steps):
+            loop.follow(SAMPLE_PERIOD, gravity + (k + 1) / steps * jolt)
+            lost += not loop.read().converged
+        for _ in range(200):
+            loop.follow(SAMPLE_PERIOD, gravity)
+        left.append(loop.read())
+    assert lost > 20
+    assert sum(result.converged for result in left) >= 10  # some try for longer
+
+
 def changed(blob: bytes, at: int, value: int) -> bytes:
     return model_blob.with_crc(blob[:at] + struct.pack("<I", value) + blob[at + 4 :])
 
@@ -108,6 +126,10 @@ def changed(blob: bytes, at: int, value: int) -> bytes:
         (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: changed(b, 32, 52), "more modes"),
         (lambda b: changed(b, 40, CABLES_MAX + 1), "more modes"),
+        (lambda b: changed(b, 44, model_blob.PIECES_MAX + 1), "pieces of cables"),
+        (lambda b: changed(b, 52, model_blob.POINTS_MAX + 1), "points"),
+        (lambda b: changed(b, 56, model_blob.LAW_POINTS_MAX + 1), "points"),
+        (lambda b: changed(b, 60, model_blob.BRANCHES_MAX + 1), "branches"),
         (lambda b: changed(b, 8, len(b) - 4), "size"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 16, 0), "another robot"),
@@ -123,9 +145,10 @@ def test_a_spoilt_model_is_refused_and_the_old_one_goes_on(found, spoil, reason)
     np.testing.assert_array_equal(loop.read().displacement, untouched.read().displacement)
 
 
-def test_the_settings_have_the_length_that_the_firmware_reads(parameters):
+def test_the_settings_have_the_length_that_the_firmware_reads(parameters, built):
+    turn = BaseTurn(built[0], parameters.turn)
     library().gc_loop_settings.restype = ctypes.c_size_t
-    assert len(settings(parameters, 1.0, 1.0)) == model_blob.SETTINGS == library().gc_loop_settings()
+    assert len(settings(parameters, 1.0, 1.0, turn)) == model_blob.SETTINGS == library().gc_loop_settings()
 
 
 def test_a_robot_that_creeps_and_whose_cables_rub_does_so_on_the_board(parameters, built):
@@ -171,6 +194,45 @@ def test_the_estimator_in_float32_follows_that_of_the_host(parameters, found):
     assert np.degrees(worst / 9.81) < 0.05
 
 
+def test_the_forces_of_a_turning_base_are_those_of_the_host(parameters, built, found):
+    """Over lost samples, one of an unknown kind, and a pause after which the rates begin again."""
+    estimator = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))
+    mount, turn, loop = parameters.robot.imu_mount.rotation, BaseTurn(built[0], parameters.turn), StandaloneLoop(found.blob)
+    worst = largest = 0.0
+    for k in range(600):
+        if k in (200, 201) or 400 <= k < 420:
+            continue
+        gyro = np.array([1.0, -0.5, 0.3]) * np.sin(0.05 * k)
+        accel = np.full(3, np.nan) if k == 300 else np.array([0.0, 0.0, 9.81])
+        estimate = estimator.update(k * 10_000_000, gyro.tolist(), accel.tolist())
+        if not isinstance(estimate, Problem):
+            turn.add(0.01 * k, mount @ np.array(estimate.imu.angular_velocity))
+        wanted = turn.acceleration(0.01 * k)
+        assert loop.weigh(k * 10_000, gyro, accel) == (k != 300)
+        worst = max(worst, float(np.linalg.norm(loop.read().turning - wanted)))
+        largest = max(largest, float(np.linalg.norm(wanted)))
+        if k in (0, 420):
+            assert not loop.read().turning.any()
+    assert largest > 0.1 and worst < 1e-4 * largest
+    last, without = loop.read(), StandaloneLoop(found.blob)
+    loop.follow(SAMPLE_PERIOD)
+    without.follow(SAMPLE_PERIOD, last.gravity)
+    alike = StandaloneLoop(found.blob)
+    alike.follow(SAMPLE_PERIOD, last.gravity + last.turning)
+    np.testing.assert_allclose(loop.read().tip, alike.read().tip, rtol=0.0, atol=1e-9)
+    assert np.linalg.norm(loop.read().tip - without.read().tip) > 1e-6
+
+
+def test_a_turn_that_does_not_count_has_no_forces_on_the_board(parameters, built):
+    file = load_robot_file("article")
+    nodes = {**file.section("nodes"), "fem_simulator": {"turn": {"enabled": False}}}
+    off = LoopParameters.of(dataclasses.replace(file, robot=parameters.robot, sections={**file.sections, "nodes": nodes}))
+    values = [settings(each, 1.0, 1.0, BaseTurn(built[0], each.turn)) for each in (parameters, off)]
+    height, lag = np.flatnonzero(values[0] != values[1])
+    assert values[0][height] == pytest.approx(BaseTurn(built[0], off.turn).height) and values[0][lag] > 0.0
+    assert not values[1][[height, lag]].any()
+
+
 def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host(parameters, found):
     """A sensor that is shaken so fast that the first look finds spikes where there are none, with stamps that jitter."""
     rng = np.random.default_rng(3)
@@ -193,7 +255,7 @@ def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host
 def test_the_image_computes_the_same_bits_as_the_host(found):
     """The inner loops are written in the processor's instructions there."""
     processor, loop = Processor(build_image(standalone=True), found.blob), StandaloneLoop(found.blob)
-    sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
+    sample, targets = MEMORY_AT + 0x17000, MEMORY_AT + 0x17100
     assert processor.take_model(found.blob)
     on_host = (ctypes.c_float * 8)(), (ctypes.c_float * 8)()
     memory = ctypes.create_string_buffer(24)

@@ -8,6 +8,7 @@
 // Displacements of the tip as fractions of the length, as in reduction/tracking.py.
 #define GC_LONGEST_STEP 0.12f
 #define GC_TOLERANCE 1e-2f  // what is left at most; the next call takes it away
+#define GC_LOST_LONG 40u   // twice the calls without a shape, less those with one: then the tracking starts from the straight robot
 #define GC_SLIDING_AT_REST 1e-9f   // N: a tension that is rounding error
 #define GC_SLIDING_REVERSAL 5e-4f  // of the length: way of a cable from no friction to whole
 
@@ -296,6 +297,19 @@ static void remember(gc_equilibrium *state) {
   gc_creep_end(&state->creep, model, strain);
 }
 
+// Go back to the last shape near an equilibrium, which the next call evaluates; where that has not helped, to the straight robot.
+static void go_back(gc_equilibrium *state) {
+  state->lost += 2u;
+  if (state->lost < GC_LOST_LONG) {
+    gc_copy(state->q, state->safe_q, sizeof state->q);
+    gc_copy(state->tension, state->safe_tension, sizeof state->tension);
+    return;
+  }
+  const gc_creep creep = state->creep;
+  gc_equilibrium_reset(state, state->model);
+  state->creep = creep;  // the material has crept, whatever the tracking lost
+}
+
 void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *wound, float interval,
                          gc_shape *shape) {
   const gc_model *model = state->model;
@@ -315,9 +329,7 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
   found = found && gc_finite(corrected);
   state->evaluated = found;
   if (!found) {
-    // Without a usable shape: back to the last equilibrium, which the next call evaluates.
-    gc_copy(state->q, state->safe_q, sizeof state->q);
-    gc_copy(state->tension, state->safe_tension, sizeof state->tension);
+    go_back(state);
     shape->converged = false;
     shape->left = length;
     return;
@@ -326,6 +338,10 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
   shape->left = larger > 0.0f ? corrected * (corrected / larger) : 0.0f;
   shape->converged = shape->left <= GC_TOLERANCE * length && inside(model, state->q, state->correction);
   if (shape->converged) {
+    state->lost -= state->lost > 0u ? 1u : 0u;
+    // At q the stiffness is positive definite; at the equilibrium itself it need not be.
+    gc_copy(state->safe_q, state->q, sizeof state->safe_q);
+    gc_copy(state->safe_tension, state->tension, sizeof state->safe_tension);
     gc_copy(state->tension, tension, sizeof state->tension);
     observe(state, shape);
     observe_length(state, shape);
@@ -333,9 +349,5 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
     if (model->branches > 0u) {
       remember(state);
     }
-    for (uint32_t a = 0; a < model->modes; ++a) {
-      state->safe_q[a] = state->q[a] + state->correction[a];
-    }
-    gc_copy(state->safe_tension, tension, sizeof state->safe_tension);
   }
 }

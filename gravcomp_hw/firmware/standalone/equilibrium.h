@@ -43,8 +43,9 @@ typedef struct {
   float compliance[GC_CABLES_MAX][GC_CABLES_MAX];
   float stiffness[GC_PAIRS_MAX];
   float factor[GC_PAIRS_MAX];
-  float safe_q[GC_MODES_MAX];    // last equilibrium
+  float safe_q[GC_MODES_MAX];    // near the last equilibrium, with a stiffness that is positive definite
   float safe_tension[GC_CABLES_MAX];
+  uint32_t lost;  // twice the calls without a usable shape, less those with one
   float pulling[GC_CABLES_MAX];  // direction of sliding
   float wound[GC_CABLES_MAX];    // m, last input, NaN: released
   bool taut[GC_CABLES_MAX];
@@ -57,7 +58,8 @@ void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model);
 
 // Track the equilibrium to gravity (3,) in m/s^2 in soft_base and to cables pulled in to `wound` (m,) in m, NaN: released.
 // After a reset gravity rises from zero over GC_LOADING_STEPS calls, so that one step a call finds each equilibrium.
-// Where none is found the shape is the last equilibrium, from which the next call starts.
+// Where none is found the shape is the last equilibrium, near which the next call starts; after 20 calls without one, or more of
+// which every other one has none, the tracking starts again from the straight robot, and gravity rises again.
 //
 // interval: s since the last call, in which the material creeps.
 void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, float interval, gc_shape *shape);

@@ -4,7 +4,6 @@
 #include "law_of_invariants.h"
 
 #define ROWS 9u  // of H
-#define LEAST_MOTION 1e-5f  // of q for which the stiffness follows the motion, as a fraction of the reach
 
 // Write F (3, 3), and E from 2 E = H + H^T + H^T H, at q.
 static void deform(const float *change, uint32_t r, const float *q, float f[ROWS], float e[6]) {
@@ -93,49 +92,15 @@ static void add_stiffness(const float *change, uint32_t r, float a[ROWS][ROWS], 
   }
 }
 
-// Return the place of the entry (i, j), j <= i, in a matrix by tiles.
-static uint32_t place_of(uint32_t i, uint32_t j) {
-  const uint32_t first = i / GC_TILE * GC_TILE, row = i - first, before = first * (first + 1u) / 2u;
-  return j < first ? before + GC_TILE * j + row : before + GC_TILE * first + row * (row + 1u) / 2u + (j - first);
-}
-
-// Make the stiffness right for the last motion from state->q to q, at which the force is `force`.
-static void follow_motion(const gc_model *model, gc_law_deviation *state, const float *q, const float *force) {
-  const uint32_t r = model->modes;
-  float s[GC_MODES_MAX], y[GC_MODES_MAX], square = 0.0f, along = 0.0f;
-  for (uint32_t i = 0; i < r; ++i) {
-    s[i] = q[i] - state->q[i];
-    y[i] = force[i] - state->force[i];
-    square += s[i] * s[i];
-  }
-  const float least = LEAST_MOTION * model->settings->reach;
-  if (square < least * least) {
-    return;  // rounding errors would be the larger part
-  }
-  for (uint32_t i = 0; i < r; ++i) {
-    for (uint32_t j = 0; j <= i; ++j) {
-      const float entry = state->stiffness[place_of(i, j)];
-      y[i] -= entry * s[j];
-      y[j] -= j < i ? entry * s[i] : 0.0f;
+// Put A (9, 9) of a point in the place of the one before; A becomes the difference.
+static void renew(float *part, float a[ROWS][ROWS]) {
+  for (uint32_t i = 0; i < ROWS; ++i) {
+    for (uint32_t j = 0; j <= i; ++j, ++part) {
+      const float before = *part;
+      *part = a[i][j];
+      a[i][j] = a[j][i] = a[i][j] - before;
     }
   }
-  for (uint32_t i = 0; i < r; ++i) {
-    along += s[i] * y[i];
-  }
-  const float inverse = 1.0f / square, twice = along * inverse * inverse;
-  for (uint32_t i = 0; i < r; ++i) {
-    for (uint32_t j = 0; j <= i; ++j) {
-      state->stiffness[place_of(i, j)] += (y[i] * s[j] + s[i] * y[j]) * inverse - twice * s[i] * s[j];
-    }
-  }
-}
-
-static void use_next(const gc_model *model, gc_law_deviation *state) {
-  for (uint32_t k = 0; k < model->modes * (model->modes + 1u) / 2u; ++k) {
-    state->stiffness[k] = state->next[k];
-    state->next[k] = 0.0f;
-  }
-  state->turn = 0u;
 }
 
 void gc_law_deviation_at(const gc_model *model, const float *q, gc_law_deviation *state, float *force) {
@@ -163,17 +128,12 @@ void gc_law_deviation_at(const gc_model *model, const float *q, gc_law_deviation
     if (is_due) {
       float a[ROWS][ROWS];
       stiffness_of(f, t, d, a);
-      add_stiffness(change, r, a, state->next);
+      renew(state->part[p], a);
+      add_stiffness(change, r, a, state->stiffness);
     }
   }
-  state->turn = end;
-  if (end == model->law_points) {
-    use_next(model, state);
-  }
-  follow_motion(model, state, q, own);
+  state->turn = end < model->law_points ? end : 0u;
   for (uint32_t i = 0; i < r; ++i) {
-    state->q[i] = q[i];
-    state->force[i] = own[i];
     force[i] += own[i];
   }
 }

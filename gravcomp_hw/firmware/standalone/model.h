@@ -13,12 +13,12 @@
 #include "settings.h"
 
 #define GC_MODEL_MAGIC 0x424d4347u // "GCMB"
-#define GC_MODEL_VERSION 2u
+#define GC_MODEL_VERSION 3u
 #define GC_TILE 4u // rows of a tile and strains of a block: what one kernel holds in registers
 #define GC_MODES_MAX 48u
 #define GC_STRAINS_MAX 96u
 #define GC_CABLES_MAX 9u
-#define GC_PIECES_MAX 192u
+#define GC_PIECES_MAX 512u
 #define GC_PAIRS_MAX (GC_MODES_MAX * (GC_MODES_MAX + 1u) / 2u)
 #define GC_POINTS_MAX 64u
 #define GC_LAW_POINTS_MAX 128u

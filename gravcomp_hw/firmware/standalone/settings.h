@@ -62,6 +62,8 @@ typedef struct {
   float spike_ratio;
   float spike_time_constant; // s
   float spike_longest;       // samples
+  float turn_height;         // m along the robot: where the forces of a turning base are taken; 0: they do not count
+  float turn_time;           // s, low-pass of the base's rate
   float law_share;           // points of a law of which a step computes the stiffness
   float cable_motor[9];      // number of each cable's motor, 1 to 8; 0: no such cable
 } gc_settings;

@@ -39,18 +39,15 @@ void gc_standalone_use(gc_standalone *loop, const gc_model *model) {
   gc_inverse_reset(&loop->controller, &loop->model);  // homing leaves the cables where the straight robot has them
 }
 
-// Convert a sample's counts: gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false for ranges that the chip does not have.
-static bool converted(const gc_sample *sample, float *gyro, float *accel) {
-  if (sample->force_range >= 4u || sample->rate_range >= 5u) {
-    return false;
-  }
-  const float force = GC_STANDARD_GRAVITY / COUNTS_PER_G[sample->force_range];
-  const float rate = FULL_RATE[sample->rate_range] * (GC_DEGREE / GC_COUNTS);
+// Convert a sample's counts: gyro (3,) in rad/s, accel (3,) in m/s^2; NaN for ranges that the chip does not have.
+static void convert(const gc_sample *sample, float *gyro, float *accel) {
+  const bool known = sample->force_range < 4u && sample->rate_range < 5u;
+  const float force = known ? GC_STANDARD_GRAVITY / COUNTS_PER_G[sample->force_range] : __builtin_nanf("");
+  const float rate = known ? FULL_RATE[sample->rate_range] * (GC_DEGREE / GC_COUNTS) : force;
   for (uint32_t i = 0; i < 3u; ++i) {
     gyro[i] = rate * (float)sample->rate[i];
     accel[i] = force * (float)sample->force[i];
   }
-  return true;
 }
 
 // Return the time in s since the last sample, and follow its stamp, which wraps.
@@ -65,15 +62,33 @@ static float elapsed(gc_standalone *loop, uint32_t time) {
   return interval;
 }
 
-// Estimate gravity from a sample. Returns whether it is known.
+bool gc_standalone_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const float *accel) {
+  const gc_settings *settings = loop->model.settings;
+  float rate[3];
+  gc_base_turn_acting(&loop->turn, settings, stamp, loop->turning);  // by the rates before, as on the host
+  if (!gc_gravity_take(&loop->gravity, stamp, gyro, accel, loop->down)) {
+    return false;
+  }
+  loop->has_gravity = true;
+  gc_quaternion_rotate(loop->gravity.mount, loop->gravity.rate, rate);
+  gc_base_turn_follow(&loop->turn, settings, stamp, rate);
+  return true;
+}
+
+void gc_standalone_field(const gc_standalone *loop, float *field) {
+  for (uint32_t i = 0; i < 3u; ++i) {
+    field[i] = loop->down[i] + loop->turning[i];
+  }
+}
+
+// Take the temperature and the counts of a sample. Returns whether gravity is known.
 static bool weigh(gc_standalone *loop, const gc_sample *sample) {
   float gyro[3], accel[3];
   if (sample->temperature != GC_NO_READING) {
     gc_gravity_temperature(&loop->gravity, loop->stamp, 23.0f + 0.125f * (float)sample->temperature);
   }
-  if (converted(sample, gyro, accel) && gc_gravity_take(&loop->gravity, loop->stamp, gyro, accel, loop->down)) {
-    loop->has_gravity = true;
-  }
+  convert(sample, gyro, accel);
+  (void)gc_standalone_weigh(loop, loop->stamp, gyro, accel);
   return loop->has_gravity;
 }
 
@@ -109,7 +124,9 @@ bool gc_standalone_step(gc_standalone *loop, const gc_sample *sample, uint8_t mo
   if (!weigh(loop, sample)) {
     return false;
   }
-  gc_standalone_follow(loop, loop->down, interval);
+  float field[3];
+  gc_standalone_field(loop, field);
+  gc_standalone_follow(loop, field, interval);
   return by_motors(loop, motors, displacement, tension);
 }
 

@@ -9,6 +9,7 @@
 
 #include "../core/frame.h"
 #include "../core/imu.h"
+#include "base_turn.h"
 #include "controller.h"
 #include "gravity.h"
 
@@ -21,10 +22,12 @@ typedef struct {
   bool loaded;
   gc_model_status refusal;  // of the last blob
   gc_gravity_estimator gravity;
+  gc_base_turn turn;
   gc_equilibrium equilibrium;
   gc_shape shape;
   gc_inverse_controller controller;
   float down[3];      // m/s^2, gravity in soft_base
+  float turning[3];   // m/s^2, what turns of the base add
   bool has_gravity;
   bool has_sample;
   uint32_t time;      // us, of the last sample
@@ -42,6 +45,13 @@ void gc_standalone_use(gc_standalone *loop, const gc_model *model);
 
 // Let a loop that was copied to another place in memory go on with the same model, `model`, which was opened there.
 void gc_standalone_moved(gc_standalone *loop, const gc_model *model);
+
+// Estimate gravity, and what turns of the base add, from a sample: stamp in us, gyro (3,) in rad/s, accel (3,) in m/s^2. Returns
+// false where it cannot be used.
+bool gc_standalone_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const float *accel);
+
+// Write the estimated gravity with what turns of the base add, (3,) in m/s^2 in soft_base.
+void gc_standalone_field(const gc_standalone *loop, float *field);
 
 // Compute the command for gravity (3,) in m/s^2 in soft_base, `interval` s after the last one; it is in loop->controller. After a
 // start the model's gravity rises within half a second, and the command with it: the robot goes from where it sags to the target

@@ -29,6 +29,7 @@ Progress = Callable[[str], None]
 _RUBBER = "tentacle"
 _RATES, _SEEDS = (10.0, 90.0), 3  # deg/s
 _STEPS = 400
+_SMOOTHED = 15  # steps on either side of one
 _COUNTED = 12  # steps of which the cycles are counted
 _PER_G, _GRAVITY = 5460.0, 9.80665  # counts of the range of 6 g
 _COUNTS_PER_RAD_S = 32767.0 / np.radians(2000.0)
@@ -73,6 +74,7 @@ def others(progress: Progress) -> dict[str, dict]:
             "law_points": len(own.model.deviation.weight),
             "basis_error_mm": round(1e3 * own.error, 4),
             "tip_mm": compared["board_tip_mm"],
+            "lateral_mm": compared["board_lateral_mm"],
             "command_mm": compared["board_command_mm"],
             "ms": step_time(progress, file, own, 4)["board_ms"]["worst"],
         }
@@ -89,10 +91,11 @@ def model_of(file: RobotFile) -> Fit:
 def accuracy(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:
     """Return the worst differences from the host's loop while gravity turns at 10 and 90 deg/s.
 
-    `board_tip_mm`: of the model's tip, `board_command_mm`: of a cable's displacement, `board_solver_steps`: most of a programme.
+    `board_tip_mm`: of the model's tip, `board_lateral_mm`: of it across the straight robot, `board_command_mm`: of a cable's
+    displacement, `board_solver_steps`: most of a programme.
     """
     model, parameters = RobotModel(file.robot), LoopParameters.of(file)
-    tip = command = 0.0
+    tip = lateral = command = 0.0
     steps = 0
     for rate in _RATES:
         for seed in range(0, _SEEDS, every):
@@ -108,9 +111,16 @@ def accuracy(progress: Progress, file: RobotFile, found: Fit, every: int = 1) ->
                 steps = max(steps, result.solver_steps)
                 if step < APPROACH_STEPS:
                     continue
-                tip = max(tip, float(np.linalg.norm(result.tip - host_tip)))
+                apart = result.tip - host_tip
+                tip = max(tip, float(np.linalg.norm(apart)))
+                lateral = max(lateral, float(np.linalg.norm(apart[:2])))
                 command = max(command, float(np.abs(result.displacement - host_command).max()))
-    return {"board_tip_mm": round(1e3 * tip, 4), "board_command_mm": round(1e3 * command, 4), "board_solver_steps": steps}
+    return {
+        "board_tip_mm": round(1e3 * tip, 4),
+        "board_lateral_mm": round(1e3 * lateral, 4),
+        "board_command_mm": round(1e3 * command, 4),
+        "board_solver_steps": steps,
+    }
 
 
 def memory(progress: Progress, found: Fit) -> dict:
@@ -131,7 +141,7 @@ def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -
     every: more than 1: a path that is so many times shorter, and ends before gravity turns at its rate.
     """
     progress("cycles of a step on the emulated processor")
-    path = turning_gravity(np.radians(90.0), 0, 200)
+    path = _of_a_base(turning_gravity(np.radians(90.0), 0, 200))
     path = path[: len(path) // every]
     samples = [sample_bytes(*_counts(file, path, step), 1, 0) for step in range(1, len(path))]
     first = len(samples) - _COUNTED
@@ -141,6 +151,13 @@ def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -
         "board_ms": {"p50": round(float(np.median(times)), 2), "worst": round(float(times.max()), 2)},
         "board_cycles": _largest(cycles[-1]),
     }
+
+
+def _of_a_base(path: np.ndarray) -> np.ndarray:
+    """Return the mean of a path of gravity (n, 3) over 0.3 s: jumps of the rate would have the forces of an impact."""
+    whole = np.concatenate([[path[0]] * _SMOOTHED, path, [path[-1]] * _SMOOTHED])
+    mean = np.array([np.convolve(column, np.full(2 * _SMOOTHED + 1, 1.0), mode="valid") for column in whole.T]).T
+    return np.linalg.norm(path[0]) * _unit(mean)
 
 
 def _largest(cycles: Cycles) -> dict[str, int]:

@@ -342,7 +342,7 @@ class ClosedLoop:
 
 def _parameters(setup: Setup) -> LoopParameters:
     """Return what the loop on the board takes from the setup."""
-    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware)
+    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn)
 
 
 def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:

@@ -187,7 +187,7 @@ def loop_cycles(image: Image, blob: bytes, samples: Sequence[bytes], uncounted: 
     image: with the loop on the board; samples: gc_sample as bytes. Raises RuntimeError where the firmware refuses the blob.
     """
     plain, counting = Processor(image, blob), Processor(image, blob, counts=True)
-    sample, targets = MEMORY_AT + 0x14000, MEMORY_AT + 0x14100
+    sample, targets = MEMORY_AT + 0x17000, MEMORY_AT + 0x17100
     if not plain.take_model(blob):
         raise RuntimeError("the image refuses the model")
     counted = []

@@ -16,10 +16,10 @@ from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
-MAGIC, VERSION = b"GCMB", 2
+MAGIC, VERSION = b"GCMB", 3
 TILE = 4
-SETTINGS = 75  # floats of gc_settings
-MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX, BRANCHES_MAX = 48, 96, 192, 64, 128, 4
+SETTINGS = 77  # floats of gc_settings
+MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX, BRANCHES_MAX = 48, 96, 512, 64, 128, 4
 LAW_FLOATS, BRANCH_FLOATS = 6, 3
 _HEADER = struct.Struct("<4sIII16s8I")
 _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis

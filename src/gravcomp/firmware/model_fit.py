@@ -7,6 +7,7 @@ import numpy as np
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.config import ConfigError
+from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware.cycles import CLOCK_HZ
 from gravcomp.firmware.loop_on_host import LOADING_STEPS, HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import (
@@ -74,10 +75,11 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     """
     whole = reduction.reduced_model(model)
     _check(model, whole, parameters)
+    turn = BaseTurn(model, parameters.turn)
     run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200), rise=True)
     best: Fit | None = None
     for smaller, share in _candidates(whole):
-        values = settings(parameters, smaller.reach, joystick_bend, share)
+        values = settings(parameters, smaller.reach, joystick_bend, turn, share)
         blob = pack(smaller, model.robot, values, least_tensions(parameters), _branches(model))
         error = _error_of_loop(blob, whole, model, run) if share else _error(smaller, model, run)
         if best is None or error < best.error:
@@ -138,7 +140,7 @@ def cost(model: ReducedModel, share: int = 0) -> tuple[int, float]:
 
 def _law_cost(modes: int, points: int) -> int:
     """Return the multiply-adds of a step for the force of a law of rubber at these points."""
-    return points * (18 * modes + _LAW_FORCE) + (2 * modes * modes if points else 0)
+    return points * (18 * modes + _LAW_FORCE)
 
 
 def _share_cost(modes: int) -> int:

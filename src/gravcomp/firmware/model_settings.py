@@ -1,12 +1,16 @@
 """Settings of the standalone loop from a robot file, in the order of gravcomp_hw/firmware/standalone/settings.h."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile
 from gravcomp.description.hardware import Hardware
+from gravcomp.external_loads.base_turn import BaseTurn
+from gravcomp.external_loads.options import BaseTurnOptions
+from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse.rest_target import rest_target
@@ -27,26 +31,24 @@ class LoopParameters:
     estimator: ImuEstimatorParameters
     controller: InverseControllerParameters
     hardware: Hardware
+    turn: BaseTurnOptions
 
     @classmethod
     def of(cls, file: RobotFile) -> "LoopParameters":
         """Return the parameters of a robot file. Raises ConfigError."""
 
-        def section(kind: type, name: str) -> object:
+        def section(kind: type, name: str) -> Any:
             return from_mapping(kind, file.section("nodes").get(name), source=file.source, key=f"nodes.{name}")
 
-        estimator, controller = (
-            section(ImuEstimatorParameters, "imu_estimator"),
-            section(InverseControllerParameters, "inverse_controller"),
-        )
-        assert isinstance(estimator, ImuEstimatorParameters) and isinstance(controller, InverseControllerParameters)
+        estimator = section(ImuEstimatorParameters, "imu_estimator")
+        controller = section(InverseControllerParameters, "inverse_controller")
         if file.zones or controller.inverse.max_contact_force is not None:
             raise ConfigError(
                 f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
                 " that on the board has neither"
             )
-        hardware = file.hardware
-        return cls(file.source, file.robot, estimator, controller, hardware)
+        turn = section(FemSimulatorParameters, "fem_simulator").turn
+        return cls(file.source, file.robot, estimator, controller, file.hardware, turn)
 
     @property
     def at_rest(self) -> Target:
@@ -74,11 +76,11 @@ def motor_numbers(parameters: LoopParameters) -> list[int]:
     return [numbers[name] for name in parameters.robot.cable_names]
 
 
-def settings(parameters: LoopParameters, reach: float, joystick_bend: float, law_share: int = 1) -> np.ndarray:
+def settings(parameters: LoopParameters, reach: float, joystick_bend: float, turn: BaseTurn, law_share: int = 1) -> np.ndarray:
     """Return the floats (n,) of gc_settings.
 
-    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; law_share: points of a law of rubber of which
-    a step computes the stiffness. Raises ConfigError for motors that are shared.
+    reach: largest |q| of the reduced model; joystick_bend: rad at full deflection; turn: of the robot's model; law_share: points
+    of a law of rubber of which a step computes the stiffness. Raises ConfigError for motors that are shared.
     """
     robot, wanted = parameters.robot, parameters.at_rest
     options, orientation = parameters.controller.inverse, parameters.estimator.filter
@@ -101,6 +103,12 @@ def settings(parameters: LoopParameters, reach: float, joystick_bend: float, law
         rest.time_constant, rest.gyro_deviation, rest.accel_deviation, rest.accel_drift, rest.minimum_time, rest.largest_bias,
         sensor.gyro_range, sensor.accel_range, sensor.delay, sensor.stuck_time, sensor.largest_gap,
         spikes.gyro, spikes.accel, spikes.ratio, spikes.time_constant, float(spikes.longest),
-        float(law_share), *numbers, *[0] * (CABLES_MAX - len(numbers)),
+        *_of_turn(turn), float(law_share), *numbers, *[0] * (CABLES_MAX - len(numbers)),
     ]  # fmt: skip
     return np.array(values, dtype="<f4")
+
+
+def _of_turn(turn: BaseTurn) -> tuple[float, float]:
+    """Return the height in m and the time of the low-pass in s; zeros where the forces of turns do not count."""
+    counts = turn.options.enabled and turn.height > 0.0
+    return (turn.height, turn.options.lag * turn.period) if counts else (0.0, 0.0)

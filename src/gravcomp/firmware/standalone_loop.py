@@ -23,6 +23,7 @@ class RawResult(ctypes.Structure):
 
     _fields_ = (
         ("gravity", ctypes.c_float * 3),
+        ("turning", ctypes.c_float * 3),
         ("tip", ctypes.c_float * 3),
         ("displacement", ctypes.c_float * CABLES_MAX),
         ("tension", ctypes.c_float * CABLES_MAX),
@@ -38,12 +39,13 @@ class RawResult(ctypes.Structure):
 class LoopResult:
     """What the loop computed.
 
-    gravity (3,) in m/s^2 and tip (3,) in m in soft_base; displacement (m,) in m and tension (m,) in N of the command; left:
-    estimated distance of the model's tip from its equilibrium in m; code: of gravcomp_msgs/ControllerStatus; solver_steps: of the
-    quadratic programme.
+    gravity (3,) and turning (3,), what turns of the base add, in m/s^2, and tip (3,) in m, all in soft_base; displacement (m,) in
+    m and tension (m,) in N of the command; left: estimated distance of the model's tip from its equilibrium in m; code: of
+    gravcomp_msgs/ControllerStatus; solver_steps: of the quadratic programme.
     """
 
     gravity: np.ndarray
+    turning: np.ndarray
     tip: np.ndarray
     displacement: np.ndarray
     tension: np.ndarray
@@ -58,6 +60,7 @@ class LoopResult:
         m = raw.cables
         return cls(
             gravity=np.array(raw.gravity, dtype=float),
+            turning=np.array(raw.turning, dtype=float),
             tip=np.array(raw.tip, dtype=float),
             displacement=np.array(raw.displacement[:m], dtype=float),
             tension=np.array(raw.tension[:m], dtype=float),
@@ -107,9 +110,9 @@ class StandaloneLoop:
         return self._library.gc_loop_weigh(self._at, stamp_us, _floats(gyro), _floats(accel))
 
     def follow(self, interval: float, gravity: Sequence[float] | None = None) -> bool:
-        """Go to the estimated gravity, or to a given one (3,) in m/s^2, `interval` s after the last step.
+        """Go to the estimated gravity with what turns of the base add, `interval` s after the last step.
 
-        Returns whether there is a command.
+        gravity (3,) in m/s^2: in place of these. Returns whether there is a command.
         """
         return self._library.gc_loop_follow(self._at, None if gravity is None else _floats(gravity), interval)
 

@@ -12,16 +12,16 @@ uint32_t gc_loop_load(gc_standalone *loop, const uint8_t *blob, size_t size) {
 }
 
 bool gc_loop_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const float *accel) {
-  const bool used = gc_gravity_take(&loop->gravity, stamp, gyro, accel, loop->down);
-  loop->has_gravity = loop->has_gravity || used;
-  return used;
+  return gc_standalone_weigh(loop, stamp, gyro, accel);
 }
 
 bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval) {
   if (gravity == NULL && !loop->has_gravity) {
     return false;
   }
-  gc_standalone_follow(loop, gravity != NULL ? gravity : loop->down, interval);
+  float field[3];
+  gc_standalone_field(loop, field);
+  gc_standalone_follow(loop, gravity != NULL ? gravity : field, interval);
   return true;
 }
 
@@ -34,6 +34,7 @@ void gc_loop_joystick(gc_standalone *loop, float x, float y) {
 void gc_loop_read(const gc_standalone *loop, gc_loop_result *result) {
   gc_zero(result, sizeof *result);
   gc_copy(result->gravity, loop->down, sizeof result->gravity);
+  gc_copy(result->turning, loop->turning, sizeof result->turning);
   gc_copy(result->tip, loop->shape.tip, sizeof result->tip);
   gc_copy(result->displacement, loop->controller.displacement, sizeof result->displacement);
   gc_copy(result->tension, loop->controller.tension, sizeof result->tension);

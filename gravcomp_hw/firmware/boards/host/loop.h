@@ -7,6 +7,7 @@
 // What the loop computed.
 typedef struct {
   float gravity[3];   // m/s^2, soft_base
+  float turning[3];   // m/s^2, soft_base, what turns of the base add
   float tip[3];       // m, of the model
   float displacement[GC_CABLES_MAX];  // m
   float tension[GC_CABLES_MAX];       // N
@@ -27,7 +28,7 @@ uint32_t gc_loop_load(gc_standalone *loop, const uint8_t *blob, size_t size);
 // Estimate gravity from a sample: stamp in us, gyro (3,) in rad/s, accel (3,) in m/s^2. Returns false where it cannot be used.
 bool gc_loop_weigh(gc_standalone *loop, int64_t stamp, const float *gyro, const float *accel);
 
-// Go to the gravity that was estimated last, or to `gravity` (3,) in m/s^2. Returns whether there is a command.
+// Go to the gravity that was estimated last, with what turns of the base add, or to `gravity` (3,) in m/s^2. Returns whether there is a command.
 bool gc_loop_follow(gc_standalone *loop, const float *gravity, float interval);
 
 // Set the joystick to x and y, -1 to 1, in place of the stored target.
