@@ -121,6 +121,11 @@ def test_the_training_ends_once_new_paths_are_represented(robot):
     assert len(samples(model, dataclasses.replace(options, paths=12), enough=lambda earlier, new: False)) == 12
 
 
+def test_a_robot_without_cables_has_samples():
+    bare = dataclasses.replace(coarse(), cables=())
+    assert len(samples(RobotModel(bare), TrainingOptions(paths=4, steps=1))) == 4
+
+
 def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):
     shipped = Path(load_robot_file("article").source).read_text()
     described = re.sub(r"(?m)^  elements: .*$", "  elements: {around: 4, along: 4}", shipped)

@@ -1,8 +1,8 @@
 """The plan of a calibration: the poses that tell most about the robot, in the time that it may take.
 
 Candidates are orientations of the base with the cables released, with one cable under a tension that the limits allow, or with
-the cables that hold the robot straight (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of the fit
-(`unknowns`). Poses are chosen one by one so that they add most to
+the cables that hold the robot in its shape at rest (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns
+of the fit (`unknowns`). Poses are chosen one by one so that they add most to
 
     log det (P + sum_k J_k^T W J_k)
 
@@ -11,6 +11,7 @@ choice is D-optimal up to a constant factor, because the determinant's logarithm
 Math. Programming 14, 1978; for designs: Pukelsheim, Optimal Design of Experiments, 1993).
 """
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import numpy as np
 
 from gravcomp.calibration.approach import APPROACH
 from gravcomp.calibration.fit import TipNoise
-from gravcomp.calibration.held_pose import held_straight
+from gravcomp.calibration.held_pose import held_at_rest
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.statics import StaticPredictor
@@ -37,6 +38,7 @@ _LEVELS = (0.35, 1.0)  # of the largest tension that is used: two are needed to 
 _MEAN_TURN = math.radians(80.0)  # of the base from station to station
 _FARTHER = 1.5  # than the linear model expects, a tip may turn
 _LEAST_REST = 0.3  # of the longest time that a pose may take
+_MOST_OF_REST = 0.5  # is left out where turns take longer than was expected
 _WIDEST = 0.5  # deviation of the logarithm of all moduli together before the measurement
 
 
@@ -137,8 +139,8 @@ def make_plan(
 ) -> Plan:
     """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose.
 
-    orientations: candidates, inclination and roll of the base in rad; inverse: of the controller, to hold the robot straight in
-    some of the poses; None: only one cable at a time is pulled, as by hand.
+    orientations: candidates, inclination and roll of the base in rad; inverse: of the controller, to hold the robot in its shape
+    at rest in some of the poses; None: only one cable at a time is pulled, as by hand.
     """
     options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
@@ -175,7 +177,10 @@ def make_plan(
     poses = _ordered([candidates[k] for k in chosen])
     free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
     poses.append(free)  # let go at the end, it swings: the damping
-    return Plan(tuple(poses), (held,) * len(poses), rest, options.rate)
+    plan = Plan(tuple(poses), (held,) * len(poses), rest, options.rate)
+    # Turns were estimated while poses were chosen.
+    less = min(max(plan.duration - options.budget, 0.0) / len(poses), _MOST_OF_REST * rest)
+    return dataclasses.replace(plan, times=(held - less,) * len(poses), rest=rest - less)
 
 
 def _candidates(
@@ -208,9 +213,10 @@ def _candidates(
                 if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
                     pose = _pose(robot, inclination, roll, shape, tension, slack, transmission)
                     found.append((pose, False, simulator.solver.state))
-        straight = None if inverse is None else held_straight(simulator, robot, transmission, inverse, gravity)
-        if straight is not None and straight.cable_tension.any():
-            pose = _pose(robot, inclination, roll, straight, straight.cable_tension, slack, transmission)
+        held = None if inverse is None or not count else held_at_rest(simulator, robot, transmission, inverse, gravity)
+        strongest = 0.0 if held is None else float(held.cable_tension.max(initial=0.0))
+        if held is not None and 0.0 < strongest <= options.tension * robot.limits.tension_max:
+            pose = _pose(robot, inclination, roll, held, held.cable_tension, slack, transmission)
             found.append((pose, True, simulator.solver.state))
     found = [entry for entry in found if entry[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
     poses, usual, shapes = zip(*found) if found else ((), (), ())
@@ -250,7 +256,7 @@ def _chosen(
     """Return the chosen candidates.
 
     usual: which are measured at every station that is visited: the released robot, which no error of a cable disturbs, and the
-    one that is held straight; rows (k, 6, u): derivatives over the noise; held: time in s of each pose.
+    one that is held at rest; rows (k, 6, u): derivatives over the noise; held: time in s of each pose.
     """
     information = prior.T @ prior
     always: dict[tuple[float, float], list[int]] = {}
@@ -287,21 +293,30 @@ def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:
 def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
     """Return the poses station by station, each next to the one before.
 
-    Released first, then held straight, then cable by cable: so every cable is wound in to where it pulls.
+    Released first, then held at rest, then cable by cable: so the cables are wound in to where they pull. After the held robot
+    comes a cable that has to be pulled further than it is there, where there is one.
     """
     left, ordered = list(poses), []
     here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
     while left:
         station = [pose for pose in left if pose.station == here.station]
+        back = _paid_out_from_held(station)
         ordered += sorted(
-            station, key=lambda pose: (bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum()))
-        )
+            station,
+            key=lambda pose: (
+                bool(pose.pulled), -len(pose.pulled), pose.pulled in back, pose.pulled, float(pose.tension.sum())
+            ),
+        )  # fmt: skip
         left = [pose for pose in left if not any(pose is one for one in station)]
         if left:
             here = max(left, key=lambda pose: float(pose.gravity @ ordered[-1].gravity))
     return ordered
 
 
-def _place(pose: PlannedPose) -> tuple:
-    """Return what sorts the poses of a station."""
-    return bool(pose.pulled), -len(pose.pulled), pose.pulled, float(pose.tension.sum())
+def _paid_out_from_held(station: list[PlannedPose]) -> set[tuple[str, ...]]:
+    """Return the cables, as they are pulled alone, that are farther out in some such pose than in that of the held robot."""
+    held = max(station, key=lambda pose: len(pose.pulled))
+    if len(held.pulled) < 2:
+        return set()
+    single = [pose for pose in station if len(pose.pulled) == 1]
+    return {pose.pulled for pose in single if (pose.displacement < held.displacement)[pose.tension > 0.0].any()}

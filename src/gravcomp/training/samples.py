@@ -129,7 +129,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     size = GRAVITY / np.exp(rng.uniform(np.log(low), np.log(high)))
     kind = rng.random()
     target = None
-    if kind >= _RELEASED:
+    if kind >= _RELEASED and model.robot.cables:
         bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
         weight = rng.choice([0.0, direction_weight(model.length)])
         target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
