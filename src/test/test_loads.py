@@ -132,6 +132,23 @@ def test_derivatives_of_a_held_robot_are_those_of_its_tensions_and_tip(shape):
     assert shape.cable_tension + slackened.tension == pytest.approx([1.2, 0, 0], abs=0.01)
 
 
+def test_nothing_is_learnt_while_the_model_has_no_equilibrium(shape):
+    """Measurements of a robot that has moved on do not belong to the last shape of the model."""
+    tip, shape = shape
+    robot = dataclasses.replace(ROBOT, cables=ROBOT.cables[:3])
+    observer = LoadObserver(robot, LoadEstimationOptions(kind="force"))
+    for k in range(10):
+        observer.predict(0.01 * k, shape, tip, ZERO, shape.cable_displacement)
+        observer.measure_tip(0.01 * k, shape.tip_position + 1e-3 * np.eye(3)[1])
+    found = observer.estimate(GRAVITY, 0.1)
+    assert found.force[1] > 0.0 and not found.sentence
+    for k in range(100):
+        observer.measure_tip(0.5 + 0.1 * k, shape.tip_position + 0.05 * np.eye(3)[1])
+        observer.measure_tensions(0.5 + 0.1 * k, 3.0 * shape.cable_tension)
+    kept = observer.estimate(GRAVITY, 10.5)
+    assert kept.force == pytest.approx(found.force) and "finds no equilibrium" in kept.sentence
+
+
 @pytest.mark.parametrize("sources", ["tip", "tensions", "both"])
 def test_a_payload_is_found_after_zeroing_whatever_the_models_errors(shape, sources):
     """The true robot is 20 % softer than the model; both are linear, so that the rest of the error is noise."""

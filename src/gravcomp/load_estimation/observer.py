@@ -31,6 +31,7 @@ from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _KEPT = 2.0  # s of predictions, for measurements that arrive late
+_APART = 0.1  # s, farthest of a measurement from the predictions: without an equilibrium the model has no new ones
 _INTERVAL = 1.96  # standard deviations of an interval of 95 %
 # Squared Mahalanobis distance of an outlier: 1 in 10000 good measurements is farther (chi-square, 3 and about 6 numbers).
 _GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
@@ -182,11 +183,15 @@ class LoadObserver:
         sources = tuple(name for name, at in self._seen.items() if now - at <= self.options.stale_after)
         sentence = self._sentence
         if not sources and not sentence:
-            sentence = (
-                "neither tips nor tensions are measured: the load is not known"
-                if not self._seen
-                else ("no measurement lately: the last estimate is kept")
-            )
+            if not self._seen:
+                sentence = "neither tips nor tensions are measured: the load is not known"
+            elif now - self._history[-1].stamp > self.options.stale_after:
+                sentence = (
+                    "the model finds no equilibrium under the load, which may be more than the cables hold:"
+                    " the last estimate is kept"
+                )
+            else:
+                sentence = "no measurement lately: the last estimate is kept"
         if self._filter is None:
             return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
         load, covariance = self._filter.load, self._filter.load_covariance
@@ -221,7 +226,9 @@ class LoadObserver:
 
     def _at(self, stamp: float) -> _Prediction | None:
         """Return the prediction nearest to a stamp; None for a stamp before the first one or far ahead."""
-        if not self._history or not np.isfinite(stamp) or stamp < self._history[0].stamp - 0.1:
+        if not self._history or not np.isfinite(stamp):
+            return None
+        if not self._history[0].stamp - _APART <= stamp <= self._history[-1].stamp + _APART:
             return None
         return min(self._history, key=lambda entry: abs(entry.stamp - stamp))
 
