@@ -53,7 +53,7 @@ class ModelBuilder:
             self._process.terminate()
         stored, _errors = self._process.communicate()
         if self._note is not None and self._process.returncode == 0 and stored:
-            with contextlib.suppress(OSError):  # the next start looks again
+            with contextlib.suppress(OSError):  # a full disk: the next start looks again
                 write_whole(self._note, stored.strip())
 
 
