@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.simulated_streams import KINDS, simulated
