@@ -19,7 +19,7 @@ from gravcomp.firmware.cycles import MEMORY_AT, Processor, sample_bytes
 from gravcomp.firmware.host_library import load as library
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.loop_on_host import LOADING_STEPS, run_on_host, turning_gravity
-from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, fit
+from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, error_of_loop, fit
 from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, settings
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
@@ -69,6 +69,13 @@ def test_the_loop_in_float32_follows_that_of_the_host(parameters, built, found):
             assert np.linalg.norm(result.tip - host.tip[step]) < 0.15e-3
             np.testing.assert_allclose(result.displacement, host.command[step], atol=0.15e-3)
     assert result.code == 1
+
+
+def test_the_error_of_the_loop_on_the_board_is_that_of_equal_pulls_while_they_rise(parameters, built, found):
+    """A robot that gravity draws across is pulled from the first step on."""
+    model, reduction = built
+    run = run_on_host(model, parameters, np.tile((-9.81, 0.0, 0.0), (10, 1)), rise=True)
+    assert error_of_loop(found.blob, reduction.reduced_model(model), model, run) < 0.15e-3
 
 
 def test_the_joystick_bends_the_robot_toward_it(parameters, found):

@@ -10,7 +10,7 @@ from gravcomp.inverse import InverseController
 from gravcomp.simulation import Simulator
 
 LOADING_STEPS = 50
-"""Steps over which gravity rises after a start, on the board as well (GC_LOADING_STEPS)."""
+"""Steps over which gravity rises after a start, on the board as well (GC_LOADING_STEPS), there with the cables' pull."""
 
 APPROACH_STEPS = 400
 """Steps of `turning_gravity` before it turns at its rate."""

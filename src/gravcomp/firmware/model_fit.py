@@ -81,7 +81,7 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     for smaller, share in _candidates(whole):
         values = settings(parameters, smaller.reach, joystick_bend, turn, share)
         blob = pack(smaller, model.robot, values, least_tensions(parameters), _branches(model))
-        error = _error_of_loop(blob, whole, model, run) if share else _error(smaller, model, run)
+        error = error_of_loop(blob, whole, model, run) if share else _error(smaller, model, run)
         if best is None or error < best.error:
             strains = smaller.elasticity.linear.shape[1]
             best = Fit(smaller, blob, strains, *cost(smaller, share), error, reduction.error_worst)
@@ -213,7 +213,7 @@ def _branches(model: RobotModel) -> tuple[tuple[float, float], ...]:
     return model.mesh.materials[0].branches
 
 
-def _error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: HostRun) -> float:
+def error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: HostRun) -> float:
     """Return the worst distance in m of the tip in the loop on the board from that of the whole reduced model, inf: it is lost.
 
     The loop is the C code on this machine, with the run's gravity and its own commands, which the whole model gets as well.
@@ -224,8 +224,9 @@ def _error_of_loop(blob: bytes, whole: ReducedModel, model: RobotModel, run: Hos
     memory, wound, worst = Memory.of(branches, np.zeros(whole.size), tracker.strain), np.zeros(count), 0.0
     for step, gravity in enumerate(run.gravity):
         creep = memory.stress(SAMPLE_PERIOD) if branches else None
-        state = tracker.track(gravity, CableInput(wound=wound), iterations=10, creep=creep)
-        # The loop lets gravity rise by itself.
+        # The loop lets gravity and pulls rise by itself.
+        pulled = min(1.0, (step + 1) / LOADING_STEPS) * wound
+        state = tracker.track(gravity, CableInput(wound=pulled), iterations=10, creep=creep)
         loop.follow(SAMPLE_PERIOD, run.gravity[max(step, LOADING_STEPS - 1)])
         result = loop.read()
         if not (state.converged and result.converged):
