@@ -105,6 +105,8 @@ def test_the_tour_rests_at_its_poses_and_never_jumps():
     ways = np.abs(poses - np.roll(poses, 1, axis=0)).max()
     assert np.abs(np.diff(positions, axis=0)).max() <= 1.875 * ways / 2.0 * 0.01 * 1.001
     assert [tour.at_rest(t, 2.0) for t in (0.0, 3.9, 4.1, 9.5, 29.5)] == [None, None, 0, 1, 0]
+    # More to measure than the rest lasts: the motion is not measured.
+    assert [tour.at_rest(t, -0.5) for t in (1.7, 2.1)] == [None, 0]
     np.testing.assert_allclose(tour.positions(14.0), poses[2])
 
 

@@ -1,6 +1,7 @@
 """A simulator that starts on the full model changes over to the reduced model when that is built."""
 
 import dataclasses
+import errno
 import os
 import re
 import shutil
@@ -157,3 +158,11 @@ def test_no_builder_is_started_for_a_model_that_is_known_to_be_stored(tmp_path, 
     with model_builder.ModelBuilder(str(robot)) as builder:
         builder.start()
     assert len(started) == 3
+
+    def full(path: Path, content: str) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr(model_builder, "write_whole", full)
+    os.utime(file, ns=(1, 1))
+    with model_builder.ModelBuilder(str(robot)) as builder:  # the command that it serves does not end with an error
+        builder.start()

@@ -8,6 +8,7 @@ from test_estimate_command import write_trial
 
 from gravcomp.commands import estimate, output
 from gravcomp.commands.__main__ import main
+from gravcomp.commands.parsers import namespace
 
 ROBOT_TAKERS = [
     "model build ROBOT",
@@ -75,6 +76,7 @@ def test_what_is_no_robot_file_is_refused(capsys, line, robot, said):
         ("calibrate DATA --write folder", "--write is folder: is a folder; the path of a file is needed"),
         ("calibrate DATA --material --write none/mine.yaml", "cannot be written: there is no folder none"),
         ("calibrate --plan --write folder", "--write is folder: is a folder"),
+        ("calibrate --live --write folder", "--write is folder: is a folder"),
         ("calibrate-imu TRIAL --write folder", "--write is folder: is a folder"),
         ("calibrate-imu TRIAL --bias-model folder", "--bias-model is folder: is a folder"),
         ("calibrate-mount folder --write none/mine.yaml", "cannot be written: there is no folder none"),
@@ -141,6 +143,10 @@ def test_values_of_options_are_checked_when_they_are_read(capsys, line, said):
         main(line.split())
     printed = capsys.readouterr()
     assert end.value.code == 2 and not printed.out and f"argument {said}" in printed.err
+
+
+def test_the_global_namespace_and_a_slash_at_the_end_are_allowed():
+    assert [namespace(text) for text in ("", "/", "/left", "/left/", "/a/b")] == ["", "", "/left", "/left", "/a/b"]
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
+from gravcomp.calibration.course import predict_course
+from gravcomp.calibration.held_pose import held_at_rest
+from gravcomp.calibration.measured import Measured
 from gravcomp.description import Cable, Elements, Limits, Material, RestShape, Robot, Segment
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability.search import HoldSearch
-from gravcomp.inverse import bend_target, rest_target
+from gravcomp.inverse import InverseOptions, bend_target, rest_target
 from gravcomp.mesh.robot_axis import rest_tip
+from gravcomp.simulation import Simulator
+from gravcomp.trials import turning_base
 
 BEND, PLANE = np.radians(70.0), np.radians(40.0)
 MATERIAL = Material("neo_hookean", 2e6, 0.45)
@@ -62,3 +67,28 @@ def test_a_bent_robot_without_weight_is_held_by_nothing():
     search = HoldSearch(RobotModel(robot(0.0, BEND)))
     tension, lateral = search.linear.tension(np.zeros(3))
     assert tension.max() < 1e-3 * search.robot.limits.tension_max and lateral < 1e-6 * search.robot.length
+
+
+def test_a_planned_pose_holds_a_bent_robot_in_its_shape_at_rest():
+    hook = robot(0.0, BEND)
+    shape = held_at_rest(Simulator(hook, reduced=False), hook, None, InverseOptions(), np.array([0.0, 0.0, -1.0]))
+    assert np.linalg.norm(shape.tip_position - rest_tip(hook)[0]) < 0.02 * hook.length
+
+
+def test_a_bent_robot_falls_from_its_shape_at_rest():
+    hook, gravity = robot(0.0, BEND), np.array([-9.81, 0.0, 0.0])
+    tip, direction = rest_tip(hook)
+    time = np.array([0.0, 1e-3])
+    fall = Measured("here", np.zeros(2, int), time, np.tile(gravity, (2, 1)), np.full((2, 3), np.nan), np.tile(tip, (2, 1)))
+    tips, directions = predict_course(hook, fall)
+    assert tips[0] == pytest.approx(tip) and directions[0] == pytest.approx(direction)
+    way = tips[1] - tip
+    assert way[0] < 0.0 and np.linalg.norm(way) < 9.81 * time[1] ** 2  # it has just been let go
+
+
+def test_lateral_residuals_are_counted_from_the_shape_at_rest():
+    for each in (robot(0.0), robot(0.0, BEND)):
+        target = rest_target(each)
+        across = np.cross(target.tip_direction, [1.0, 0.0, 0.0])
+        tips = target.tip_position + np.outer([0.0, 1e-3, 0.0], across) + np.outer([0.0, 0.0, -2e-3], target.tip_direction)
+        assert turning_base._lateral(tips, target) == pytest.approx([0.0, 1e-3 * np.linalg.norm(across), 0.0], abs=1e-12)

@@ -40,6 +40,6 @@ class Tour:
         return before + s * (self.poses[index] - before)
 
     def at_rest(self, time: float, settled: float) -> int | None:
-        """Return the index of the pose that has been held for at least `settled` s at `time`, or None."""
+        """Return the index of the pose that has been held for at least `settled` s at `time`, or None; below 0: it is reached."""
         leg, into = divmod(time, self.travel + self.hold)
-        return int(leg) % len(self.poses) if into >= self.travel + settled else None
+        return int(leg) % len(self.poses) if into >= self.travel + max(settled, 0.0) else None

@@ -7,10 +7,11 @@ import numpy as np
 from gravcomp.calibration.measured import Measured
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Shape, ShapeStatus
 
 STRAIGHT = 0.02
-"""A course starts straight if its first tip is nearer than this share of the length to the straight robot's."""
+"""A course starts at the shape at rest if its first tip is nearer than this share of the length to that of the shape."""
 _STEPS = 55.0  # of time in the robot's first period: the error of a fall is then a thousandth of the robot's length
 
 
@@ -24,9 +25,9 @@ def predict_course(robot: Robot, course: Measured, options: DynamicsOptions | No
 
     options: default `course_options`. Raises RuntimeError if the start has no equilibrium or a time step does not converge.
     """
-    straight = np.array([0.0, 0.0, robot.length]), np.array([0.0, 0.0, 1.0])
+    at_rest = rest_tip(robot)
     rows = [
-        straight if shape is None else (shape.tip_position, shape.tip_direction)
+        at_rest if shape is None else (shape.tip_position, shape.tip_direction)
         for shape in predict_shapes(robot, course, options)
     ]
     tips, directions = zip(*rows)
@@ -34,9 +35,9 @@ def predict_course(robot: Robot, course: Measured, options: DynamicsOptions | No
 
 
 def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions | None = None) -> Iterator[Shape | None]:
-    """Yield the shapes at the course's times, None for the start at the straight robot; as `predict_course`."""
+    """Yield the shapes at the course's times, None for the start at the shape at rest; as `predict_course`."""
     simulator = DynamicSimulator(robot, options or course_options(robot))
-    if np.linalg.norm(course.tip_position[0] - [0.0, 0.0, robot.length]) > STRAIGHT * robot.length:
+    if np.linalg.norm(course.tip_position[0] - rest_tip(robot)[0]) > STRAIGHT * robot.length:
         shape = simulator.settle(course.gravity[0], course.displacement[0])
         if not shape.is_equilibrium:
             raise RuntimeError(f"the motion has no equilibrium to start from: {shape.message}")

@@ -1,8 +1,8 @@
 """The plan of a calibration: the poses that tell most about the robot, in the time that it may take.
 
 Candidates are orientations of the base with the cables released, with one cable under a tension that the limits allow, or with
-the cables that hold the robot straight (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of the fit
-(`unknowns`). Poses are chosen one by one so that they add most to
+the cables that hold the robot as it is at rest (`held_pose`). The model gives the derivatives J_k of the tip by all unknowns of
+the fit (`unknowns`). Poses are chosen one by one so that they add most to
 
     log det (P + sum_k J_k^T W J_k)
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from gravcomp.calibration.approach import APPROACH
 from gravcomp.calibration.fit import TipNoise
-from gravcomp.calibration.held_pose import held_straight
+from gravcomp.calibration.held_pose import held_at_rest
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.statics import StaticPredictor
@@ -208,9 +208,9 @@ def _candidates(
                 if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
                     pose = _pose(robot, inclination, roll, shape, tension, slack, transmission)
                     found.append((pose, False, simulator.solver.state))
-        straight = None if inverse is None else held_straight(simulator, robot, transmission, inverse, gravity)
-        if straight is not None and straight.cable_tension.any():
-            pose = _pose(robot, inclination, roll, straight, straight.cable_tension, slack, transmission)
+        held = None if inverse is None else held_at_rest(simulator, robot, transmission, inverse, gravity)
+        if held is not None and held.cable_tension.any():
+            pose = _pose(robot, inclination, roll, held, held.cable_tension, slack, transmission)
             found.append((pose, True, simulator.solver.state))
     found = [entry for entry in found if entry[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
     poses, usual, shapes = zip(*found) if found else ((), (), ())

@@ -99,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, or fit and write. Returns 0: the file is written, 130: interrupted. Raises ConfigError."""
+    from gravcomp.calibration.apply import overlay_path
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
 
@@ -110,24 +111,23 @@ def run(args: argparse.Namespace) -> int:
     if args.plan:
         return _plan(args, file)
     made_folder("--out", Path(args.out).expanduser())
+    named = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
+    target = checked_target("--write", named)
     if args.live:
         found = _measured_live(args, file)
         if found is None:
             return INTERRUPTED
         args.data = str(found)
-    return _calibrate(args, file)
+    return _calibrate(args, file, target)
 
 
-def _calibrate(args: argparse.Namespace, file: "RobotFile") -> int:
-    """Fit to the data, and write robot file and page. Returns 0. Raises ConfigError."""
-    from gravcomp.calibration.apply import overlay_path
+def _calibrate(args: argparse.Namespace, file: "RobotFile", target: Path) -> int:
+    """Fit to the data, and write the robot file `target` and the page. Returns 0. Raises ConfigError."""
     from gravcomp.commands.material_calibration import fit_material
     from gravcomp.commands.pose_calibration import fit_pose_table
     from gravcomp.commands.tip_calibration import fit_tips
     from gravcomp.report.page import write_report
 
-    named = Path(args.write).expanduser() if args.write else overlay_path(file.source, file.robot.name)
-    target = checked_target("--write", named)
     started = time.perf_counter()
     fit = fit_material if args.material else fit_pose_table if args.mapping else fit_tips
     result = fit(args, file, target)

@@ -74,7 +74,8 @@ def in_range(kind: type, least: float, most: float, unit: str = "") -> Callable[
 
 
 def namespace(text: str) -> str:
-    """Return a namespace of nodes, as the type of an option for argparse."""
+    """Return a namespace of nodes without a slash at its end, empty for /, as the type of an option for argparse."""
+    text = text.rstrip("/")
     if text and not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", text):
         raise argparse.ArgumentTypeError(f"is '{text}'; a name that begins with / is needed, e.g. /left")
     return text

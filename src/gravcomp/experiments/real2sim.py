@@ -1,4 +1,4 @@
-"""Free fall from straight at the article's five inclinations: the tip over time, model against virtual robot."""
+"""Free fall from the shape at rest at the article's five inclinations: the tip over time, model against virtual robot."""
 
 from collections.abc import Callable
 
@@ -10,6 +10,7 @@ from gravcomp.calibration.motion import fit_motion
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.evaluation.metrics import angle_between
+from gravcomp.mesh.robot_axis import rest_axis, rest_tip
 from gravcomp.report.drawing import MODEL, REAL, REST, Drawing, draw_robot, equal_axes, side_view
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
@@ -24,7 +25,7 @@ _FITTED_POSES = ((20.0, 45.0), (-25.0, -30.0))  # inclination, roll, deg: other 
 _DURATION, _BRIEF_DURATION = 14.0, 1.5
 _SHOWN = (0.1, 0.2, 0.35, 7.0)
 _REST = 0.25  # of a fall: its last part, which counts as rest
-# Of the sag of the horizontal robot, its tip's distance from the straight one's, and of the turn of that tip.
+# Of the sag of the horizontal robot, its tip's distance from where it is at rest, and of the turn of that tip.
 _WORST, _WORST_TURN = 0.067, 0.08
 
 
@@ -53,8 +54,7 @@ def run(context: Context) -> Result:
     rest = slice(-max(2, round(_REST * duration / SAMPLE)), None)
     hanging = evaluated[inclinations.index(0.0)]
     hanging = hanging.rows(np.arange(len(hanging.time))[rest])
-    straight = np.array([0.0, 0.0, setup.nominal.length]), np.array([0.0, 0.0, 1.0])
-    sag, turn = (float(part.max()) for part in _errors(hanging, *straight))
+    sag, turn = (float(part.max()) for part in _errors(hanging, *rest_tip(setup.nominal)))
     whole = slice(None)
 
     def worst(model: str, row: int, part: slice) -> float:
@@ -91,7 +91,7 @@ def run(context: Context) -> Result:
                         for i, fall in zip(inclinations, evaluated)
                         if i != 90.0
                     ],
-                    setup.robot.length,
+                    setup.robot,
                 ),
                 f"Side view, gravity downwards, {', '.join(f'{1e3 * t:.0f}' for t in shown)} ms after the start of the fall."
                 " Grey: rest shape without gravity, vermilion: virtual robot, blue: axis of the calibrated model.",
@@ -163,16 +163,16 @@ def _fall_shapes(
     found = []
     for k in samples:
         shape = modelled[k]
-        assert shape is not None  # only the straight robot at the start has none
+        assert shape is not None  # only the shape at rest at the start has none
         found.append((true[k][0], shape.backbone_position @ base.T))
     return found
 
 
-def _shapes(falls: list[tuple[float, list]], length: float) -> str:
+def _shapes(falls: list[tuple[float, list]], robot: Robot) -> str:
+    rest, _ = rest_axis(robot).frames(robot.length * np.linspace(0.0, 1.0, 33))
     with Drawing(1, len(falls), width=11.5, height=3.4, squeeze=False) as drawing:
         for axes, (inclination, shapes) in zip(drawing.axes[0], falls):
-            straight = np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, length], 9)
-            draw_robot(axes, side_view(straight, base_orientation(np.radians(inclination))), REST, "rest shape", alpha=0.6)
+            draw_robot(axes, side_view(rest, base_orientation(np.radians(inclination))), REST, "rest shape", alpha=0.6)
             for k, (true, modelled) in enumerate(shapes):
                 draw_robot(
                     axes, true[:, [0, 2]], REAL, "virtual robot" if k == 0 else None, alpha=0.45 + 0.55 * (k + 1) / len(shapes)

@@ -36,7 +36,7 @@ def holdability(
 ) -> Holdability:
     """Return whether the robot's cables keep its tip laterally on the target.
 
-    target: default the straight tip; directions (k, 3) of gravity: default all over the sphere, and the worst of the linear
+    target: default the tip at rest; directions (k, 3) of gravity: default all over the sphere, and the worst of the linear
     estimate first; progress: see `Progress`; first: called with the linear estimate, as a sentence, before the paths are
     followed; with_needed: find also what would be needed, where it buckles, and the released shape. Raises MeshError for a
     body that cannot be meshed, ValueError for a robot without cables.
@@ -67,7 +67,7 @@ def _directions(search: HoldSearch) -> np.ndarray:
 
 
 def _estimate(search: HoldSearch, direction: np.ndarray) -> str:
-    """Return the linear estimate of the straight robot for a direction (3,), as a sentence."""
+    """Return the linear estimate of the robot at rest for a direction (3,), as a sentence."""
     tension, lateral = search.linear.tension(STANDARD_GRAVITY * direction)
     inclination, azimuth = np.degrees(angles(direction))
     where = f"gravity {inclination:.0f} deg from the axis toward {azimuth:.0f} deg"

@@ -5,6 +5,7 @@ the cache, under a key of the robot and of this package's code, names the stored
 with the same ratios of its moduli may replace it); as long as they are right, no process is started.
 """
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -52,7 +53,8 @@ class ModelBuilder:
             self._process.terminate()
         stored, _errors = self._process.communicate()
         if self._note is not None and self._process.returncode == 0 and stored:
-            write_whole(self._note, stored.strip())
+            with contextlib.suppress(OSError):  # a full disk: the next start looks again
+                write_whole(self._note, stored.strip())
 
 
 def note_of(robot: str) -> Path | None:

@@ -102,7 +102,7 @@ class DynamicSimulator:
         self._place(np.zeros_like(self.model.mesh.nodes), np.zeros(self.model.tendons.count), np.zeros(3))
 
     def let_go(self, gravity: np.ndarray) -> None:
-        """Return to the straight robot at rest, on which gravity (3,) acts from now on."""
+        """Return to the shape at rest without load, on which gravity (3,) acts from now on."""
         self.statics.reset()
         self._place(np.zeros_like(self.model.mesh.nodes), np.zeros(self.model.tendons.count), np.asarray(gravity, dtype=float))
 

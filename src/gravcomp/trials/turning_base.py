@@ -1,4 +1,4 @@
-"""The loop held straight while its base turns from orientation to orientation and rests at each: errors at rest and in motion.
+"""The loop holds the shape at rest while its base turns from orientation to orientation and rests at each: errors in both.
 
 The base turns from one direction of gravity to the next by the smallest angle, about a horizontal axis, and takes the random ones
 in the order of the nearest: a turn about the vertical changes nothing for the robot and would only take time.
@@ -16,8 +16,8 @@ import numpy as np
 
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
-from gravcomp.closed_loop.trace import Trace
-from gravcomp.evaluation.metrics import SETTLED, settling_time
+from gravcomp.evaluation.metrics import SETTLED, settling_time, tip_errors
+from gravcomp.inverse import Target
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.virtual.body import build_rod
@@ -35,7 +35,7 @@ _COUNTED = 0.3  # s at the end of each rest
 
 @dataclass(frozen=True)
 class Residuals:
-    """Root mean squares of lateral distances of the true tip from the straight robot's, in m; NaN where nothing is counted.
+    """Root mean squares of lateral distances of the true tip from that of the shape at rest, in m; NaN where nothing is counted.
 
     held: at the end of each rest; moving: during the turns; sag: released, at the same orientations; orientations: their number,
     without those at which the released robot has no equilibrium; settled: s from the start of compensation until the lateral
@@ -95,7 +95,8 @@ def residuals(
     rest = _REACTION + _PERIODS * setup.first_period + _COUNTED
     motion = WaypointMotion([(one, rest if k else 2.0 * rest) for k, one in enumerate(wanted)], RATE)
     loop = ClosedLoop(setup, motion, board=board)
-    loop.hold(target_of(setup, Case(0.0)))
+    target = target_of(setup, Case(0.0))
+    loop.hold(target)
     start = loop.time
     legs = motion.rests
     for done, (_, end) in enumerate(legs):
@@ -103,29 +104,31 @@ def residuals(
         if progress is not None:
             progress(done + 1, len(legs))
     trace = loop.trace
-    held = [_lateral(trace.between(end - _COUNTED, end)) for _, end in legs]
-    turns = [_lateral(trace.between(end, begin)) for (_, end), (begin, _) in zip(legs, legs[1:])]
-    sags = _released(setup, wanted)
+    held = [_lateral(trace.between(end - _COUNTED, end).tip_position, target) for _, end in legs]
+    turns = [_lateral(trace.between(end, begin).tip_position, target) for (_, end), (begin, _) in zip(legs, legs[1:])]
+    sags = _released(setup, wanted, target)
     sag = _rms(sags)
     first = trace.between(start, legs[0][1])
-    settled = settling_time(first.time, _lateral(first), start=start, band=SETTLED * sag)
+    settled = settling_time(first.time, _lateral(first.tip_position, target), start=start, band=SETTLED * sag)
     return Residuals(held=_rms(held), moving=_rms(turns), sag=sag, orientations=len(sags), settled=settled)
 
 
-def _released(setup: Setup, wanted: list[np.ndarray]) -> list[np.ndarray]:
-    """Lateral distances (1,) in m of the released virtual robot's tip, where it has an equilibrium."""
+def _released(setup: Setup, wanted: list[np.ndarray], target: Target) -> list[np.ndarray]:
+    """Lateral distances (1,) in m of the released virtual robot's tip from the target, where it has an equilibrium."""
     rod, found = build_rod(setup.true_robot), []
     for orientation in wanted:
         try:
             shape = equilibrium(rod, orientation.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY]))
         except NoEquilibrium:
             continue
-        found.append(np.linalg.norm(shape.tip[None, :2], axis=1))
+        found.append(_lateral(shape.tip[None], target))
     return found
 
 
-def _lateral(trace: Trace) -> np.ndarray:
-    return np.linalg.norm(trace.tip_position[:, :2], axis=1)
+def _lateral(tips: np.ndarray, target: Target) -> np.ndarray:
+    """Lateral distances (t,) in m of tips (t, 3) from the target."""
+    along = target.direction_or_zeros
+    return tip_errors(tips, along, target.tip_position, along).lateral
 
 
 def _rms(parts: list[np.ndarray]) -> float:

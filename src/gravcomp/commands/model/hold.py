@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-hold", action="store_true", help="leave out whether the robot can be held")
     target = parser.add_mutually_exclusive_group()
     target.add_argument(
-        "--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to hold, mm (default: the straight tip)"
+        "--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="tip position to hold, mm (default: the tip at rest)"
     )
     target.add_argument("--bend", nargs=2, type=float, metavar=("ANGLE", "PLANE"), help="bend to hold and its plane, deg")
     parser.add_argument(

@@ -19,15 +19,12 @@ def run(recorded: RecordedRun) -> Result:
     """Return the evaluation. Raises ConfigError when no fall is found."""
     course, robot = recorded.course, recorded.setup.robot
     period = first_period(robot)
-    measured = [
-        as_measured(course.rows(rows), str(recorded.bag), robot.length, len(robot.cables))
-        for rows in falls(course, robot.length, period)
-    ]
+    measured = [as_measured(course.rows(rows), str(recorded.bag), robot) for rows in falls(course, robot, period)]
     if not measured:
         raise ConfigError(
             f"{recorded.bag}: contains no fall. A fall: cables paid out (~/relax) for {PAID_OUT * period:.2g} s, the tip held"
-            f" within {1e3 * STRAIGHT * robot.length:g} mm of straight, let go, and {1e3 * FALLEN * robot.length:g} mm away from"
-            f" there within {WITHIN * period:.2g} s"
+            f" within {1e3 * STRAIGHT * robot.length:g} mm of its place at rest, let go, and {1e3 * FALLEN * robot.length:g} mm"
+            f" away from there within {WITHIN * period:.2g} s"
         )
     models = [predict_course(robot, fall) for fall in measured]
     position = [np.linalg.norm(tip - fall.tip_position, axis=1) for fall, (tip, _) in zip(measured, models)]
@@ -53,7 +50,7 @@ def run(recorded: RecordedRun) -> Result:
         ],
         parts=[
             Plot(
-                "Distance of the tip from straight",
+                "Distance of the tip from its place at rest",
                 _drawing(inclinations, measured, models),
                 f"Vermilion: the {recorded.who}; blue: the model.",
             ),

@@ -1,4 +1,4 @@
-"""Free falls in a recorded course: the robot is held straight by hand, its cables are paid out, and it is let go.
+"""Free falls in a recorded course: the robot is held by hand as it is at rest, its cables are paid out, and it is let go.
 
 The moment of letting go is not measured. At first the tip moves as d = a (t - t_0)^2 / 2, so sqrt(d) of the first samples is a
 straight line that begins at t_0.
@@ -8,10 +8,12 @@ import numpy as np
 
 from gravcomp.calibration.course import STRAIGHT
 from gravcomp.calibration.measured import Measured
+from gravcomp.description import Robot
 from gravcomp.evaluation.recorded.course import RELEASED, Course
+from gravcomp.mesh.robot_axis import rest_tip
 
 FALLEN, WITHIN = 0.08, 1.8
-"""A fall: the tip is more than FALLEN lengths from the straight robot's within WITHIN first periods."""
+"""A fall: the tip is more than FALLEN lengths from where it is at rest within WITHIN first periods."""
 PAID_OUT = 3.6
 """First periods for which the cables must have been paid out before: a robot that its cables let down does not fall."""
 _BEGINNING = (0.01, 0.1)  # lengths: distances of the samples from which the moment of letting go is computed
@@ -19,9 +21,10 @@ _LONGEST = 14.0  # first periods of a fall
 _SHORTEST = 3.6
 
 
-def falls(course: Course, length: float, period: float) -> list[np.ndarray]:
-    """Return the rows of each fall, from the last sample near straight on; length in m and first period in s of the robot."""
-    distance, near = np.linalg.norm(course.tip_position - [0.0, 0.0, length], axis=1), STRAIGHT * length
+def falls(course: Course, robot: Robot, period: float) -> list[np.ndarray]:
+    """Return the rows of each fall, from the last sample near the shape at rest on; period in s: the robot's first."""
+    length = robot.length
+    distance, near = np.linalg.norm(course.tip_position - rest_tip(robot)[0], axis=1), STRAIGHT * length
     released = course.phase == RELEASED
     found: list[np.ndarray] = []
     last = -1
@@ -42,10 +45,10 @@ def falls(course: Course, length: float, period: float) -> list[np.ndarray]:
     return found
 
 
-def as_measured(course: Course, source: str, length: float, cables: int) -> Measured:
-    """Return the fall as a course that begins straight at the moment of letting go."""
-    straight = np.array([0.0, 0.0, length])
-    let_go = _let_go(course.time, np.linalg.norm(course.tip_position - straight, axis=1) / length)
+def as_measured(course: Course, source: str, robot: Robot) -> Measured:
+    """Return the fall as a course that begins at the shape at rest, at the moment of letting go."""
+    tip, direction = rest_tip(robot)
+    let_go = _let_go(course.time, np.linalg.norm(course.tip_position - tip, axis=1) / robot.length)
     course = course.rows(course.time > let_go)
     count = len(course.time) + 1
     return Measured(
@@ -53,9 +56,9 @@ def as_measured(course: Course, source: str, length: float, cables: int) -> Meas
         trial=np.zeros(count, int),
         time=np.append(let_go, course.time) - let_go,
         gravity=course.gravity[np.append(0, np.arange(count - 1))],
-        displacement=np.full((count, cables), np.nan),
-        tip_position=np.vstack([straight, course.tip_position]),
-        tip_direction=np.vstack([[0.0, 0.0, 1.0], course.tip_direction]),
+        displacement=np.full((count, len(robot.cables)), np.nan),
+        tip_position=np.vstack([tip, course.tip_position]),
+        tip_direction=np.vstack([direction, course.tip_direction]),
     )
 
 
