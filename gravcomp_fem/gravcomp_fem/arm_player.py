@@ -34,6 +34,7 @@ from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 
 _RATE = 50.0  # Hz, of joint_states
+_LONGEST_MOTION = 2.5 / _RATE  # s, by which the tour goes on between two messages
 _PASSES = ("released", "compensated")
 _REPEAT_REQUEST = 1.0  # s, until a refused or unanswered request is repeated
 
@@ -64,7 +65,8 @@ class ArmPlayer(ManagedNode):
     def activate(self) -> None:
         """Subscribe and start moving."""
         self._ready: float | None = None  # s, since when robot and services are available
-        self._begin: float | None = None  # s, start of the pass
+        self._moved: float | None = None  # s, the last motion of the pass; None: it has not begun
+        self._time = 0.0  # s, since the start of the pass
         self._pass = 0
         self._accepted = self._measuring = False
         self._requested = -_REPEAT_REQUEST
@@ -89,17 +91,20 @@ class ArmPlayer(ManagedNode):
     def _tick(self) -> None:
         self._read_polled()
         now = self.get_clock().now().nanoseconds * 1e-9
-        time = 0.0 if self._begin is None else now - self._begin
+        # A process that the machine has halted moves the arm on from where it is: an arm does not jump.
+        time = 0.0 if self._moved is None else self._time + min(max(now - self._moved, 0.0), _LONGEST_MOTION)
+        self._time = time
         if time >= self._tour.duration:
-            self._pass, self._begin, self._accepted, self._measuring, time = self._pass + 1, None, False, False, 0.0
+            self._pass, self._moved, self._accepted, self._measuring, time = self._pass + 1, None, False, False, 0.0
             if self._pass == len(_PASSES):
                 self._write("done", self._figures())
                 self.finished = True
                 return
         self._move(self._tour.positions(time))
-        if self._begin is None:
+        if self._moved is None:
             self._prepare(now)
             return
+        self._moved = now
         pose = self._tour.at_rest(time, self.parameters.hold - self.parameters.measured)
         self._measuring = pose is not None
         if pose is not None:
@@ -128,7 +133,7 @@ class ArmPlayer(ManagedNode):
         elif self._bridge.state != CableState.ACTIVE:
             self._set_phase(f"waiting for the bridge: {self._bridge.message}")
         else:
-            self._begin = now
+            self._moved = now
             self._set_phase(_PASSES[self._pass])
 
     def _request_pass(self, now: float) -> None:

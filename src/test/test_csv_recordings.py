@@ -153,6 +153,11 @@ STRANGERS = {
     "Polish": ("czas [ms],żyroskop x,żyroskop y,żyroskop z,przyspieszenie x,przyspieszenie y,przyspieszenie z", 1e3, "rad", ""),
     "Spanish": ("Tiempo (s),Giroscopio x,Giroscopio y,Giroscopio z,Aceleración x,Aceleración y,Aceleración z", 1.0, "rad", ""),
     "quotes": ('"t","gx","gy","gz","ax","ay","az"', 1.0, "rad", ""),
+    "paths of PlotJuggler": (
+        "__time,/imu/angular_velocity/x,/imu/angular_velocity/y,/imu/angular_velocity/z,"
+        "/imu/linear_acceleration/x,/imu/linear_acceleration/y,/imu/linear_acceleration/z", 1.0, "rad", ""),
+    "the counter of Xsens": ("SampleTimeFine,Gyr_X,Gyr_Y,Gyr_Z,Acc_X,Acc_Y,Acc_Z", 1e4, "rad", ""),
+    "the counter of Movella": ("SampleTimeFine,Gyr_X,Gyr_Y,Gyr_Z,Acc_X,Acc_Y,Acc_Z", 1e6, "rad", ""),
     "spaces": ("t, gx, gy, gz, ax, ay, az", 1.0, "rad", ""),
 }  # fmt: skip
 IN_SI = {"rad": 1.0, "deg": np.pi / 180.0, "mdeg": np.pi / 180e3, "": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
@@ -181,6 +186,17 @@ def test_columns_in_another_order_with_gaps_and_a_separator_at_the_end(tmp_path)
     table = rows(ACCEL[:, ::-1], [""] * N, GYRO[:, ::-1], SECONDS, [""] * N)
     (tmp_path / "a.csv").write_text(lines("az,ay,ax,note,gz,gy,gx,t", table))
     check(read_recording(tmp_path / "a.csv"))
+
+
+@pytest.mark.parametrize("first", ["PacketID", "loggingTime(txt)", "timestamp (+0100)"])
+def test_a_column_that_is_no_usable_time_is_passed_over(tmp_path, first):
+    (tmp_path / "a.csv").write_text(lines(f"{first},elapsed (s),gx,gy,gz,ax,ay,az", rows(range(N), SECONDS, GYRO, ACCEL)))
+    check(read_recording(tmp_path / "a.csv"))
+
+
+def test_a_magnetometer_is_no_accelerometer(tmp_path):
+    with pytest.raises(RecordingError, match=r"found: Gyroscope\.csv, Magnetometer\.csv, Metadata\.csv"):
+        read_recording(logger_files(tmp_path / "a", {"Magnetometer": ACCEL}))
 
 
 def test_seconds_and_nanoseconds_in_two_columns(tmp_path):
@@ -217,6 +233,8 @@ MISTAKES = [
     ),
     ("t,gx,gy,gz,ax,ay,az\n0,1,2,3,4,5,6\n", "has 1 IMU samples"),
     ("hello\nworld\n", "no line of numbers"),
+    ("t [s] gx gy gz ax ay az [g]\n0 1 2 3 4 5 6\n1 1 2 3 4 5 6\n", r"header names 9 columns.* have 7 fields: t, \[s\], gx"),
+    ("t;gx;gy;gz;ax;ay;az\n1;0;1;2;3;4;5;6\n2;1;1;2;3;4;5;6\n", "header names 7 columns.* have 8 fields"),
     ("t,gx,gy,gz,ax,ay,az\n0.2,1,2,3,4,5,6\n0.1,1,2,3,4,5,6\n", "the time does not advance: it goes from 0.2 to 0.1"),
     ("sec,nanosec,gx,gy,gz,ax,ay,az\n0,0,1,2,3,4,5,6\n0,-,1,2,3,4,5,6\n", "column 'nanosec' is no number in row 2"),
     ("t,gx,gy,gz,ax,ay,az\n12:00:01,1,2,3,4,5,6\n(stop),1,2,3,4,5,6\n", r"column 't' is no time of a clock in row 2: '\(stop\)'"),

@@ -35,6 +35,7 @@ def has_model(bench) -> bool:
         (lambda b: changed(b, 16, 0), "another robot"),
         (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: b[:-8], "cut off"),
+        (lambda b: b + bytes(8), "size"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 32, 52), "more modes"),
         (lambda b: changed(b, 44, model_blob.PIECES_MAX + 1), "pieces of cables"),

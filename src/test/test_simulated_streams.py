@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scipy.spatial.transform import Rotation
+
 from gravcomp.bench.simulated_streams import KINDS, simulated
 from gravcomp.bench.stream_faults import FAULTS
 from gravcomp.orientation.self_calibration import calibrate_from_itself
@@ -73,6 +75,21 @@ def test_fast_translation_alone_is_no_unit():
     clean = recording("arm at 2 m/s^2", duration=20.0)
     shaken = replace(clean, accel=clean.accel + 12.0 * np.sin(2.0 * np.pi * 1.3 * np.arange(len(clean)) / clean.rate)[:, None])
     assert "accel_unit" not in kinds(check_recording(shaken))
+
+
+@pytest.mark.parametrize("name", ["hand, no rest", "arm at 2 m/s^2", "phone"])
+def test_the_acceleration_without_gravity_is_not_taken_for_another_unit(name):
+    clean = recording(name)
+    gravity = Rotation.from_quat(clean.orientation, scalar_first=True).inv().apply([0.0, 0.0, STANDARD_GRAVITY])
+    found = check_recording(replace(clean, accel=clean.accel - gravity, orientation=None))
+    assert found[0].kind == "no_gravity" and found[0].fatal and not found[0].convertible
+
+
+@pytest.mark.parametrize("factor", [1.0 / STANDARD_GRAVITY, 1000.0 / STANDARD_GRAVITY, 100.0])
+def test_the_unit_of_the_specific_force_is_found_without_a_rest(factor):
+    clean = recording("hand, no rest")
+    found = check_recording(replace(clean, accel=clean.accel * factor))
+    assert kinds(found) == ["accel_unit"] and found[0].accel_factor == pytest.approx(1.0 / factor)
 
 
 def test_what_a_calibration_leaves_open_is_said():

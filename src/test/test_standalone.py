@@ -122,6 +122,7 @@ def changed(blob: bytes, at: int, value: int) -> bytes:
     [
         (lambda b: b[:40], "cut off"),
         (lambda b: b[:-8], "cut off"),
+        (lambda b: b + bytes(8), "size"),
         (lambda b: b"GCMX" + b[4:], "no blob"),
         (lambda b: changed(b, 4, 1), "another version"),
         (lambda b: changed(b, 32, 52), "more modes"),

@@ -99,6 +99,17 @@ def test_the_live_checks_find_what_the_offline_checks_find(short):
     assert [finding.kind for finding in monitor.findings()] == ["gyro_spikes"]
 
 
+def test_a_live_stream_forgets_that_its_time_went_back():
+    monitor, stamps = StreamMonitor(memory=1.0), 10_000_000 * np.arange(2560)
+    stamps[[100, 101]] = stamps[[101, 100]]
+    still = np.tile([0.0, 0.0, 9.81], (256, 1))
+    found = []
+    for block in stamps.reshape(10, 256):
+        monitor.add_block(block, 0.0 * still, still)
+        found.append("time_back" in [finding.kind for finding in monitor.findings()])
+    assert found[0] and not found[-1]
+
+
 def gated(values):
     """Return what a gate counts of a signal of one axis in the end, and how many spikes it held."""
     gate = SpikeGate(math.radians(20.0), SpikeOptions(), 1.0)

@@ -310,13 +310,17 @@ static void go_back(gc_equilibrium *state) {
   state->creep = creep;  // the material has crept, whatever the tracking lost
 }
 
-void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *wound, float interval,
+void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const float *full_wound, float interval,
                          gc_shape *shape) {
   const gc_model *model = state->model;
   const float length = model->settings->length;
   state->loaded = state->loaded < GC_LOADING_STEPS ? state->loaded + 1u : GC_LOADING_STEPS;
   const float share = (float)state->loaded / (float)GC_LOADING_STEPS;
   const float gravity[3] = {share * full_gravity[0], share * full_gravity[1], share * full_gravity[2]};
+  float wound[GC_CABLES_MAX];
+  for (uint32_t i = 0; i < model->cables; ++i) {
+    wound[i] = share * full_wound[i];
+  }
   gc_creep_begin(&state->creep, model, interval);
   if (model->slides) {
     slide(state, wound);

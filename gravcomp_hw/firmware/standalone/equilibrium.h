@@ -11,7 +11,7 @@
 #include "elasticity.h"
 #include "law_deviation.h"
 
-#define GC_LOADING_STEPS 50u  // calls after a reset over which gravity rises from zero
+#define GC_LOADING_STEPS 50u  // calls after a reset over which gravity and pulls rise from zero
 #define GC_EFFECTOR_ROWS 6u  // position and direction of the tip
 
 #define GC_ANSWERS_MAX (GC_CABLES_MAX + 4u)
@@ -57,9 +57,9 @@ typedef struct {
 void gc_equilibrium_reset(gc_equilibrium *state, const gc_model *model);
 
 // Track the equilibrium to gravity (3,) in m/s^2 in soft_base and to cables pulled in to `wound` (m,) in m, NaN: released.
-// After a reset gravity rises from zero over GC_LOADING_STEPS calls, so that one step a call finds each equilibrium.
+// After a reset gravity and pulls rise from zero over GC_LOADING_STEPS calls, so that one step a call finds each equilibrium.
 // Where none is found the shape is the last equilibrium, near which the next call starts; after 20 calls without one, or more of
-// which every other one has none, the tracking starts again from the straight robot, and gravity rises again.
+// which every other one has none, the tracking starts again from the straight robot, and they rise again.
 //
 // interval: s since the last call, in which the material creeps.
 void gc_equilibrium_step(gc_equilibrium *state, const float *gravity, const float *wound, float interval, gc_shape *shape);

@@ -66,6 +66,11 @@ uint32_t gc_model_magic(const uint8_t *blob, size_t size) {
   return size < sizeof(gc_model_header) ? 0u : ((const gc_model_header *)(const void *)blob)->magic;
 }
 
+size_t gc_model_length(const uint8_t *blob, size_t room) {
+  const size_t size = room < sizeof(gc_model_header) ? room : ((const gc_model_header *)(const void *)blob)->size;
+  return size < room ? size : room;
+}
+
 gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size, uint32_t magic, const uint8_t *robot,
                               gc_alive *alive) {
   if (size < sizeof(gc_model_header)) {
@@ -84,7 +89,7 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
   if (size < header->size) {
     return GC_MODEL_CUT_OFF;
   }
-  if (header->size != byte_count(header)) {
+  if (size > header->size || header->size != byte_count(header)) {
     return GC_MODEL_WRONG_SIZE;
   }
   const size_t before = offsetof(gc_model_header, robot);

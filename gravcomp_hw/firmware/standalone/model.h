@@ -49,7 +49,7 @@ typedef enum {
   GC_MODEL_FOREIGN = 2,      // not a blob of a model
   GC_MODEL_OTHER_VERSION = 3,
   GC_MODEL_TOO_BIG = 4,      // more modes, strains, cables, pieces, points or branches than this firmware has room for
-  GC_MODEL_WRONG_SIZE = 5,   // the tables do not fill the size
+  GC_MODEL_WRONG_SIZE = 5,   // the tables do not fill the size, or there are bytes after them
   GC_MODEL_WRONG_CRC = 6,
   GC_MODEL_OTHER_ROBOT = 7,
   GC_MODEL_NOT_FINITE = 8    // a setting or a table has a number that is not finite
@@ -102,5 +102,8 @@ gc_model_status gc_model_open(gc_model *model, const uint8_t *blob, size_t size,
 
 // Return the first word of a blob of `size` bytes, 0 where there is none.
 uint32_t gc_model_magic(const uint8_t *blob, size_t size);
+
+// Return the number of bytes of the blob at the begin of a place of `room` bytes, as its header says; at most `room`.
+size_t gc_model_length(const uint8_t *blob, size_t room);
 
 #endif

@@ -7,7 +7,7 @@ bool gc_model_store_start(gc_model_store *store) {
   for (uint32_t slot = 0; slot < GC_MODEL_SLOTS && store->used == GC_MODEL_SLOTS; ++slot) {
     const uint8_t *blob = store->memory.slots[slot];
     const uint32_t magic = gc_model_magic(blob, GC_MODEL_SLOT);
-    if (gc_standalone_take(store->loop, blob, GC_MODEL_SLOT, magic, store->memory.alive)) {
+    if (gc_standalone_take(store->loop, blob, gc_model_length(blob, GC_MODEL_SLOT), magic, store->memory.alive)) {
       store->used = slot;
     }
   }

@@ -1,8 +1,7 @@
 """IMU recordings with known truth of sensors and motions that BROAD does not have.
 
 A sensor rests, then turns and moves with a bounded velocity, with pauses or without. Its samples have noise, biases, a step of
-quantisation and stamps with jitter, as a data sheet or a
-driver gives them. The same kind and seed give the same recording.
+quantisation and stamps with jitter, as a data sheet or a driver gives them. The same kind and seed give the same recording.
 """
 
 import math

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--calibrate",
         action="store_true",
-        help="fit scale and offset of the accelerometer to the recording itself, in which the sensor has to turn",
+        help="fit scale and offset of the accelerometer to the recording itself; where the sensor turns too little: its length at rest",
     )
     parser.add_argument("--average", type=int, default=1, metavar="N", help="average every N samples (3: 95.2 Hz in BROAD)")
     parser.add_argument(

@@ -14,6 +14,7 @@ STEADY = math.radians(0.5)  # rad/s, largest deviation of a rate in it
 LARGEST_BIAS = math.radians(5.0)  # rad/s: a larger mean rate is rotation
 UNIT = 0.2  # relative error of the length that a bad calibration explains
 MOVING = 2.0  # ratio of lengths that motion explains
+STEADY_LENGTH = 0.7  # lowest tenth of the lengths in motion over their median: with gravity 0.8 and more, of three random axes 0.5
 UNCALIBRATED = 0.1  # m/s^2
 DRIFT = math.radians(0.15)  # rad/s
 KEPT = 400  # windows
@@ -74,10 +75,13 @@ class Resting:
         if not rested and 1.0 / MOVING < length / STANDARD_GRAVITY < MOVING:
             return []
         where = "at rest" if rested else "in motion"
-        for name, unit in UNITS.items():
-            if abs(length / unit - 1.0) <= UNIT or (not rested and 1.0 / MOVING < length / unit < MOVING):
-                text = f"the accelerometer is in {name} ({length:.3g} {where}): m/s^2 is needed"
-                return [Finding("accel_unit", text, fatal=True, accel_factor=STANDARD_GRAVITY / unit)]
+        if not rested and np.quantile(norms, 0.1) < STEADY_LENGTH * length:
+            text = f"the specific force {where} varies about {length:.3g} as without gravity: gravity was removed"
+            return [Finding("no_gravity", text, fatal=True)]
+        name, unit = min(UNITS.items(), key=lambda item: abs(math.log(max(length, 1e-12) / item[1])))
+        if abs(length / unit - 1.0) <= UNIT or (not rested and 1.0 / MOVING < length / unit < MOVING):
+            text = f"the accelerometer is in {name} ({length:.3g} {where}): m/s^2 is needed"
+            return [Finding("accel_unit", text, fatal=True, accel_factor=STANDARD_GRAVITY / unit)]
         if length < 0.05 * STANDARD_GRAVITY:
             return [Finding("no_gravity", f"the specific force {where} is {length:.2f}: gravity was removed", fatal=True)]
         text = f"the accelerometer is in no known unit: {length:.3g} {where}, 9.81 m/s^2 is needed"

@@ -47,7 +47,7 @@ class Timing:
             found.append(
                 Finding("duplicates", f"{100 * self._repeated / self._count:.1f} % of the stamps repeat the one before: left out")
             )
-        if self._older > 0:
+        if self._older > 0.5:
             found.append(Finding("time_back", f"the time goes back {self._older:.0f} time(s): those samples are left out"))
         if self._gaps > 0.5:
             found.append(Finding("gaps", f"samples are missing {self._gaps:.0f} time(s), up to {self._longest:.2f} s"))

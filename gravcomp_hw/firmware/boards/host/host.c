@@ -78,9 +78,11 @@ void gc_host_attach(gc_host *host, gc_host_loop *loop) {
   attach_loop(host);
   gc_model model;
   const uint32_t used = loop->store.used;
-  if (used < GC_MODEL_SLOTS && loop->standalone.loaded &&
-      gc_model_open(&model, loop->store.memory.slots[used], GC_MODEL_SLOT, GC_MODEL_MAGIC, NULL, NULL) == GC_MODEL_OK) {
-    gc_standalone_moved(&loop->standalone, &model);
+  if (used < GC_MODEL_SLOTS && loop->standalone.loaded) {
+    const uint8_t *blob = loop->store.memory.slots[used];
+    if (gc_model_open(&model, blob, gc_model_length(blob, GC_MODEL_SLOT), GC_MODEL_MAGIC, NULL, NULL) == GC_MODEL_OK) {
+      gc_standalone_moved(&loop->standalone, &model);
+    }
   }
 }
 

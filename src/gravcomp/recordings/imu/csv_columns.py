@@ -25,13 +25,13 @@ _ACCEL = (
 )
 _LINEAR = r"linear(?!_acc|\.acc)|without g|ohne g|sans g|sin g|senza g|user.?acc"  # in ROS linear_acceleration is with gravity
 _TIME = (
-    r"time|stamp|epoch|elapsed|zeit|temps|tiempo|tempo\b|tijd|czas|čas|tid\b|aika|zaman|idő|время|时间|時間|時刻|시간|"
+    r"time|stamp|epoch|elapsed|zeit|temps|tiempo|tempo\b|tijd|czas|čas|\btid\b|aika|zaman|idő|время|时间|時間|時刻|시간|"
     r"^t$|^(milli|micro|nano)?s(ec(ond)?s?)?$|^(millis|micros|nanos)$"
 )
 _WHOLE_SECONDS, _NANOSECONDS = r"(^|[^a-z])secs?(onds?)?$", r"(^|[^a-z])n(ano)?secs?(onds?)?$"  # of a stamp in two columns
 _MORE = r"absol|magnitude|norm\b|betrag|magnet|covariance|bias"
 _AXIS = (
-    r"(?:^|[\s_.\-])([xyz])(?:[\s_\-]?(?:axis|achse))?$",
+    r"(?:^|[\s_.\-/])([xyz])(?:[\s_\-]?(?:axis|achse))?$",
     r"[^\W\d_]([xyz])(?:[\s_\-]?(?:axis|achse))?$",
     r"^([xyz])(?:[\s_\-]?(?:axis|achse))?[\s_.\-]",
     r"^([xyz])(?=[^\x00-\x7f])",
@@ -97,15 +97,15 @@ def by_names(names: tuple[str, ...], stem: str, source: str) -> Found:
     gyro, accel = _axes(names, _GYRO, "gw", source), _axes(names, _ACCEL, "a", source)
     bare = _axes(names, r"^$", "", source)
     if bare and not gyro and not accel:
-        gyro, accel = (bare, ()) if re.search(_GYRO, stem.lower()) else ((), bare)
-    linear = bool(accel) and bool(re.search(_LINEAR, (names[accel[0]] if not bare else stem).lower()))
+        gyro, accel = (bare if re.search(words, stem.lower()) else () for words in (_GYRO, rf"{_ACCEL}|grav"))
+    linear = bool(accel) and bool(re.search(_LINEAR, (names[accel[0]] if accel != bare else stem).lower()))
     times = [i for i, name in enumerate(names) if re.search(_TIME, plain_name(name)) or re.search(_TIME, name.lower())]
     whole, nanoseconds = (
         next((i for i, name in enumerate(names) if re.search(words, name.lower())), None)
         for words in (_WHOLE_SECONDS, _NANOSECONDS)
     )
     in_two = whole is not None and nanoseconds is not None
-    time = whole if in_two else times[0] if times else None
+    time = whole if in_two else _time(names, times, source)
     turned = tuple(
         i
         for letter in "wxyz"
@@ -140,6 +140,21 @@ def _axes(names: tuple[str, ...], words: str, letters: str, source: str) -> tupl
         return ()
     calibrated = [[i for i in of_axis if not re.search(_LINEAR, names[i].lower())] or of_axis for of_axis in found.values()]
     return tuple(of_axis[0] for of_axis in calibrated)
+
+
+def _time(names: tuple[str, ...], times: list[int], source: str) -> int | None:
+    """Return the first of the columns of time whose unit is known or not given, None without one. Raises RecordingError."""
+    refusals = []
+    for column in times:
+        try:
+            named_unit(names[column], tuple(TIME_UNITS), source)
+        except RecordingError as error:
+            refusals.append(error)
+        else:
+            return column
+    if refusals:
+        raise refusals[0]
+    return None
 
 
 def _unit(names: tuple[str, ...], columns: tuple[int, ...], known: tuple[str, ...], source: str) -> str | None:

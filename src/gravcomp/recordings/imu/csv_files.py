@@ -17,6 +17,7 @@ from gravcomp.recordings.imu.stamps import nearest, usable_stamps
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log")
 _RATES = (5.0, 8000.0)  # Hz, of an IMU whose unit of time is not given
+_TICKS = {"sampletimefine": (100_000, 1_000)}  # ns: counters of Xsens (0.1 ms) and Movella (us)
 _TRUTHS = ("state_groundtruth_estimate0", "mocap0")  # of EuRoC and TUM-VI, next to imu0
 _TREE = ("mav0/imu0/data.csv", "imu0/data.csv", "data.csv")
 _NEEDED = "needed: time, rate x y z, specific force x y z; or their names in a file for --columns"
@@ -129,8 +130,7 @@ def _stamps(table: Table, found: Found, rate: float | None, values: np.ndarray) 
     if (clock := table.clock_times(found.time)) is not None:
         return usable_stamps(clock, None, values)
     numbers, whole = _finite(table, found.time), table.whole_numbers(found.time)
-    unit = found.time_unit or _time_unit(numbers, table)
-    scale = TIME_UNITS[unit]
+    scale = TIME_UNITS[found.time_unit] if found.time_unit else _time_scale(numbers, table, found.time)
     stamp = np.rint(numbers * scale).astype(np.int64) if whole is None else np.array([x * scale for x in whole], np.int64)
     if found.nanoseconds is not None:
         stamp = stamp + _finite(table, found.nanoseconds).astype(np.int64)
@@ -146,16 +146,17 @@ def _finite(table: Table, column: int) -> np.ndarray:
     return numbers
 
 
-def _time_unit(times: np.ndarray, table: Table) -> str:
+def _time_scale(times: np.ndarray, table: Table, column: int) -> int:
+    """Return the unit of a column of times (n,) in ns, with which their steps are those of an IMU. Raises RecordingError."""
     if len(times) < 2:
         raise RecordingError(f"{table.source}: has {len(times)} IMU samples; at least 2 are needed")
     steps = np.diff(times)
     if not (steps > 0).any():
         raise RecordingError(f"{table.source}: the time does not advance: it goes from {times[0]:g} to {times[-1]:g}")
     step = float(np.median(steps[steps > 0]))
-    for unit, scale in TIME_UNITS.items():
+    for scale in _TICKS.get(table.names[column].lower(), tuple(TIME_UNITS.values())):
         if _RATES[0] <= 1e9 / (step * scale) <= _RATES[1]:
-            return unit
+            return scale
     raise RecordingError(f"{table.source}: the steps of time are {step:g}, in no known unit; give time_unit by --columns")
 
 

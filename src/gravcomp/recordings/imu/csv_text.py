@@ -81,6 +81,11 @@ def read_table(path: Path, *, longest: int | None = None) -> Table:
             f"{path}: has {width} fields under {len(names)} names: commas are separators and decimal points at once;"
             " export it with semicolons or tabulators as separators, or with decimal points"
         )
+    if names and len(names) != width:
+        raise RecordingError(
+            f"{path}: its header names {len(names)} columns, and the lines of numbers have {width} fields:"
+            f" {', '.join(name or '-' for name in names)}"
+        )
     if any(_DECIMAL_COMMA.match(field) for row in rows[:5] for field in row):
         rows = [[field.replace(",", ".") for field in row] for row in rows]
     if len(rows[-1]) < width:  # cut off while it was written
@@ -145,7 +150,7 @@ def _names(header: list[list[str]], width: int) -> tuple[str, ...]:
         joined = []
         for outer, name in zip(above, last):
             group = outer or group
-            joined.append(f"{group} {name}".strip())
+            joined.append(f"{group} {name}".strip() if outer or name else "")
         last = joined
     last = [
         f"{name} ({unit.strip('()[]{}')})" if is_unit(unit) else name for name, unit in zip(last, [*units, *[""] * len(last)])
