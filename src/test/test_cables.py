@@ -9,6 +9,8 @@ from gravcomp.cables.friction import Sliding
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.slack import taut_tensions
 from gravcomp.description import Cable, Elements, load_robot_file
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.mesh import MeshError, body_mesh
 from gravcomp.mesh.sections import is_one_region
 from gravcomp.simulation import RobotModel
@@ -127,3 +129,36 @@ def test_a_command_that_trembles_does_not_reverse_the_friction():
         sliding = sliding.after(np.array([tremble - 0.05 * step * way, np.nan]), None, np.ones(2), none)
         assert sliding.direction[0] == pytest.approx(min(1.0, max(-1.0, 1.0 - 0.05 * step)), abs=0.05)
         assert sliding.direction[1] == -1.0
+
+
+@pytest.mark.parametrize("between", ["released", "tension"])
+def test_after_a_release_or_given_tensions_a_cable_slides_from_where_it_is(between):
+    """What was wound in before says nothing: a cable of 3 mm that comes from 1 mm is pulled in, also if it had 5 mm once."""
+    sliding = Sliding.none(1, 0.1).after(np.array([5e-3]), None, np.zeros(1), np.zeros(1))
+    given = None if between == "released" else np.array([0.5])
+    for tension in (1.0, 0.5):
+        sliding = sliding.after(None, given, np.array([tension]), np.array([1e-3]))
+    assert sliding.direction == pytest.approx([-1.0])
+    assert sliding.after(np.array([3e-3]), None, np.zeros(1), np.array([1e-3])).direction == pytest.approx([1.0])
+
+
+def test_a_part_of_the_load_that_fails_leaves_no_trace_in_the_friction():
+    """The next, smaller part pulls the cables in from the last equilibrium; it does not pay them out from the one that failed."""
+    directions = []
+
+    class Refusing(StaticSolver):
+        tried = 0
+
+        def track(self, gravity, cables, *args, **kwargs):
+            self.tried += 1
+            state = dataclasses.replace(self.state, converged=self.tried not in (1, 2, 4))
+            self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement)
+            if state.converged:
+                self.state = state
+                directions.append(self.sliding.direction)
+            return state
+
+    robot = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
+    solver = Refusing(RobotModel(robot))
+    assert solver.solve(np.zeros(3), CableInput(wound=np.full(6, 5e-3))).converged
+    assert solver.tried > 5 and np.array(directions) == pytest.approx(1.0)

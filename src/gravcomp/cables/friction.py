@@ -86,7 +86,8 @@ class Sliding:
     ) -> "Sliding":
         """Return the state after an input: displacements `wound` (m,), tensions `given` (m,), or neither for released cables.
 
-        tension and displacement (m,): of the cables before. A cable whose input does not change keeps its direction.
+        tension and displacement (m,): of the cables before, with their stretch. A cable whose input does not change keeps its
+        direction.
         """
         if given is not None:
             change = given - tension
@@ -98,4 +99,4 @@ class Sliding:
         direction = np.where(np.abs(change) > _AT_REST, np.sign(change), self.direction)
         if given is None and wound is not None and self.way > 0.0:
             direction = np.where(np.isnan(wound), direction, np.clip(self.direction + change / self.way, -1.0, 1.0))
-        return Sliding(direction, self.wound if wound is None else wound, self.way)
+        return Sliding(direction, np.full(len(tension), np.nan) if wound is None else wound, self.way)

@@ -72,7 +72,7 @@ class StaticSolver(StaticTracker):
         returned, not converged, with the fraction of the load that it balances, and the solver keeps the state `kept`.
         iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first.
         """
-        (before, gravity), here, done = ends, self.state, 0.0
+        (before, gravity), here, sliding, done = ends, self.state, self.sliding, 0.0
         while done < 1.0:
             fraction = min(1.0, done + part)
             force = before + fraction * (gravity - before)
@@ -80,9 +80,9 @@ class StaticSolver(StaticTracker):
                 self.contact.allowed = (1.0 - fraction) * depth
             state = self.track(force, cables.part(origin, fraction), iterations, exact=exact, loads=loads, fraction=fraction)
             if state.converged:
-                here, done, part = self.state, fraction, part if self._rubs else 2.0 * part
+                here, sliding, done, part = self.state, self.sliding, fraction, part if self._rubs else 2.0 * part
                 continue
-            self.state = here
+            self.state, self.sliding = here, sliding
             part /= 2.0
             if part < least:
                 self.state = kept

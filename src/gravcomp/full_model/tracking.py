@@ -99,7 +99,8 @@ class StaticTracker:
             self._kept = None
         state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
         if self.model.tendons.friction.any():
-            self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement)
+            stretched = self.model.tendons.stretch(state.tendons) * state.tension
+            self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement + stretched)
         if self.contact is not None:
             self.contact.begin(previous.u, gravity)
             iterations *= _MORE_IN_CONTACT

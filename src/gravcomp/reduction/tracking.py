@@ -20,7 +20,8 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.contact import ReducedContact, tracked_touching
+from gravcomp.reduction.contact import ReducedContact
+from gravcomp.reduction.contact_step import tracked_touching
 from gravcomp.reduction.law_deviation import KeptStiffness, forget
 from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
@@ -95,7 +96,8 @@ class ReducedTracker:
         stiffer, offset = creep or (0.0, self._no_offset)
         state = self.state
         if self._has_friction:
-            self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement)
+            stretched = stretch(self._body.cables, self._point.tendons) * state.tension
+            self.sliding = cables.sliding(self.sliding, state.tension, self._point.tendons.displacement + stretched)
         wound, given = cables.arrays(state.tension.size)
         weight = self.model.weight @ gravity
         if force is not None:
