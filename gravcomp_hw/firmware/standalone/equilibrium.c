@@ -318,6 +318,7 @@ void gc_equilibrium_step(gc_equilibrium *state, const float *full_gravity, const
   const float share = (float)state->loaded / (float)GC_LOADING_STEPS;
   const float gravity[3] = {share * full_gravity[0], share * full_gravity[1], share * full_gravity[2]};
   float wound[GC_CABLES_MAX];
+  gc_zero(wound, sizeof wound);
   for (uint32_t i = 0; i < model->cables; ++i) {
     wound[i] = share * full_wound[i];
   }
