@@ -88,10 +88,15 @@ def test_the_joints_of_a_ros2_control_robot_wind_the_cables(bench):
         return max(abs(x - y) for x, y in zip(bench.heard["cable/state"].displacement, GOAL)) < 1e-6
 
     bench.until(arrived, "the cables do not arrive")
-    angles = bench.heard["joint_states"].position
     directions, zeros = (1, -1, 1), (0.0, 1.5707963, 0.0)
-    for angle, direction, zero, radius, goal in zip(angles, directions, zeros, RADII, GOAL):
-        assert direction * (angle - zero) * radius == pytest.approx(goal, abs=1e-6)
+
+    def wound():
+        angles = bench.heard["joint_states"].position
+        parts = zip(angles, directions, zeros, RADII, GOAL)
+        return all(abs(direction * (angle - zero) * radius - goal) < 1e-6 for angle, direction, zero, radius, goal in parts)
+
+    # The message of the joints may be older than that of the cables.
+    bench.until(wound, "the joints are not where the cables are")
 
     client = bench.node.create_client(Trigger, "joint_bridge/stop")
     assert client.wait_for_service(10.0)
