@@ -72,6 +72,15 @@ def test_a_stream_that_hardly_turns_keeps_its_unit_with_spikes_and_without_rest(
     assert [finding.kind for finding in monitor.findings()] == ([] if fault is None else [fault])
 
 
+@pytest.mark.parametrize("unit", ["gyro_in_deg_s", "gyro_in_millideg_s"])
+@pytest.mark.parametrize("stem", ["12_undisturbed_slow_translation_C", "27_disturbed_phone_vibration_B"])
+def test_the_unit_of_rates_is_known_apart_from_their_bias_where_the_sensor_hardly_turns(stem, unit):
+    recording = averaged_trial(stem)
+    (finding,) = check_recording(FAULTS[unit].apply(recording, np.random.default_rng(3)))
+    assert finding.kind == "gyro_unit"
+    assert finding.text.startswith(f"the gyroscope is in {unit.removeprefix('gyro_in_').replace('_s', '/s')}:")
+
+
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_reported_and_held(name, trial, short, clean_deg):
     fault = FAULTS[name]

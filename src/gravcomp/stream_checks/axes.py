@@ -59,6 +59,11 @@ _MATRICES = np.array(
     + [scale * np.eye(3) for scale in RATE_SCALES.values()]
     + [np.zeros((3, 3))]  # no turns
 )
+_UNITS = (1.0, math.pi / 180.0, math.pi / 180e3)  # rad/s in the units that the rates may have
+# The unit of each matrix, as its number in _UNITS.
+_UNIT = np.array(
+    [_UNITS.index(SCALES[scale]) if scale.endswith("deg/s") else 0 for _, scale in CANDIDATES] + [0] * (len(RATE_SCALES) + 1)
+)
 
 
 class Axes:
@@ -72,7 +77,7 @@ class Axes:
         self._blocks: list[Block] = []
         self._length = self._pause = 0.0
         self._live = False
-        self._bias: np.ndarray | None = None  # rad/s, of the last rest
+        self._biases: list[np.ndarray | None] = [None] * len(_UNITS)  # of the last rest that it is in each of the units
 
     def forget(self, keep: float) -> None:
         """Multiply the sums by `keep`; the stream is live, so that stretches are taken with pauses."""
@@ -176,8 +181,8 @@ class Axes:
         scatter = self._scatter[:count]
         return int(np.argmax(scatter <= ALIKE * scatter.min()))
 
-    def _find_bias(self, gyro: np.ndarray, accel: np.ndarray, period: float) -> None:
-        """Take the mean rate of the steadiest rest, if there is one, among means (m, 3) over `period` s."""
+    def _find_biases(self, gyro: np.ndarray, accel: np.ndarray, period: float) -> None:
+        """Take the mean rate of the steadiest rest in each unit, if there is one, among means (m, 3) over `period` s."""
         count = max(4, round(REST / period))
         whole = len(gyro) // count * count
         if not whole:
@@ -185,10 +190,11 @@ class Axes:
         rates, forces = (values[:whole].reshape(-1, count, 3) for values in (gyro, accel))
         deviation = rates.std(axis=1).max(axis=1)
         quiet = forces.std(axis=1).max(axis=1) <= QUIET * np.linalg.norm(forces.mean(axis=1), axis=1)
-        still = quiet & (np.abs(rates.mean(axis=1)).max(axis=1) <= LARGEST_BIAS)
-        steady = np.where(still, deviation, np.inf)
-        if steady.min() <= STEADY:
-            self._bias = rates[int(np.argmin(steady))].mean(axis=0)
+        for number, unit in enumerate(_UNITS):
+            still = quiet & (unit * np.abs(rates.mean(axis=1)).max(axis=1) <= LARGEST_BIAS)
+            steady = np.where(still, deviation, np.inf)
+            if unit * steady.min() <= STEADY:
+                self._biases[number] = rates[int(np.argmin(steady))].mean(axis=0)
 
     def _take_stretch(self, blocks: list[Block]) -> None:
         stamp = np.concatenate([block.stamp_ns for block in blocks])
@@ -209,10 +215,9 @@ class Axes:
         duration = (stamp[whole - 1] - stamp[0]) * 1e-9 / (whole - 1) * count
         rate = gyro[:whole].reshape(-1, count, 3).mean(axis=1)  # (m, 3)
         force = accel[:whole].reshape(-1, count, 3).mean(axis=1) / length
-        self._find_bias(rate, force, duration)
-        if self._bias is not None:
-            rate = rate - self._bias
-        turns = np.einsum("cij,mj->mci", _MATRICES, rate) * duration
+        self._find_biases(rate, force, duration)
+        biases = np.array([np.zeros(3) if bias is None else bias for bias in self._biases])
+        turns = np.einsum("cij,mcj->mci", _MATRICES, rate[:, None] - biases[_UNIT]) * duration
         matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(_MATRICES), 3, 3)
         orientations = np.empty_like(matrices)
         orientation = np.broadcast_to(np.eye(3), (len(_MATRICES), 3, 3))
@@ -227,7 +232,9 @@ class Axes:
         self._turning += candidates.max()
         self._as_given += candidates[0]
         self._stretches += 1.0
-        self._rate.take(orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._bias is not None)
+        self._rate.take(
+            orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._biases[0] is not None
+        )
         up = np.einsum("mji,wj->wmi", orientations[:, 0], means[:, 0]).reshape(WINDOWS, WINDOWS, -1, 3)
         lengths = np.linalg.norm(means[:, 0], axis=1)
         directions = up[range(WINDOWS), range(WINDOWS)].mean(axis=1) / lengths[:, None]
