@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.reduction.cholesky import factorise
 from gravcomp.reduction.law_deviation import DeviationPoint, KeptStiffness, LawDeviation, deviation_at, near_stiffness
-from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, tendons_at
+from gravcomp.reduction.reduced_cables import ReducedCables, ReducedTendons, add_stiffness, tendons_at
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.reduction.strain_polynomials import strain_at, tangent
 
@@ -68,6 +69,19 @@ def elastic_stiffness(
     if len(body.deviation.weight):
         stiffness += near_stiffness(body.deviation, point.deviation, q, kept)
     return stiffness
+
+
+@njit(cache=True)
+def stiffness_factor(
+    body: Body, point: Point, q: np.ndarray, tension: np.ndarray, stress: np.ndarray, scale: float, kept: KeptStiffness
+) -> tuple[bool, np.ndarray]:
+    """Return what `cholesky.factorise` does for the stiffness of body and cables under `tension` (m,) in N at q (r,).
+
+    stress, scale and kept: of `elastic_stiffness`.
+    """
+    matrix = elastic_stiffness(body, point, q, stress, scale, kept)
+    add_stiffness(body.cables, point.tendons, tension, matrix)
+    return factorise(matrix)
 
 
 def kept_stiffness(model: ReducedModel) -> KeptStiffness:

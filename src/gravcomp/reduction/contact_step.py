@@ -34,12 +34,12 @@ from gravcomp.contact.place_forces import (
 )
 from gravcomp.contact.places import Places, empty_places, find_places
 from gravcomp.full_model.contact import TOUCHED
-from gravcomp.reduction.body import Body, Point, elastic_force, elastic_stiffness, point_at
-from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.body import Body, Point, elastic_force, point_at, stiffness_factor
+from gravcomp.reduction.cholesky import solve
 from gravcomp.reduction.contact import Touching
 from gravcomp.reduction.contact_rows import directions_of, pull_of
 from gravcomp.reduction.law_deviation import KeptStiffness, forget
-from gravcomp.reduction.reduced_cables import add_stiffness, stretch
+from gravcomp.reduction.reduced_cables import stretch
 from gravcomp.rounding import REORDERED
 
 # A factor is used again after a step below this part of the longest one.
@@ -97,9 +97,7 @@ def tracked_touching(
         if not reuse:
             if iteration:
                 forget(kept)
-            matrix = elastic_stiffness(body, point, q, stress, scale, kept)
-            add_stiffness(cables, point.tendons, tension, matrix)
-            definite, factor = factorise(matrix)
+            definite, factor = stiffness_factor(body, point, q, tension, stress, scale, kept)
             if not definite:
                 break
         columns = np.empty((r, m + 2))

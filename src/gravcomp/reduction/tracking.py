@@ -18,12 +18,12 @@ from gravcomp.cables.friction import Sliding
 from gravcomp.cables.slack import pivoted
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
-from gravcomp.reduction.body import Body, Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
-from gravcomp.reduction.cholesky import factorise, solve
+from gravcomp.reduction.body import Body, Point, body_of, elastic_force, kept_stiffness, point_at, stiffness_factor
+from gravcomp.reduction.cholesky import solve
 from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.contact_step import tracked_touching
 from gravcomp.reduction.law_deviation import KeptStiffness, forget
-from gravcomp.reduction.reduced_cables import add_stiffness, lacking, stretch
+from gravcomp.reduction.reduced_cables import lacking, stretch
 from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
 
@@ -130,9 +130,7 @@ class ReducedTracker:
         Raises NotPositiveDefinite where the state is not stable.
         """
         body, point, state = self._body, self._point, self.state
-        matrix = elastic_stiffness(body, point, state.q, point.strain, 1.0, self._kept)
-        add_stiffness(body.cables, point.tendons, state.tension, matrix)
-        definite, factor = factorise(matrix)
+        definite, factor = stiffness_factor(body, point, state.q, state.tension, point.strain, 1.0, self._kept)
         if not definite:
             raise NotPositiveDefinite("the reduced stiffness is not positive definite")
         columns = body.tip.T.copy()
@@ -181,9 +179,7 @@ def _tracked(
         stress = scale * point.strain + offset
         if iteration:  # with that of another shape the steps may not come to an end
             forget(kept)
-        matrix = elastic_stiffness(body, point, q, stress, scale, kept)
-        add_stiffness(cables, point.tendons, tension, matrix)
-        definite, factor = factorise(matrix)
+        definite, factor = stiffness_factor(body, point, q, tension, stress, scale, kept)
         if not definite:
             break
         columns = np.empty((r, m + 4))
