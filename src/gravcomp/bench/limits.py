@@ -176,7 +176,7 @@ ROWS = {
         Row("excess_deg.gyro_spikes", "gyroscope spikes: error beyond the clean trial's, worst", "deg", 0.25),
         Row("excess_deg.accel_spikes", "accelerometer spikes: error beyond the clean trial's, worst", "deg", 0.25),
         Row("partly_calibrated", "scale and offset: trials that turn too little to be calibrated, which is reported", ""),
-        Row("partly_calibrated_deg", "the same: error beyond the clean trial's, worst", "deg"),
+        Row("partly_calibrated_deg", "the same: error beyond the clean trial's, worst", "deg", 0.5),
         Row("simulated.false_reports", "simulated sensors and motions, clean: findings", "", 0.0),
         Row("simulated.missed.*", "simulated sensors and motions: recordings in which it is not reported", "", 0.0),
         Row("simulated.excess_deg.gyro_spikes.*", "simulated: gyroscope spikes, error beyond the clean recording's", "deg", 0.25),
