@@ -32,19 +32,25 @@ def coarse(robot: Robot | None = None) -> Robot:
 @contextlib.contextmanager
 def cache_of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Context with a cache that is empty at the start of a run, but for compiled functions, and that its processes share."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "gravcomp_cache"
+    folder = of_the_run(tmp_path_factory) / "gravcomp_cache"
     keep_compiled(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("GRAVCOMP_CACHE", str(folder))
         yield
 
 
-def keep_compiled(folder: Path) -> None:
-    """Give another cache the compiled functions of this one: to compile them again takes longer than what a test does."""
+def of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that all processes of a run share."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+def keep_compiled(folder: Path, *kinds: str) -> None:
+    """Give another cache the compiled functions of this one, and its entries of other kinds: to make them again takes longer."""
     folder.mkdir(parents=True, exist_ok=True)
-    with contextlib.suppress(FileExistsError):
-        (folder / "numba").symlink_to(cache_folder("numba"))
+    for kind in ("numba", *kinds):
+        with contextlib.suppress(FileExistsError):
+            (folder / kind).symlink_to(cache_folder(kind))
 
 
 def built_once(robot: Robot) -> tuple[RobotModel, Reduction]:

@@ -42,6 +42,21 @@ def test_damping_only_takes_energy_away():
     assert np.diff(energy).max() < 1e-3 * np.abs(energy).max()
 
 
+def test_rayleigh_damping_takes_energy_from_a_robot_that_its_cables_compress():
+    """Taut cables press the sagging body more than it bears without them: its own stiffness as damping would drive it."""
+    robot = model()
+    statics = Simulator(robot, reduced=False)
+    rest = statics.solve(GRAVITY, displacement=np.zeros(6))
+    _, cables = statics.checked(GRAVITY, np.zeros(6), None)
+    solver = DynamicSolver(robot, DynamicsOptions(damping="rayleigh", rayleigh_mass=1.0, rayleigh_stiffness=0.1))
+    sideways = np.zeros_like(robot.mesh.nodes)
+    sideways[:, 1] = 1e-6 * (robot.mesh.nodes[:, 2] / robot.length) ** 2
+    solver.place(statics.displacements + sideways, rest.cable_tension, GRAVITY)
+    for _ in range(60):
+        solver.step(GRAVITY, cables, 0.02)
+    assert np.abs(solver.state.u - statics.displacements).max() < 0.1e-6
+
+
 @pytest.mark.parametrize("damping", ["kelvin_voigt", "rayleigh"])
 def test_it_settles_at_the_equilibrium(damping):
     robot = model(0.1)

@@ -80,12 +80,12 @@ class DynamicSolver:
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         model = self.model
+        tendons = model.tendons.state(model.mesh.nodes + u)
         force = -(self._mass_product @ model.free(acceleration))
         if self._rayleigh:
-            self._rayleigh.update(u)
+            self._rayleigh.update(u, tension, tendons)
             force -= self._rayleigh.force(model.free(velocity))
         strain = model.elements.strains(u)
-        tendons = model.tendons.state(model.mesh.nodes + u)
         held = self._relaxed(strain) if held is None or self._viscosity is None else held
         self.state = Motion(u, velocity, acceleration, tension, tendons, force, strain, strain, held)
 
@@ -97,7 +97,7 @@ class DynamicSolver:
         model, last = self.model, self.state
         scheme = GeneralizedAlpha.of(h, self.options.spectral_radius)
         if self._rayleigh:
-            self._rayleigh.update(last.u)
+            self._rayleigh.update(last.u, last.tension, last.tendons)
         viscous = self._viscous(h)
         weight = model.weight(gravity)
         if external is not None:

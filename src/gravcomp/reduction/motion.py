@@ -17,7 +17,7 @@ from gravcomp.full_model.motion import ExternalForce
 from gravcomp.reduction.body import Point, body_of, elastic_force, elastic_stiffness, kept_stiffness, point_at
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.motion_step import motion_step
-from gravcomp.reduction.reduced_cables import ReducedTendons
+from gravcomp.reduction.reduced_cables import ReducedTendons, add_stiffness
 from gravcomp.reduction.reduced_model import ReducedModel
 
 
@@ -104,7 +104,7 @@ class ReducedDynamicSolver:
         The forces are set to those that the acceleration needs; the forces of this model would excite its highest frequencies.
         """
         point = point_at(self._body, q, np.zeros(len(tension)))
-        force = -self._mass @ acceleration - self._rayleigh(point, q) @ velocity
+        force = -self._mass @ acceleration - self._rayleigh(point, q, tension) @ velocity
         memory = memory or Memory.of(self._branches, q, point.strain)
         self.state = ReducedMotion(q, velocity, acceleration, tension, point, force, point.strain, memory)
 
@@ -121,7 +121,7 @@ class ReducedDynamicSolver:
         scale = 1.0 + self._damping_time * rate + stiffer
         strain = last.point.strain
         offset = self._damping_time * history + held
-        drag = self._rayleigh(last.point, last.q)
+        drag = self._rayleigh(last.point, last.q, last.tension)
         velocity_0, acceleration_0 = scheme.predict(last.velocity, last.acceleration)
         # Contribution of the last step's forces, including inertia, to the balance of this step.
         rest = self._mass @ ((1.0 - scheme.alpha_m) * acceleration_0 + scheme.alpha_m * last.acceleration) + before * last.force
@@ -152,12 +152,17 @@ class ReducedDynamicSolver:
         )
         return self.state
 
-    def _rayleigh(self, point: Point, q: np.ndarray) -> np.ndarray:
-        """Return alpha M + beta K (r, r) at q (r,), where the model is `point`; zeros without Rayleigh damping."""
+    def _rayleigh(self, point: Point, q: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return alpha M + beta K (r, r) of `full_model.rayleigh`; zeros without Rayleigh damping.
+
+        point: the model at q (r,); tension (m,) of the cables in N.
+        """
         options = self.options
         if options.damping != "rayleigh":
             return np.zeros_like(self._mass)
-        stiffness = np.tril(elastic_stiffness(self._body, point, q, point.strain, 1.0, self._kept))
+        stiffness = elastic_stiffness(self._body, point, q, point.strain, 1.0, self._kept)
+        add_stiffness(self._body.cables, point.tendons, tension, stiffness)
+        stiffness = np.tril(stiffness)
         stiffness += np.tril(stiffness, -1).T
         return options.rayleigh_mass * self._mass + options.rayleigh_stiffness * stiffness
 
