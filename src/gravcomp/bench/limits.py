@@ -241,7 +241,7 @@ ROWS = {
         Row("command_ms.version", "`./gravcomp --version`", "ms", 300.0),
         Row("command_ms.model_help", "`./gravcomp model --help`", "ms", 300.0),
         Row("test_s", "all tests", "s", 480.0),
-        Row("test_fast_s", "tests without the running graph", "s", 90.0),
+        Row("test_fast_s", "unit tests of the core", "s", 90.0),
     ),
     "soak": (
         Row("minutes", "duration", "min", 30.0, True),

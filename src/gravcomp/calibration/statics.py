@@ -92,9 +92,28 @@ class StaticPredictor:
         """
         other = dataclasses.replace(self.windows, displacement=displacement)
         parameters = starting_parameters(self._robot, self._creep_times)
+        steps = self._inputs(parameters, steps_of(other, crept=bool(self._creep_times)))
+        tips, moved = self._resting(parameters), np.arange(len(steps))
+        if tips is not None:
+            same = (displacement == self.windows.displacement) | (np.isnan(displacement) & np.isnan(self.windows.displacement))
+            moved = np.flatnonzero(~same.all(axis=1))
         self._apply(parameters)
-        steps = self._walk.run(self._inputs(parameters, steps_of(other, crept=bool(self._creep_times))), parameters.creep)
-        return np.array([step.tip for step in steps if step.window is not None])
+        walked = self._walk.run([steps[k] for k in moved], parameters.creep)
+        found = [step.tip for step in walked if step.window is not None]
+        if tips is None:
+            return np.array(found)
+        for k, tip in zip(moved, found):
+            tips[k] = tip
+        return tips
+
+    def _resting(self, parameters: StaticParameters) -> np.ndarray | None:
+        """Return the tips (k, 6) in the windows as they are, where each rests by itself: without creep and friction of cables."""
+        if self._creep_times or self._friction.any():
+            return None
+        try:
+            return np.array([step.tip for step in self._walked(parameters)])
+        except RuntimeError:
+            return None
 
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
         """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.

@@ -12,7 +12,8 @@ from gravcomp.commands import output
 OWN = ("--fast", "--json", "--quiet", "-h", "--help")
 """Options of the command itself, which come first; all other words are passed to pytest."""
 
-FOLDERS = ("src/test", "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
+CORE = "src/test"
+FOLDERS = (CORE, "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
 _WORKERS = (os.cpu_count() or 1) + 1
 """Processes that run tests side by side: one more than cores, as a test with a graph waits for events half of its time."""
 
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.usage = "gravcomp test [--fast] [--json] [--quiet] [PATH ...] [OPTIONS OF PYTEST]"
     parser.description = "Run all tests, or those in the given paths. Further arguments are passed to pytest, e.g. -k viewer -x."
-    parser.add_argument("--fast", action="store_true", help="leave out the tests of the running graph (folder test/)")
+    parser.add_argument("--fast", action="store_true", help=f"only the unit tests of the core (folder {CORE})")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="paths in place of all tests, and options of pytest")
 
 
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     provide_firmware_tools()
     if not args.fast:
         _provide_browser()
-    folders = [f for f in FOLDERS if (root / f).is_dir() and not (args.fast and f == "test")]
+    folders = [CORE] if args.fast else [folder for folder in FOLDERS if (root / folder).is_dir()]
     given = [a for a in args.arguments if a != "--"]
     targets = [] if any((root / a.split("::")[0]).exists() for a in given if not a.startswith("-")) else folders
     how = ["-q", "--no-header"] if args.quiet else ["-ra", "--durations=10"]
