@@ -20,8 +20,10 @@ def test_solve_prints_the_shape(capsys):
     assert figures["residual_n"] < 1e-6
 
 
-def test_solve_reaches_a_target(capsys):
-    arguments = ["--gravity", "-9.81", "0", "0", "--target", "0", "0", "99", "--full", "--json"]
+def test_solve_reaches_a_target(tmp_path, capsys):
+    coarse = tmp_path / "coarse.yaml"
+    coarse.write_text("base: article\nrobot:\n  elements: {around: 4, along: 4}\n")
+    arguments = [str(coarse), "--gravity", "-9.81", "0", "0", "--target", "0", "0", "99", "--full", "--json"]
     assert main(["model", "solve", *arguments]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert abs(figures["tip_position_mm"][0]) < 0.3
@@ -32,11 +34,14 @@ def test_view_writes_a_picture(tmp_path, capsys):
     assert (tmp_path / "robot.png").stat().st_size > 10_000
 
 
-def test_info_tells_masses_modes_and_reach(capsys):
-    assert main(["model", "info", "mesh_body", "--directions", "4", "--json"]) == 0
+def test_info_tells_masses_modes_and_reach(tmp_path, capsys):
+    weak = tmp_path / "weak.yaml"  # far from the bends at which its equilibria take many steps
+    weak.write_text("base: mesh_body\nrobot:\n  limits: {tension_max: 0.3}\n")
+    assert main(["model", "info", str(weak), "--directions", "4", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["mass_g"] == pytest.approx(3.44, abs=0.05) and figures["mesh"]["kind"] == "tet10"
-    assert len(figures["natural_frequency_hz"]) == 6 and len(figures["reach"]) == 3
+    assert len(figures["natural_frequency_hz"]) == 6
+    assert [(entry["cable"], entry["ended_by"]) for entry in figures["reach"]] == [(f"c{k}", "tension limit") for k in (1, 2, 3)]
 
 
 @pytest.mark.parametrize(
