@@ -1,5 +1,7 @@
 """Calibration: derivatives, recovery of known robots, warnings, data files, and the robot's YAML."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
 from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
-from gravcomp.calibration.parameters import StaticParameters, cable_compliance, with_moduli
+from gravcomp.calibration.parameters import StaticParameters, cable_compliance, starting_parameters, with_moduli
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.closed_loop.setup import Setup
@@ -72,6 +74,19 @@ def test_a_known_robot_is_recovered_within_two_per_cent(setup, windows):
     true = offsets(setup.robot)
     assert np.sqrt(np.mean((fit.parameters.offset - true) ** 2)) < 0.5 * np.sqrt(np.mean(true**2))
     assert fit.rms_after < 0.1 * fit.rms_before
+
+
+def test_exchanged_cables_have_the_tips_of_windows_measured_so(robot, windows):
+    coarse, few = (
+        with_coarse_elements(robot),
+        StillWindows(*(rows[:4] for rows in (windows.gravity, windows.displacement, windows.tip_position))),
+    )
+    exchanged = few.displacement[:, [1, 0, 2, 3, 4, 5]]
+    measured_so = StaticPredictor(coarse, dataclasses.replace(few, displacement=exchanged))
+    expected = measured_so.predict(starting_parameters(coarse, ())).tip
+    found = StaticPredictor(coarse, few).tips_of(exchanged)
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], atol=1e-6)
+    assert np.abs(found - StaticPredictor(coarse, few).tips_of(few.displacement)).max() > 1e-3
 
 
 def test_without_taut_cables_only_the_modulus_is_fitted_with_a_warning(setup, windows):
