@@ -183,7 +183,7 @@ class InverseController(ManagedNode):
         if not self._asked and self._target is not None and self._target.tip_position_weight > 0.0:
             self._asked = True
             if np.linalg.norm(gravity) > 0.0:
-                self._question = HoldProcess(self.robot_file.source, gravity, self._target)
+                self._question = HoldProcess(self.robot_file.robot, gravity, self._target)
         if self._question is None or self._question.running:
             return
         verdict = self._question.poll()

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from gravcomp.commands.__main__ import main
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability import Binding, HoldOptions, holdability
-from gravcomp.holdability.background import answer as background_answer
+from gravcomp.holdability.background import HoldProcess
 from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.search import HoldSearch
 from gravcomp.inverse import InverseController, straight_target
@@ -184,9 +185,24 @@ def test_info_leaves_it_out_on_demand(tmp_path, capsys):
     assert "allowed: 4 to 180" in capsys.readouterr().err
 
 
-def test_a_loop_asks_a_process_of_its_own(tmp_path):
-    file = tmp_path / "rod.yaml"
-    file.write_text(FILE.replace("LIMIT", "0.5"))
-    question = {"robot": str(file), "gravity": [-9.81, 0.0, 0.0], "tip": [0.0, 0.0, 0.12], "direction": [0.0, 0.0, 1.0]}
-    verdict = background_answer(question)
+def test_a_loop_asks_a_process_of_its_own():
+    question = HoldProcess(arm(tension_max=0.5), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH))
+    while question.running:
+        time.sleep(0.02)
+    verdict = question.poll()
     assert not verdict.held and "tension limit" in verdict.sentence
+    assert question.poll() is None  # once
+    question.stop()
+
+
+@pytest.mark.parametrize(("cables", "ended"), [(3, True), (0, False)])
+def test_a_question_that_is_ended_or_fails_has_no_answer(cables, ended):
+    robot = arm()
+    question = HoldProcess(
+        dataclasses.replace(robot, cables=robot.cables[:cables]), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH)
+    )
+    if ended:
+        question.stop()
+    while question.running:
+        time.sleep(0.02)
+    assert question.poll() is None

@@ -79,6 +79,7 @@ class StaticPredictor:
         self._near = [dataclasses.replace(step, state=state) for step, state in zip(self._steps, near or ())] or None
         self._coarse: StaticPredictor | None = None
         self._creep_times = creep_times
+        self._tips: dict[bytes, np.ndarray] = {}  # of `tips_of`, by gravity and displacements
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
@@ -88,32 +89,18 @@ class StaticPredictor:
     def tips_of(self, displacement: np.ndarray) -> np.ndarray:
         """Return the tips (k, 6) of the described robot where the measured displacements were these (k, m), NaN: released.
 
+        A window is computed once, unless creep or friction lets it depend on those before it: exchanged cables change few.
         Raises RuntimeError if there is no equilibrium.
         """
         other = dataclasses.replace(self.windows, displacement=displacement)
         parameters = starting_parameters(self._robot, self._creep_times)
-        steps = self._inputs(parameters, steps_of(other, crept=bool(self._creep_times)))
-        tips, moved = self._resting(parameters), np.arange(len(steps))
-        if tips is not None:
-            same = (displacement == self.windows.displacement) | (np.isnan(displacement) & np.isnan(self.windows.displacement))
-            moved = np.flatnonzero(~same.all(axis=1))
         self._apply(parameters)
-        walked = self._walk.run([steps[k] for k in moved], parameters.creep)
-        found = [step.tip for step in walked if step.window is not None]
-        if tips is None:
-            return np.array(found)
-        for k, tip in zip(moved, found):
-            tips[k] = tip
-        return tips
-
-    def _resting(self, parameters: StaticParameters) -> np.ndarray | None:
-        """Return the tips (k, 6) in the windows as they are, where each rests by itself: without creep and friction of cables."""
+        steps = self._inputs(parameters, steps_of(other, crept=bool(self._creep_times)))
         if self._creep_times or self._friction.any():
-            return None
-        try:
-            return np.array([step.tip for step in self._walked(parameters)])
-        except RuntimeError:
-            return None
+            return np.array([step.tip for step in self._walk.run(steps, parameters.creep) if step.window is not None])
+        new = [step for step in steps if step.key not in self._tips]
+        self._tips |= {step.key: step.tip for step in self._walk.run(new, parameters.creep)}
+        return np.array([self._tips[step.key] for step in steps])
 
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
         """Return the derivatives (k, 6, n) of the tips by the fields named in `kinds`, by the logarithm of the modulus.

@@ -37,6 +37,11 @@ class Step:
     state: Equilibrium | None = None
     viscous: ViscousStrain | None = None
 
+    @property
+    def key(self) -> bytes:
+        """What a relaxed robot without friction has its shape from."""
+        return self.gravity.tobytes() + self.displacement.tobytes()
+
 
 def steps_of(windows: StillWindows, crept: bool) -> list[Step]:
     """Return the steps through the windows. crept: with times; else each window is relaxed."""

@@ -21,7 +21,7 @@ TITLE = "On a moving arm"
 HOLD, RATE = 10.0, np.radians(4.5)  # s, rad/s: a pass of 90 s; slow robots are held longer
 ARTICLE = {0.0: "0.9653 without, 0.9830 with", 30.0: "0.9394 without, 0.9439 with"}
 _START = 4.0  # s at the first pose before the passes, in which the robot comes to rest
-_BRIEF_START, _BRIEF_HOLD, _BRIEF_FASTER = 1.5, 0.5, 20.0  # s, s, times the rate
+_BRIEF_START, _BRIEF_HOLD, _BRIEF_FASTER = 1.0, 0.3, 30.0  # s, s, times the rate
 _BRIEF_INCLINATIONS = (45.0, 0.0)
 _PERIODS = 13.0  # first periods of the robot that either lasts at least
 

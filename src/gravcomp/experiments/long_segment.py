@@ -11,7 +11,7 @@ from gravcomp.report.drawing import MODEL, REAL, REST, WITHOUT, Drawing, draw_ro
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, Outcome, held_notes, pooled_recovery, run_case
+from gravcomp.trials.holding import GROUND, Case, Outcome, held_notes, pooled_recovery, run_cases
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "A longer distal segment"
@@ -45,9 +45,9 @@ def run(context: Context) -> Result:
     setup = dataclasses.replace(calibrated, robot=lengthened(calibrated.robot), nominal=lengthened(calibrated.nominal))
     inclinations = INCLINATIONS[1:2] if context.brief else INCLINATIONS
     cases = [Case(i, options=options, brief=context.brief) for options in ({}, BACKBONE) for i in inclinations]
-    outcomes = context.map(run_case, [(setup, case) for case in cases], "robot with a longer segment")
+    outcomes = run_cases(context, [(setup, case) for case in cases], "robot with a longer segment")
     tip_only, weighted = outcomes[: len(inclinations)], outcomes[len(inclinations) :]
-    short = context.map(run_case, [(calibrated, Case(0.0, brief=context.brief))], "robot as described")[0]
+    short = run_cases(context, [(calibrated, Case(0.0, brief=context.brief))], "robot as described")[0]
     distal = setup.robot.effectors.backbone_station > 1.0 - setup.robot.segments[-1].full_length / setup.robot.length
     distal[-1] = False
 

@@ -11,7 +11,7 @@ from gravcomp.report.drawing import MODEL, REAL, REST, TARGET, WITHOUT, Drawing,
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.calibration_run import calibrate_on_virtual_robot
 from gravcomp.trials.context import Context
-from gravcomp.trials.holding import GROUND, Case, Outcome, held_notes, pooled_recovery, run_case
+from gravcomp.trials.holding import GROUND, Case, Outcome, held_notes, pooled_recovery, run_cases
 from gravcomp.virtual.motion import base_orientation
 
 TITLE = "Static compensation"
@@ -38,7 +38,7 @@ def run(context: Context) -> Result:
     cases = [dataclasses.replace(case, brief=True) for case in CASES[3::3]] if context.brief else CASES
     calibrated = context.once(calibrate_on_virtual_robot)
     jobs = [(setup, case) for setup in (context.setup, calibrated.setup) for case in cases]
-    outcomes = context.map(run_case, jobs, "static compensation")
+    outcomes = run_cases(context, jobs, "static compensation")
     plain, fitted = outcomes[: len(cases)], outcomes[len(cases) :]
     straight = [o for o in fitted if not o.case.bend]
     sag = next(o.without.lateral for o in straight if o.case.inclination == 0.0)

@@ -19,7 +19,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gravcomp.environment.end_with_parent import end_with_parent
-from gravcomp.launcher.process_title import PADDING
+from gravcomp.environment.process_title import PADDING
 
 MARK = "GRAVCOMP_GRAPH"
 """Environment variable of every process of a graph, also of those that a node starts in a session of their own."""

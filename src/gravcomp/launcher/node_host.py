@@ -4,7 +4,7 @@
 
 SOCKET: number of the inherited socket to the launcher (`gravcomp.launcher.host_client`). MODULES: names of the modules to import,
 with commas between them; MODULE:FUNCTION also calls a function. What fails is left to the node, which reports the error. PADDING:
-room for the command lines of the nodes (`gravcomp.launcher.process_title`).
+room for the command lines of the nodes (`gravcomp.environment.process_title`).
 
 A request and an answer are one line of JSON each:
 
@@ -33,7 +33,7 @@ import warnings
 from typing import NoReturn
 
 from gravcomp.environment.end_with_parent import end_with_parent
-from gravcomp.launcher.process_title import set_title
+from gravcomp.environment.process_title import set_title
 
 
 def main(arguments: list[str]) -> int:

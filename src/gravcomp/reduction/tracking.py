@@ -4,9 +4,15 @@
 
 with the tensions lambda from the cables' complementarity. Creep adds a stress that is linear in the strain (`memory`). One step
 is enough to track a turning gravity; another is taken if the correction with the last factor moves the tip by more than the
-tolerance. A straight step along a curved path stretches a body, which in one that hardly changes its volume makes large stresses
-and a stiffness without meaning: the W that is returned is never that of a shape to which a long step has led. All of it is one
-compiled function: with many small calls, a control step would spend more time on calling than on computing.
+tolerance.
+
+A straight step along a curved path stretches a body: its stress says little about that of the equilibrium, and with it the
+stiffness may be eight times too large after a step of 3 % of the length. So the stiffness at a shape takes the stress that the
+step to it expected, eps + J dq from the shape before, as in the full model (Magisano, Leonetti and Garcea 2017). It is kept from
+one call to the next: a step that is good enough for the tip may leave such a stretch. For a law that is not quadratic in the
+strain it is the stress of the shape, and the W that is returned is never that of a shape to which a long step has led.
+
+All of it is one compiled function: with many small calls, a control step would spend more time on calling than on computing.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +34,7 @@ from gravcomp.reduction.reduced_model import ReducedModel
 from gravcomp.rounding import REORDERED
 
 # Displacements of the tip as fractions of the length: the longest step, the largest one whose factor may decide on convergence,
-# what may be left then, and the largest step that leads near enough to an equilibrium for the stiffness there.
+# what may be left then, and the largest step of a law that leads near enough to an equilibrium for the stiffness there.
 _LONGEST_STEP, _NEAR, _TOLERANCE, _CALM = 0.05, 0.02, 5e-5, 5e-4
 
 
@@ -56,7 +62,6 @@ class ReducedTracker:
         """Start from the straight robot of `length` m."""
         self.model, self._length = model, length
         self._body = body_of(model)
-        # A body whose elasticity is quadratic in the strain is always calm: its strains leave out the stretch of a straight step.
         calm = _CALM * length if len(self._body.deviation.weight) else np.inf
         self._limits = _LONGEST_STEP * length, _NEAR * length, _TOLERANCE * length, calm
         self._kept = kept_stiffness(model)
@@ -73,6 +78,7 @@ class ReducedTracker:
         self.sliding = sliding or Sliding.none(m, self._length)
         self.state = ReducedState(q, tension, np.zeros(m), np.zeros((m, m)), np.zeros((m, q.size)))
         self._point = point_at(self._body, q, self.sliding.direction)
+        self._expected = self._point.strain
         if self.contact is not None:
             self.contact.forget()
 
@@ -104,9 +110,10 @@ class ReducedTracker:
             weight = weight + force
         if self.contact is not None:
             return self._touching(gravity, weight, wound, given, 1.0 + stiffer, offset, iterations)
-        converged, self._point, q, tension, displacement, compliance, answer, residual = _tracked(
+        converged, self._point, self._expected, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
             self._point,
+            self._expected,
             state.q,
             state.tension,
             weight,
@@ -130,7 +137,7 @@ class ReducedTracker:
         Raises NotPositiveDefinite where the state is not stable.
         """
         body, point, state = self._body, self._point, self.state
-        definite, factor = stiffness_factor(body, point, state.q, state.tension, point.strain, 1.0, self._kept)
+        definite, factor = stiffness_factor(body, point, state.q, state.tension, self._expected, 1.0, self._kept)
         if not definite:
             raise NotPositiveDefinite("the reduced stiffness is not positive definite")
         columns = body.tip.T.copy()
@@ -154,6 +161,7 @@ class ReducedTracker:
             self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
             self._kept, iterations, longest, min(longest, near), tolerance, calm, touching,
         )  # fmt: skip
+        self._expected = self._point.strain
         if not converged:
             return replace(state, residual=np.inf, converged=False)
         self.contact.keep(touching, places, forces, held, by_tension, pressed)
@@ -163,23 +171,25 @@ class ReducedTracker:
 
 @njit(cache=True, fastmath=REORDERED)
 def _tracked(
-    body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
-    pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
+    body: Body, point: Point, expected: np.ndarray, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray,
+    given: np.ndarray, pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
     iterations: int, longest_step: float, near: float, tolerance: float, calm: float,
-) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
-    """Return whether an equilibrium was reached, the point there (else that of the start), and the fields of `ReducedState`.
+) -> tuple[bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:  # fmt: skip
+    """Return whether an equilibrium was reached, the point there and the strain expected there, and the fields of `ReducedState`.
 
-    wound and given: of `CableInput.arrays`; pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps +
-    offset; kept: of `elastic_stiffness`; the last four in m.
+    Where none was reached, point and expected strain (k,) are those of the start. wound and given: of `CableInput.arrays`;
+    pulling (m,): of `tendons_at`; scale and offset (k,): the stress is scale eps + offset; kept: of `elastic_stiffness`; the last
+    four in m.
     """
-    m, r, start, cables = len(tension), len(q), point, body.cables
+    m, r, start, expected_first, cables = len(tension), len(q), point, expected, body.cables
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual, before = False, np.inf, 0.0
+    of_law = len(body.deviation.weight) > 0
     for iteration in range(iterations):
         stress = scale * point.strain + offset
         if iteration:  # with that of another shape the steps may not come to an end
             forget(kept)
-        definite, factor = stiffness_factor(body, point, q, tension, stress, scale, kept)
+        definite, factor = stiffness_factor(body, point, q, tension, scale * expected + offset, scale, kept)
         if not definite:
             break
         columns = np.empty((r, m + 4))
@@ -204,7 +214,10 @@ def _tracked(
             break
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
         q, tension = q + share * step, tension + share * (wanted - tension)
+        expected = point.strain + share * (step @ point.jacobian)
         point = point_at(body, q, pulling)
+        if of_law:
+            expected = point.strain
         out = weight - elastic_force(point, scale * point.strain + offset) + tension @ point.tendons.force_jacobian
         pull = np.zeros(m) if len(given) else lacking(cables, point.tendons, tension, compliance, wound)
         left = of_tip @ out + body.tip @ (answer.T @ pull)
@@ -213,7 +226,7 @@ def _tracked(
             break
         before = share * size
     if not converged:
-        point = start
+        point, expected = start, expected_first
         forget(kept)  # it may be that of a shape without meaning
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
-    return converged, point, q, tension, displacement, compliance, answer, residual
+    return converged, point, expected, q, tension, displacement, compliance, answer, residual

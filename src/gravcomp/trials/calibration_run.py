@@ -39,7 +39,7 @@ _BUS_STEP, _SAMPLE_PERIOD = 0.002, 0.010  # s
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
 _LONGEST_START = 5.0  # s
-_BRIEF, _FEWER = 0.2, 6  # of the budget; every so many of the orientations
+_BRIEF, _FEWER = 0.12, 6  # of the budget; every so many of the orientations
 _FEWEST = 5  # poses: the three of an orientation, the last one, and the turn
 _BRIEFLY_FITTED = {"offsets", "compliance", "weight"}  # with the moduli: the others take most of the derivatives' time
 

@@ -13,6 +13,7 @@ from gravcomp.evaluation import metrics
 from gravcomp.holdability import holdability
 from gravcomp.holdability.text import sentence
 from gravcomp.inverse import Target, rest_target
+from gravcomp.trials.context import Context
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 # In first periods of the robot: the phases of a case, and the end of a phase over which errors are averaged.
@@ -119,6 +120,23 @@ def run_case(job: tuple[Setup, Case]) -> Outcome:
         shape_without=before.backbone.mean(axis=0),
         shape_held=after.backbone.mean(axis=0),
     )
+
+
+def run_cases(context: Context, jobs: list[tuple[Setup, Case]], stage: str) -> list[Outcome]:
+    """Return the outcomes of the jobs of `run_case`; what another experiment of this context has run is not run again."""
+    known = context.once(_outcomes)
+    new = [(setup, case) for setup, case in jobs if not any(_is_of(entry, setup, case) for entry in known)]
+    known += [(setup, outcome) for (setup, _), outcome in zip(new, context.map(run_case, new, stage))]
+    return [next(entry[1] for entry in known if _is_of(entry, setup, case)) for setup, case in jobs]
+
+
+def _outcomes(context: Context) -> list[tuple[Setup, Outcome]]:
+    """Return the outcomes of a context, with their setups: none at first."""
+    return []
+
+
+def _is_of(entry: tuple[Setup, Outcome], setup: Setup, case: Case) -> bool:
+    return entry[0] is setup and entry[1].case == case
 
 
 def unholdable(robot: Robot) -> str | None:
