@@ -1,14 +1,18 @@
 """Laws of rubber on the board: their stress and tangent in float32 against those of the host."""
 
 import ctypes
+import re
 
 import numpy as np
 import pytest
 
+from gravcomp.firmware import model_blob
 from gravcomp.firmware.host_library import load
 from gravcomp.firmware.model_blob import SETTINGS, law_constants
+from gravcomp.firmware.sources import STANDALONE, firmware_folder
 from gravcomp.materials.laws import LAWS
 from gravcomp.reduction.law_deviation import LawDeviation, add_deviation_stiffness, deviating_stress, deviation_at
+from gravcomp.training import BuildOptions
 
 FIRST, SHEAR = 3.0e6, 0.06e6  # Pa, nearly incompressible: Poisson's ratio is 0.49
 
@@ -71,3 +75,11 @@ def test_the_stiffness_of_a_law_is_that_of_the_shape_once_each_point_has_had_its
     add_deviation_stiffness(of, point, wanted)
     np.testing.assert_allclose(force, point.force, atol=1e-4 * np.abs(point.force).max())
     np.testing.assert_allclose(matrix, wanted[np.tril_indices(modes)], atol=1e-4 * np.abs(wanted).max())
+
+
+def test_blob_and_build_count_on_the_room_that_the_firmware_has():
+    header = (firmware_folder() / STANDALONE / "model.h").read_text()
+    room = {name: int(number) for name, number in re.findall(r"#define GC_(\w+_MAX) (\d+)u", header)}
+    assert BuildOptions().board_points == room["LAW_POINTS_MAX"]
+    for name in ("MODES_MAX", "STRAINS_MAX", "PIECES_MAX", "POINTS_MAX", "LAW_POINTS_MAX", "BRANCHES_MAX"):
+        assert getattr(model_blob, name) == room[name], name

@@ -13,7 +13,7 @@ from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cholesky import factorise, solve
-from gravcomp.reduction.cubature import Cubature, choose
+from gravcomp.reduction.cubature import Cubature, choose, sparse_weights
 from gravcomp.reduction.law_deviation import add_deviation_stiffness, deviation_at
 from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
 from gravcomp.reduction.reduced_model import project, section_changes
@@ -242,15 +242,32 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
     _, _, basis, _ = modes
     coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
     sections = section_changes(model, basis)[:, 0] / model.length
-    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance, 999) for tolerance in (1e-3, 3e-5))
+    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance, (999, 999)) for tolerance in (1e-3, 3e-5))
     assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
     assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
     # Where a number of points is enough, twice the error is allowed; where it is not, the error counts.
-    every_point, enough = (choose(model.elements, basis, coordinates, sections, 3e-5, few) for few in (1, len(fine.weight) - 1))
+    every_point, enough = (
+        choose(model.elements, basis, coordinates, sections, 3e-5, (few, few)) for few in (1, len(fine.weight) - 1)
+    )
     assert every_point.error <= 3e-5 and len(enough.weight) <= len(fine.weight) and enough.error <= 6e-5
     few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
     for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
         assert deviation_at(few, q).force == pytest.approx(deviation_at(every, q).force, abs=0.05 * largest)
+
+
+def test_twice_the_error_is_enough_at_every_number_of_points_that_the_board_has_room_for():
+    columns = np.random.default_rng(4).random((30, 60))
+    total = columns @ np.ones(60)
+
+    def count(*enough: int) -> tuple[int, float]:
+        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, enough)
+        return len(index), left
+
+    allowed = 0.02 * np.linalg.norm(total)
+    (most, within), (fewest, rough) = count(999, 999), count(0, 999)
+    assert fewest < most and within <= allowed < rough <= 2.0 * allowed
+    # Between the smallest and the largest number; where there is room for fewer only, the error counts.
+    assert count(fewest - 1, fewest) == (fewest, rough) and count(0, fewest - 1) == (most, within)
 
 
 def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(robot, cache):

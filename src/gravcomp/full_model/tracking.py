@@ -40,6 +40,8 @@ _MORE_IN_CONTACT = 3
 # A factor is used again up to this displacement from where it was made, as a fraction of the length, and as long as each
 # correction is at most this fraction of the previous one.
 _FACTOR_REACH, _FACTOR_CONTRACTION = 0.01, 0.1
+# The largest change of shape that is extrapolated, as a fraction of the length: longer ones are transients.
+_LONGEST_AHEAD = 0.01
 
 
 class StaticTracker:
@@ -50,6 +52,8 @@ class StaticTracker:
     """
 
     contact: FullContact | None = None
+    extrapolates = False
+    """Whether a track starts where the last change of shape leads if it happens again: good where the load changes evenly."""
 
     def __init__(self, model: MeshedModel, tolerance: float = 1e-6, longest_step: float = 0.25, near: float = 0.03):
         """Start from the straight robot.
@@ -71,6 +75,7 @@ class StaticTracker:
         """Return to the straight robot without tension."""
         self._contained: list[np.ndarray] = []  # of the loads that turn, in the last factor
         self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
+        self._before: np.ndarray | None = None  # displacements (n, 3) of the equilibrium before the current one
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
         tendons = self.model.tendons.state(self.model.mesh.nodes)
@@ -101,6 +106,8 @@ class StaticTracker:
         if self.model.tendons.friction.any():
             stretched = self.model.tendons.stretch(state.tendons) * state.tension
             self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement + stretched)
+        if self.extrapolates and self._before is not None:
+            self._go_ahead(state, self._before)
         if self.contact is not None:
             self.contact.begin(previous.u, gravity)
             iterations *= _MORE_IN_CONTACT
@@ -117,8 +124,16 @@ class StaticTracker:
                 break
             settled = self.contact is None or self.contact.settled
             state.converged &= settled and state.residual <= self._allowed_residual(state, load)
+        self._before = previous.u if state.converged and previous.converged else None
         self.state = state
         return state
+
+    def _go_ahead(self, state: Equilibrium, before: np.ndarray) -> None:
+        """Move `state` as far again as from the displacements `before` (n, 3) to it, if that is not far."""
+        change = state.u - before
+        if np.abs(change).max() < _LONGEST_AHEAD * self.model.length:
+            state.u += change
+            state.tendons = self.model.tendons.state(self.model.mesh.nodes + state.u, self.sliding.direction)
 
     def tip_compliance(self) -> np.ndarray:
         """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present state.

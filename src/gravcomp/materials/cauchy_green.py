@@ -9,22 +9,21 @@ TENSOR_INDICES = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)])
 """(6, 2): row and column of each of the six components."""
 
 
+Components = tuple[float, float, float, float, float, float]
+"""The components of a symmetric tensor. Not an array: a compiled function would allocate one at every point of a body."""
+
+
 @njit(cache=True, fastmath=REORDERED)
-def cauchy_green(e: np.ndarray, c: np.ndarray, inverse: np.ndarray) -> float:
-    """Write C (6) and its inverse (6) for the strain e (6); return J = det F."""
-    for k in range(3):
-        c[k] = 2.0 * e[k] + 1.0
-        c[3 + k] = e[3 + k]
-    inverse[0] = c[1] * c[2] - c[4] * c[4]
-    inverse[1] = c[0] * c[2] - c[5] * c[5]
-    inverse[2] = c[0] * c[1] - c[3] * c[3]
-    inverse[3] = c[4] * c[5] - c[3] * c[2]
-    inverse[4] = c[3] * c[5] - c[0] * c[4]
-    inverse[5] = c[3] * c[4] - c[1] * c[5]
-    det = c[0] * inverse[0] + c[3] * inverse[3] + c[5] * inverse[5]
-    for k in range(6):
-        inverse[k] /= det
-    return np.sqrt(det)
+def cauchy_green(e: np.ndarray) -> tuple[Components, Components, float]:
+    """Return C and its inverse for the strain e (6), and J = det F."""
+    c_0, c_1, c_2 = 2.0 * e[0] + 1.0, 2.0 * e[1] + 1.0, 2.0 * e[2] + 1.0
+    c_3, c_4, c_5 = e[3], e[4], e[5]
+    i_0, i_1, i_2 = c_1 * c_2 - c_4 * c_4, c_0 * c_2 - c_5 * c_5, c_0 * c_1 - c_3 * c_3
+    i_3, i_4, i_5 = c_4 * c_5 - c_3 * c_2, c_3 * c_5 - c_0 * c_4, c_3 * c_4 - c_1 * c_5
+    det = c_0 * i_0 + c_3 * i_3 + c_5 * i_5
+    over = 1.0 / det
+    inverse = i_0 * over, i_1 * over, i_2 * over, i_3 * over, i_4 * over, i_5 * over
+    return (c_0, c_1, c_2, c_3, c_4, c_5), inverse, np.sqrt(det)
 
 
 @njit(cache=True)

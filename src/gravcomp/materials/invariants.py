@@ -12,7 +12,7 @@ last one, so that a nearly incompressible material is only a large kappa. Compil
 import numpy as np
 from numba import njit
 
-from gravcomp.materials.cauchy_green import TENSOR_INDICES, cauchy_green, component
+from gravcomp.materials.cauchy_green import TENSOR_INDICES, Components, cauchy_green, component
 from gravcomp.rounding import REORDERED
 
 
@@ -25,15 +25,14 @@ def bulk_modulus(constants: np.ndarray) -> float:
 @njit(cache=True, fastmath=REORDERED)
 def invariants(e: np.ndarray) -> tuple[float, float, float]:
     """Return I1 J^(-2/3), I2 J^(-4/3) and J of the strain e (6)."""
-    c, inverse = np.empty(6), np.empty(6)
-    j = cauchy_green(e, c, inverse)
+    c, _, j = cauchy_green(e)
     root = j ** (-2.0 / 3.0)
     return root * (c[0] + c[1] + c[2]), root * root * _second(c), j
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _second(c: np.ndarray) -> float:
-    """Return I2 of C (6)."""
+def _second(c: Components) -> float:
+    """Return I2 of C."""
     return c[0] * c[1] + c[1] * c[2] + c[2] * c[0] - c[3] * c[3] - c[4] * c[4] - c[5] * c[5]
 
 
@@ -42,20 +41,27 @@ def stress_of_invariants(
     w1: float, w11: float, w2: float, bulk: float, e: np.ndarray, s: np.ndarray, d: np.ndarray, tangent: bool
 ) -> None:
     """Second Piola-Kirchhoff stress into s (6), and dS/dE into d (6, 6) if `tangent`; w1, w11, w2 and bulk (kappa) in Pa."""
-    c, ci = np.empty(6), np.empty(6)
-    j = cauchy_green(e, c, ci)
+    c, inverse, j = cauchy_green(e)
     first, second = c[0] + c[1] + c[2], _second(c)
     root = j ** (-2.0 / 3.0)
     g, h = 2.0 * w1 * root, 2.0 * w2 * root * root
     pressure = bulk * j * (j - 1.0)
+    # S = of_unit I - h C + of_inverse C^-1.
+    of_unit, of_inverse = g + h * first, pressure - g * first / 3.0 - 2.0 / 3.0 * h * second
+    s[0] = of_unit - h * c[0] + of_inverse * inverse[0]
+    s[1] = of_unit - h * c[1] + of_inverse * inverse[1]
+    s[2] = of_unit - h * c[2] + of_inverse * inverse[2]
+    s[3] = of_inverse * inverse[3] - h * c[3]
+    s[4] = of_inverse * inverse[4] - h * c[4]
+    s[5] = of_inverse * inverse[5] - h * c[5]
+    if not tangent:
+        return
+    ci, green = np.array(inverse), np.array(c)
     unit, a, shape = np.empty(6), np.empty(6), np.empty(6)  # I, A1, I1 I - C
     for k in range(6):
         unit[k] = 1.0 if k < 3 else 0.0
         a[k] = root * (unit[k] - first / 3.0 * ci[k])
-        shape[k] = first * unit[k] - c[k]
-        s[k] = 2.0 * w1 * a[k] + h * (shape[k] - 2.0 / 3.0 * second * ci[k]) + pressure * ci[k]
-    if not tangent:
-        return
+        shape[k] = first * unit[k] - green[k]
     outer = 2.0 / 9.0 * g * first + 8.0 / 9.0 * h * second + bulk * j * (2.0 * j - 1.0)
     product = 2.0 / 3.0 * g * first + 4.0 / 3.0 * h * second - 2.0 * pressure
     for m in range(6):

@@ -28,10 +28,9 @@ def volume_measure(law: int, e: np.ndarray, slope: np.ndarray) -> float:
             slope[k] = 1.0
             slope[3 + k] = 0.0
         return e[0] + e[1] + e[2]
-    c = np.empty(6)
-    j = cauchy_green(e, c, slope)
-    for k in range(6):
-        slope[k] *= j
+    _, inverse, j = cauchy_green(e)
+    slope[0], slope[1], slope[2] = j * inverse[0], j * inverse[1], j * inverse[2]
+    slope[3], slope[4], slope[5] = j * inverse[3], j * inverse[4], j * inverse[5]
     return j
 
 

@@ -65,12 +65,17 @@ class Cubature:
 
 
 def choose(
-    elements: SolidElements, basis: np.ndarray, coordinates: np.ndarray, sections: np.ndarray, tolerance: float, few: int
+    elements: SolidElements,
+    basis: np.ndarray,
+    coordinates: np.ndarray,
+    sections: np.ndarray,
+    tolerance: float,
+    enough: tuple[int, int],
 ) -> Cubature:
     """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
 
     sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length; tolerance: largest `error` of
-    the result; where `few` points leave at most twice as much, they are enough.
+    the result; enough: smallest and largest number of points that are enough where they leave at most twice as much.
     """
     observed = sections.reshape(-1, basis.shape[1])
     metric = observed.T @ observed / len(sections)
@@ -89,32 +94,30 @@ def choose(
         columns.append(forces[:, is_candidate[part]])
     forces = np.hstack(columns)
     root = np.sqrt(len(coordinates))
-    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root, few)
+    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root, enough)
     at = candidates[chosen]
     return Cubature(element[at], point[at], found, left / root)
 
 
 def sparse_weights(
-    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, few: int
+    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, enough: tuple[int, int]
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Return indices (p,), positive weights (p,) and remaining |A w - b| of few columns of A for which it is at most `allowed`.
 
-    gram A^T A (c, c); products A^T b (c,); square b^T b; few: number of columns that are enough where they leave at most twice as
-    much.
+    gram A^T A (c, c); products A^T b (c,); square b^T b; enough: smallest and largest number of columns that are enough where
+    they leave at most twice as much.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     weights = np.zeros(len(products))
     active = np.zeros(len(products), dtype=bool)
     left = np.sqrt(square)
-    more = False  # than a few are needed
     for _ in range(3 * len(products)):
         if left <= max(allowed, 1e-7 * np.sqrt(square)):
             break
-        if active.sum() >= few and not more:
-            if left <= 2.0 * allowed:
-                break
-            more = True
-        gain = np.where(active, -np.inf, (products - gram @ weights) / scale)
+        if enough[0] <= active.sum() <= enough[1] and left <= 2.0 * allowed:
+            break
+        index = np.flatnonzero(active)
+        gain = np.where(active, -np.inf, (products - weights[index] @ gram[index]) / scale)  # gram is symmetric
         best = int(np.argmax(gain))
         if gain[best] <= _ROUNDING * np.sqrt(square):
             break
@@ -133,7 +136,9 @@ def sparse_weights(
             weights[index] = before + share * (solved - before)
             active[index[falling & (weights[index] <= 1e-12 * weights.max())]] = False
             weights[~active] = 0.0
-        left = np.sqrt(max(0.0, square - 2.0 * products @ weights + weights @ gram @ weights))
+        index = np.flatnonzero(active)
+        found = weights[index]
+        left = np.sqrt(max(0.0, square - 2.0 * products[index] @ found + found @ gram[np.ix_(index, index)] @ found))
     index = np.flatnonzero(weights)
     return index, weights[index], float(left)
 

@@ -41,9 +41,9 @@ class BuildOptions:
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
     to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose the
-    cubature of the law's deviation with, cubature its tolerance, and points a number that is enough for twice the tolerance (the
-    board has room for 128); represented: the training ends when the modes of earlier paths represent new ones to this part of the
-    length; training and test: motions to train and to test with.
+    cubature of the law's deviation with, cubature its tolerance; from `points` up to `board_points`, for which the board has
+    room, twice the tolerance is enough; represented: the training ends when the modes of earlier paths represent new ones to this
+    part of the length; training and test: motions to train and to test with.
     """
 
     modes: int = 44
@@ -53,6 +53,7 @@ class BuildOptions:
     integrated: int = 150
     cubature: float = 1.5e-4
     points: int = 120
+    board_points: int = 128
     represented: float = 2e-4
     training: TrainingOptions = field(default_factory=TrainingOptions)
     test: TrainingOptions = field(default_factory=lambda: TrainingOptions(paths=6, steps=20, seed=1000))
@@ -127,7 +128,7 @@ def trained(
     if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
         sections = section_changes(model, basis)[:, 0] / model.length
         shown = evenly(coordinates, options.integrated)
-        cubature = choose(model.elements, basis, shown, sections, options.cubature, options.points)
+        cubature = choose(model.elements, basis, shown, sections, options.cubature, (options.points, options.board_points))
     return Reduction(
         basis=basis,
         elasticity=elasticity,

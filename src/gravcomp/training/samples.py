@@ -134,6 +134,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
         weight = rng.choice([0.0, direction_weight(model.length)])
         target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
+    simulator.solver.extrapolates = True  # gravity turns evenly
     gravity, displacement = size * _direction(rng), None
     largest = _largest_load(model, rng)
     for step in range(options.steps):
