@@ -39,7 +39,7 @@ class Play:
         return self.share > _LARGE
 
     def text(self) -> str:
-        """Return the play as a sentence, with the capstan that would do where it is large."""
+        """Return this as a sentence, with the capstan that would do where it is large."""
         found = (
             f"gears with {math.degrees(self.backlash):.2g} deg of backlash behind capstans of {1e3 * self.capstan:.3g} mm leave"
             f" {1e3 * self.cable:.2g} mm of a cable open, and up to {1e3 * self.tip:.2g} mm of the tip:"
@@ -53,7 +53,7 @@ class Play:
 
 
 def play_of(hardware: Hardware, response: Response, direction: np.ndarray, sag: float) -> Play:
-    """Return the play of a robot with this response at its shape, whose tip points along `direction` (3,)."""
+    """Return what is left open of a robot with this response at its shape, whose tip points along `direction` (3,)."""
     matrix, drive = hardware.transmission.matrix, hardware.drive
     turned = drive.backlash * drive.capstan_radius
     moved = turned * np.abs(matrix).max(axis=1)  # (m,)
