@@ -6,13 +6,15 @@ import time
 
 import numpy as np
 import pytest
+import yaml
 
 from gravcomp.commands.__main__ import main
-from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
+from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability import Binding, HoldOptions, holdability
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.holdability.directions import angles, sphere
+from gravcomp.holdability.play import play_of
 from gravcomp.holdability.search import HoldSearch
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.simulation import Simulator
@@ -161,6 +163,18 @@ robot:
 """
 
 
+MICRO = {
+    "name": "micro",
+    "segments": [
+        {"name": "m", "length_mm": 9, "outer_diameter_mm": 0.8, "lumen_diameter_mm": 0.3,
+         "material": {"youngs_modulus_mpa": 1.4, "poissons_ratio": 0.49, "density": 965}}
+    ],
+    "cables": [{"name": n, "angle_deg": a, "radius_mm": 0.28, "segment": "m"} for n, a in (("a", 0), ("b", 120), ("c", 240))],
+    "elements": {"around": 6, "along": 6},
+    "limits": {"tension_max": 0.05, "displacement_min_mm": -2, "displacement_max_mm": 2},
+}  # fmt: skip
+
+
 def test_info_prints_and_draws_the_answer(tmp_path, capsys):
     file, picture = tmp_path / "rod.yaml", tmp_path / "sphere.png"
     file.write_text(FILE.replace("LIMIT", "0.5"))
@@ -170,8 +184,29 @@ def test_info_prints_and_draws_the_answer(tmp_path, capsys):
     assert hold["held"] is False and 0.0 < hold["held_share"] < 1.0 and "tension limit of 0.5 N" in hold["sentence"]
     assert hold["worst"]["binding"] == "tension" and hold["needed"]["tension_n"] > 0.5
     assert len(hold["directions"]) == len(sphere(4)) + 1
+    play = figures["play"]
+    assert play["large"] == (play["of_sag_pct"] > 10.0) and play["cable_mm"] == pytest.approx(
+        np.radians(play["backlash_deg"]) * play["capstan_radius_mm"]
+    )
     assert {"inclination_deg", "azimuth_deg", "demand", "lateral_mm", "eigenvalue"} <= set(hold["directions"][0])
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_backlash_leaves_more_than_the_sag_of_a_robot_that_hardly_sags_unless_capstans_follow_from_it(tmp_path):
+    """A tube of 0.8 mm with capstans of 5 mm, and with those that follow from it."""
+    plays = []
+    for drive in ({"capstan_radius_mm": 5.0}, {}):
+        path = tmp_path / "micro.yaml"
+        path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive}}))
+        file = load_robot_file(path)
+        sag = Simulator(file.robot, reduced=False).solve(np.array([-9.81, 0.0, 0.0]))
+        plays.append(play_of(file.hardware, sag.response, np.array([0.0, 0.0, 1.0]), abs(sag.tip_position[0])))
+    # A cable at the distance r from the axis turns a beam by d / r (1 + I / A r^2): it shortens it as well.
+    expected = 0.5 * 9.0 * np.radians(0.6) * 5.0 / 0.28 / (1.0 + (0.8**2 + 0.3**2) / 16 / 0.28**2)
+    coarse, fine = plays
+    assert 1e3 * coarse.tip == pytest.approx(expected, rel=0.05)
+    assert coarse.large and coarse.share > 1.0 and "worse than when released" in coarse.text()
+    assert fine.share < 1.0 and fine.capstan == pytest.approx(0.2e-3) and fine.tip == pytest.approx(0.04 * coarse.tip)
 
 
 def test_info_leaves_it_out_on_demand(tmp_path, capsys):

@@ -1,15 +1,20 @@
 """Targets that are far away or out of reach: the loop finds a way to them or stops near them, and recovers afterwards."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from arc_robot import LENGTH, LIMITS, STATIONS, ArcRobot, closed_loop, controller
 from coarse_article import coarse
 
+from gravcomp.description.rest_shape import RestShape
 from gravcomp.inverse import ControllerCode, InverseController, Target, bend_target, straight_target
 from gravcomp.inverse.retreat import Move, Retreat
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.simulation import ShapeStatus, Simulator
 
 GRAVITY = 9.81
+STRAIGHT = np.array([0.0, 0.0, LENGTH])
 
 
 @pytest.mark.parametrize(("angle", "plane"), [(1.5, 0.0), (1.5, 0.7), (2.0, 1.57), (2.6, 0.4)])
@@ -120,7 +125,7 @@ def moves_at_a_dead_end(sag, missed, steps=400):
 
     Paying out reduces the tension by 0.1 N per step; a step onward restores it.
     """
-    retreat, target, tension = Retreat(LENGTH, LIMITS.tension_max), straight_target(LENGTH), np.full(6, 4.0)
+    retreat, target, tension = Retreat(LENGTH, LIMITS.tension_max, STRAIGHT), straight_target(LENGTH), np.full(6, 4.0)
     retreat.move(True, target, np.array([-sag, 0.0, LENGTH]), np.zeros(6))
     moves = []
     for _ in range(steps):
@@ -137,6 +142,22 @@ def test_a_target_at_a_dead_end_is_tried_again_from_half_a_quarter_and_no_tensio
     moves = moves_at_a_dead_end(sag=0.3 * LENGTH, missed=LENGTH)
     paid_out = [len(run) for run in "".join("P" if move == Move.PAY_OUT else " " for move in moves).split()]
     assert paid_out == [20, 30, 40]
+
+
+def test_a_robot_bent_at_rest_is_not_paid_out_towards_the_straight_one():
+    """Not yet released, it knows where its shape at rest has the tip: farther from the target than where it is stuck."""
+    target, bent = straight_target(LENGTH), np.array([0.9 * LENGTH, 0.0, 0.3 * LENGTH])
+    moves = []
+    for at_rest in (STRAIGHT, bent):
+        retreat = Retreat(LENGTH, LIMITS.tension_max, at_rest)
+        for _ in range(60):
+            moves.append(retreat.move(True, target, np.array([0.5 * LENGTH, 0.0, LENGTH]), np.full(6, 4.0)))
+            retreat.observe(np.zeros(6), 0.01)
+    assert Move.PAY_OUT in moves[:60] and set(moves[60:]) == {Move.ONWARD}
+    robot = coarse()
+    rest = RestShape(bend_angle=np.radians(60.0))
+    hook = dataclasses.replace(robot, segments=tuple(dataclasses.replace(one, rest=rest) for one in robot.segments))
+    assert np.allclose(InverseController(hook)._retreat._tip_at_rest, rest_tip(hook)[0]) and rest_tip(hook)[0][0] > 0.3 * LENGTH
 
 
 def test_a_load_that_is_too_heavy_is_held_and_not_dropped():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.cables.friction import Sliding
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.creep import Creep
@@ -24,7 +25,7 @@ class Step:
     """One step: the robot is under gravity (3,) with the cables at displacement (m,), NaN: released, `duration` s after the last.
 
     duration None: relaxed, as after a long time. window: whose tip is predicted, None for a step in between. The others are the
-    result: tip (6,), tension (m,), by_offset (6, m), and the state and what the branches held in it.
+    result: tip (6,), tension (m,), by_offset (6, m), and the state, how its cables slid, and what the branches held in it.
     """
 
     gravity: np.ndarray
@@ -35,6 +36,7 @@ class Step:
     tension: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     by_offset: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((6, 0)))
     state: Equilibrium | None = None
+    sliding: Sliding | None = None
     viscous: ViscousStrain | None = None
 
     @property
@@ -86,7 +88,9 @@ class Walk:
         return done
 
     def near(self, step: Step, known: Step) -> np.ndarray:
-        """Return the tip (6,) of a step near `known`, with what the branches held in that one."""
+        """Return the tip (6,) of a step near `known`, with what the branches held in that one, and its cables' friction."""
+        assert known.state is not None and known.sliding is not None  # it has been computed
+        self._solver.state, self._solver.sliding = known.state, known.sliding
         state = self._solve(step, known.viscous, known.state)
         if not state.converged:
             raise RuntimeError(_lost(step))
@@ -140,7 +144,13 @@ class Walk:
             own = response.compliance_aa[np.ix_(taut, taut)]
             by_offset[:, taut] = np.linalg.solve(own.T, response.compliance_ea[:6, taut].T).T
         return dataclasses.replace(
-            step, tip=effector[:6].copy(), tension=state.tension, by_offset=by_offset, state=state, viscous=viscous
+            step,
+            tip=effector[:6].copy(),
+            tension=state.tension,
+            by_offset=by_offset,
+            state=state,
+            viscous=viscous,
+            sliding=self._solver.sliding,
         )
 
 

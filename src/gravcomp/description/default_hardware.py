@@ -1,15 +1,23 @@
 """Motors for a robot whose file has none, for the virtual robot only: one for each cable or for each joint of `hardware.joints`.
 
 What the file gives in `hardware.drive` stays. The rest follows from `robot.limits`: tension, stroke and speed of the cables, and
-a current limit that reaches the largest tension.
+motors that reach the largest tension. The capstans are so small that the backlash of the gears turns the tip little: a capstan of
+radius c behind a gear with the backlash b leaves a cable at the distance r from the axis open by b c, and the tip by b c / r. The
+gains of the position loops are those of the same rotor.
 """
 
+import math
 from typing import Any
 
 from gravcomp.description.hardware import MOTOR_IDS, Drive
+from gravcomp.description.own_weight import bend_by_own_weight, largest_pitch_radius
 from gravcomp.description.robot import Robot
 
 _MARGIN = 1.5  # of the current limit over the largest tension's current, for the friction of gear and line
+_LARGEST_CURRENT = 10.0  # A, of a C610
+_PLAY = 0.02  # turn of the tip by the backlash of a gear, over the turn by the robot's weight
+_SMALLEST_CAPSTAN = 0.2e-3  # m: of a lead screw with a lead of 1.26 mm
+_SPEED = 28.0  # rad/s of a small capstan: half of what an M2006 does without load
 _BASE_PORT = 43113
 _RIGGING = ("cable", "ratio", "pair", "also", "preload_mm", "differential")  # keys that say which cables a motor moves
 
@@ -26,15 +34,29 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
         return section
     limits, standard = robot.limits, Drive()
     tension = _number(drive, "tension_limit", limits.tension_max)
-    radius, constant = _number(drive, "capstan_radius_mm", 1e3 * standard.capstan_radius), standard.torque_constant
-    current = _MARGIN * tension * 1e-3 * radius / _number(drive, "torque_constant", constant)
+    backlash = (
+        0.0 if drive.get("backlash_deg") == 0 else math.radians(_number(drive, "backlash_deg", math.degrees(standard.backlash)))
+    )
+    radius = 1e-3 * _number(drive, "capstan_radius_mm", 1e3 * _capstan_radius(robot, backlash, standard.capstan_radius))
+    torque = _MARGIN * tension * radius
+    constant = max(standard.torque_constant, math.ceil(1e3 * torque / _LARGEST_CURRENT) * 1e-3)
+    current = torque / _number(drive, "torque_constant", constant)
+    size = standard.capstan_radius / radius
     derived = {
-        "tension_limit": min(tension, 100.0),
-        "current_limit": round(min(max(current, standard.current_limit), 10.0), 3),
-        "velocity_limit_mm_s": min(1e3 * limits.displacement_rate, 250.0),
-        "displacement_min_mm": max(1e3 * limits.displacement_min, -200.0),
-        "displacement_max_mm": min(1e3 * limits.displacement_max, 200.0),
+        "tension_limit": tension,
+        "current_limit": round(min(max(current, standard.current_limit), _LARGEST_CURRENT), 3),
+        "velocity_limit_mm_s": min(1e3 * limits.displacement_rate, 1e3 * _SPEED * radius if size > 1.0 else 250.0),
+        "displacement_min_mm": 1e3 * limits.displacement_min,
+        "displacement_max_mm": 1e3 * limits.displacement_max,
     }
+    if constant > standard.torque_constant:
+        derived["torque_constant"] = constant
+    if size > 1.0:
+        derived |= {
+            "capstan_radius_mm": 1e3 * radius,
+            "velocity_gain": size * standard.velocity_gain,
+            "velocity_integral": size * standard.velocity_integral,
+        }
     most = len(MOTOR_IDS)
     motors = [{**cables, "can_id": 1 + index % most} for index, cables in enumerate(_cables_of_motors(section, robot))]
     completed = {**section, "drive": {**derived, **drive}, "motors": motors}
@@ -44,6 +66,15 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
         for index, motor in enumerate(motors):
             motor["bus"] = f"bus{index // most}"
     return completed
+
+
+def _capstan_radius(robot: Robot, backlash: float, standard: float) -> float:
+    """Return a radius in m, at most the standard one, with which a backlash in rad turns the tip by no more than `_PLAY`."""
+    bend, pitch = bend_by_own_weight(robot), largest_pitch_radius(robot)
+    if bend is None or pitch == 0.0 or backlash == 0.0:
+        return standard
+    fine = _PLAY * bend * pitch / backlash
+    return standard if fine >= standard else max(math.floor(1e5 * fine) * 1e-5, _SMALLEST_CAPSTAN)
 
 
 def _cables_of_motors(section: dict[str, Any], robot: Robot) -> list[dict[str, Any]]:

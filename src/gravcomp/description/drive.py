@@ -15,11 +15,16 @@ class Drive:
 
     gear_ratio: float = parameter(36.0, minimum=1, maximum=1000, description="rotor turns per turn of the capstan (M2006: 36)")
     capstan_radius: float = parameter(
-        5.0, edge="mm", minimum=0.5, maximum=50, description="from the axis to the middle of the cable"
+        5.0,
+        edge="mm",
+        minimum=0.1,
+        maximum=50,
+        description="from the axis to the middle of the cable; of a lead screw its lead over 2 pi",
     )
+    backlash: float = parameter(0.6, edge="deg", minimum=0, maximum=90, description="of the gear, at its output")
     torque_constant: float = parameter(0.18, unit="N m/A", minimum=1e-3, maximum=10, description="at the gear's output")
     current_limit: float = parameter(1.0, unit="A", minimum=0.05, maximum=10, description="largest current in a frame")
-    tension_limit: float = parameter(5.0, unit="N", minimum=0, maximum=100, description="largest feed-forward of tension")
+    tension_limit: float = parameter(5.0, unit="N", minimum=0, maximum=1000, description="largest feed-forward of tension")
     pretension: float = parameter(0.0, unit="N", minimum=0, maximum=20, description="smallest feed-forward of tension")
     velocity_limit: float = parameter(40.0, edge="mm/s", minimum=0.1, maximum=250, description="largest speed of a cable")
     acceleration_limit: float = parameter(
@@ -28,7 +33,7 @@ class Drive:
     displacement_min: float = parameter(
         -30.0,
         edge="mm",
-        minimum=-200,
+        minimum=-1000,
         maximum=0,
         description="farthest paid out",
         renamed_from="displacement_minimum_mm",
@@ -37,7 +42,7 @@ class Drive:
         30.0,
         edge="mm",
         minimum=0,
-        maximum=200,
+        maximum=1000,
         description="farthest pulled in",
         renamed_from="displacement_maximum_mm",
     )

@@ -31,6 +31,7 @@ from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, evaluate
 from gravcomp.inverse.surroundings import Surroundings, rows_of
 from gravcomp.inverse.target import Target
+from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class InverseController:
         self._least: tuple[float, np.ndarray] | None = None  # the option `pretension`, and the bounds that follow from it
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
-        self._retreat = Retreat(robot.length, robot.limits.tension_max)
+        self._retreat = Retreat(robot.length, robot.limits.tension_max, rest_tip(robot)[0])
         self._release = Release()
         self.reset()
 

@@ -42,15 +42,15 @@ class Move(enum.Enum):
 
 
 class Retreat:
-    """Chooses the moves of a robot of `length` (m) with cables of at most `tension_max` (N).
+    """Chooses the moves of a robot of `length` (m), its tip at `tip_at_rest` (3,) in m, with cables of at most `tension_max` (N).
 
     Attribute `stride`: fraction of the usual stride that a step may take.
     """
 
-    def __init__(self, length: float, tension_max: float):
+    def __init__(self, length: float, tension_max: float, tip_at_rest: np.ndarray):
         self._length, self._tension_max = length, tension_max
         self._slow = _SLOW * math.sqrt(STANDARD_GRAVITY * length)  # m/s
-        self._tip_at_rest = np.array([0.0, 0.0, length])  # until it is observed
+        self._tip_at_rest = tip_at_rest  # until it is observed
         self.reset()
 
     def reset(self) -> None:

@@ -90,26 +90,38 @@ def _by_stiffness(robot: Robot) -> Robot:
 def held_figures(setup: Setup) -> dict[str, float]:
     """Return numbers without a unit of the robot that the loop holds straight while it turns from hanging to horizontal.
 
-    sag: released and horizontal, over the length; moving: lateral error during the turn, its root mean square over the sag;
-    lateral, axial: of the true tip at the end, over the sag; model: the modelled tip's lateral error over the sag; tension: the
-    largest one over its limit; command: the largest one over the length.
+    sag: released and horizontal, from the shape at rest, over the length; moving: lateral error during the turn, its root mean
+    square over the sag; lateral, axial: mean of the true tip at the end from the target, over the sag, against the sag and along
+    the tip; model: as lateral, of the modelled tip; tension: the largest one over its limit; command: the largest one over the
+    length.
     """
     pose, length, period = base_orientation(0.0), setup.robot.length, setup.first_period
-    sag = float(np.linalg.norm(equilibrium(build_rod(setup.true_robot), pose.T @ [0.0, 0.0, -STANDARD_GRAVITY]).tip[:2]))
+    target = target_of(setup, Case(0.0))
+    along = target.direction_or_zeros
+
+    def lateral(tips: np.ndarray) -> np.ndarray:
+        """Parts (t, 3) of the distances of tips (t, 3) from the target across its direction."""
+        away = tips - target.tip_position
+        return away - np.outer(away @ along, along)
+
+    released = equilibrium(build_rod(setup.true_robot), pose.T @ [0.0, 0.0, -STANDARD_GRAVITY]).tip
+    sagged = lateral(released[None])[0]
+    sag = float(np.linalg.norm(sagged))
+    upward = -sagged / sag
     quarter = 0.5 * np.pi
     stops = [(base_orientation(-quarter), _HANGING * period), (pose, _HELD * period)]
     motion = WaypointMotion(stops, quarter / (_TURN * period))
     loop = ClosedLoop(setup, motion)
-    loop.hold(target_of(setup, Case(0.0)))
+    loop.hold(target)
     loop.run(motion.duration - loop.time)
     (_, begin), (end, _) = motion.rests
     turning, held = loop.trace.between(begin, end), loop.trace.between(loop.time - _COUNTED * period)
     return {
         "sag": sag / length,
-        "moving": float(np.sqrt((turning.tip_position[:, :2] ** 2).sum(axis=1).mean())) / sag,
-        "lateral": float(held.tip_position[:, 0].mean()) / sag,
-        "axial": (float(held.tip_position[:, 2].mean()) - length) / sag,
-        "model": float(held.model_tip_position[:, 0].mean()) / sag,
+        "moving": float(np.sqrt((lateral(turning.tip_position) ** 2).sum(axis=1).mean())) / sag,
+        "lateral": float((lateral(held.tip_position) @ upward).mean()) / sag,
+        "axial": float(((held.tip_position - target.tip_position) @ along).mean()) / sag,
+        "model": float((lateral(held.model_tip_position) @ upward).mean()) / sag,
         "tension": float(held.tension.mean(axis=0).max()) / setup.robot.limits.tension_max,
         "command": float(held.command.mean(axis=0).max()) / length,
     }

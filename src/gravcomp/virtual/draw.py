@@ -10,7 +10,7 @@
 | friction of the lines | described +- 20 %; without one, 0.05 to 0.11; sheath angle described, else 15 to 25 deg |
 | creep, damping, inner friction | that of the material's class, or the described creep, +- 30 % |
 | torque constant, capstan radius of each motor | described +- 4 %, +- 0.3 % |
-| backlash, friction of the gears | 0.4 to 0.8 deg, 6 to 10 % of the load |
+| backlash, friction of the gears | described +- a third, 6 to 10 % of the load |
 | surroundings | 18 to 26 degC |
 
 All distributions are uniform. Every number is drawn whether it is used or not, so that giving one value changes no other.
@@ -39,7 +39,7 @@ _FRICTION_SPREAD, _FRICTION, _GUIDE_ANGLE = 0.2, (0.05, 0.11), (math.radians(15.
 _PRESLIDING = 5e-4  # of the robot's length
 _MATERIAL_SPREAD = 0.3
 _TORQUE_SPREAD, _CAPSTAN_SPREAD = 0.04, 0.003
-_BACKLASH, _LOAD_FRICTION = (math.radians(0.4), math.radians(0.8)), (0.06, 0.10)
+_BACKLASH_SPREAD, _LOAD_FRICTION = 1.0 / 3.0, (0.06, 0.10)
 _AMBIENT = (18.0, 26.0)
 _ELEMENTS = 20
 
@@ -205,7 +205,8 @@ def _lines(
 def _motors(given: VirtualRobotParameters, hardware: Hardware, random: np.random.Generator, drawn: dict[str, str]) -> TrueMotors:
     motors, drive, count = given.motors, hardware.drive, len(hardware.motors)
     torque, radius = random.uniform(-1.0, 1.0, (2, count))
-    backlash, friction = random.uniform(*_BACKLASH, count), random.uniform(*_LOAD_FRICTION, count)
+    backlash = drive.backlash * random.uniform(1.0 - _BACKLASH_SPREAD, 1.0 + _BACKLASH_SPREAD, count)
+    friction = random.uniform(*_LOAD_FRICTION, count)
 
     def each(name: str, value: float | None, drawn_values: np.ndarray, scale: float, unit: str) -> np.ndarray:
         if value is not None:

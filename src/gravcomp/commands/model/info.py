@@ -12,7 +12,7 @@ from gravcomp.commands.model.reach import reach
 from gravcomp.commands.model.reach import text as reach_text
 
 if TYPE_CHECKING:
-    from gravcomp.description import Robot
+    from gravcomp.description import Robot, RobotFile
     from gravcomp.simulation import RobotModel, Shape
 
 _GRAVITY = 9.81
@@ -61,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
         "natural_frequency_hz": natural_frequencies(model).tolist(),
         "horizontal_tip_mm": (1e3 * sag.tip_position).tolist() if sag.is_equilibrium else None,
         "horizontal_message": sag.message,
+        "play": _play(file, robot, sag),
         "hold": None if answer is None else hold.figures(answer, model),
         "reach": reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
@@ -69,6 +70,32 @@ def run(args: argparse.Namespace) -> int:
         figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     output.result(figures, _text(figures, [] if answer is None else lines(robot, answer)))
     return 0
+
+
+def _play(file: "RobotFile", robot: "Robot", sag: "Shape") -> dict[str, Any] | None:
+    """Return what the backlash of the gears leaves open at the tip of the released, horizontal robot; None without cables."""
+    import numpy as np
+    from scipy.spatial.transform import Rotation
+
+    from gravcomp.holdability.play import play_of
+    from gravcomp.mesh.robot_axis import rest_tip
+
+    if not robot.cables or not sag.is_equilibrium:
+        return None
+    position, direction = rest_tip(robot)
+    away = sag.tip_position - position
+    sagged = float(np.linalg.norm(away - direction * (direction @ away)))
+    along = Rotation.from_quat(sag.tip_orientation).apply((0.0, 0.0, 1.0))
+    play = play_of(file.hardware, sag.response, along, sagged)
+    return {
+        "backlash_deg": float(np.degrees(play.backlash)),
+        "capstan_radius_mm": 1e3 * play.capstan,
+        "cable_mm": 1e3 * play.cable,
+        "tip_mm": 1e3 * play.tip,
+        "of_sag_pct": 100.0 * play.share if sagged > 0.0 else None,
+        "large": play.large,
+        "sentence": play.text(),
+    }
 
 
 def _cables(model: "RobotModel") -> dict[str, dict[str, float | None]]:
@@ -156,6 +183,8 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
         + (figures["horizontal_message"] if tip is None else ", ".join(f"{x:.2f}" for x in tip) + " mm"),
     ]
     lines += [f"  {line}" for line in hold_lines]
+    if figures["play"]:
+        lines.append(f"  {'advice: ' if figures['play']['large'] else ''}{figures['play']['sentence']}")
     if figures["reach"]:
         lines += reach_text(figures["reach"])
     lines.append(

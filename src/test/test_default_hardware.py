@@ -1,0 +1,77 @@
+"""Motors of a robot whose file has none: they follow from the robot."""
+
+import math
+
+import pytest
+import yaml
+
+from gravcomp.description import load_robot_file
+from gravcomp.description.drive import Drive
+from gravcomp.description.own_weight import bend_by_own_weight
+
+STANDARD = Drive()
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Make a robot file without motors: a tube with cables at 0.7 of its radius."""
+
+    def make(length, diameter, modulus, drive=None, **limits):
+        material = {"youngs_modulus_mpa": modulus, "poissons_ratio": 0.49, "density": 1000}
+        body = {
+            "name": "tube",
+            "segments": [{"name": "s", "length_mm": length, "outer_diameter_mm": diameter, "material": material}],
+            "cables": [
+                {"name": n, "angle_deg": a, "radius_mm": 0.35 * diameter, "segment": "s"}
+                for n, a in (("a", 0), ("b", 120), ("c", 240))
+            ],
+            "limits": limits,
+        }
+        path = tmp_path / "tube.yaml"
+        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}}}))
+        return load_robot_file(path)
+
+    return make
+
+
+def test_a_tube_bends_by_its_weight_as_a_cantilever(robot):
+    # q L^3 / (6 E I), with I / A = d^2 / 16
+    expected = 1000 * 9.80665 * 0.05**3 / (6 * 2e6 * 0.004**2 / 16)
+    assert bend_by_own_weight(robot(50, 4, 2.0).robot) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize(("length", "diameter", "modulus"), [(50, 4, 2.0), (40, 8, 0.3), (120, 6, 1.0)])
+def test_backlash_turns_the_tip_by_little_of_what_its_weight_does(robot, length, diameter, modulus):
+    file = robot(length, diameter, modulus)
+    drive, pitch = file.hardware.drive, 0.35e-3 * diameter
+    turned = drive.backlash * drive.capstan_radius / pitch
+    assert drive.capstan_radius <= STANDARD.capstan_radius
+    assert turned <= 0.0201 * bend_by_own_weight(file.robot)
+
+
+def test_a_small_capstan_has_the_position_loop_of_the_same_rotor(robot):
+    drive = robot(50, 4, 2.0).hardware.drive
+    assert drive.capstan_radius < STANDARD.capstan_radius
+    for gain in ("velocity_gain", "velocity_integral"):
+        per_turn = getattr(drive, gain) * drive.capstan_radius
+        assert per_turn == pytest.approx(getattr(STANDARD, gain) * STANDARD.capstan_radius)
+    assert drive.velocity_limit / drive.capstan_radius <= 30.0
+
+
+def test_a_robot_that_hardly_sags_gets_the_smallest_capstan_and_what_is_given_stays(robot):
+    assert robot(9, 4, 50.0).hardware.drive.capstan_radius == pytest.approx(0.2e-3)
+    given = robot(9, 4, 50.0, drive={"capstan_radius_mm": 3.0, "velocity_gain": 80.0}).hardware.drive
+    assert (given.capstan_radius, given.velocity_gain) == (pytest.approx(3e-3), 80.0)
+
+
+def test_gears_without_backlash_need_no_small_capstan(robot):
+    assert robot(9, 4, 50.0, drive={"backlash_deg": 0.0}).hardware.drive.capstan_radius == STANDARD.capstan_radius
+
+
+def test_motors_reach_the_tension_and_the_stroke_of_a_large_robot(robot):
+    limits = {"tension_max": 300.0, "displacement_min_mm": -300.0, "displacement_max_mm": 300.0}
+    drive = robot(1000, 80, 0.6, **limits).hardware.drive
+    assert drive.capstan_radius == STANDARD.capstan_radius and drive.tension_limit == 300.0
+    assert (drive.displacement_min, drive.displacement_max) == (pytest.approx(-0.3), pytest.approx(0.3))
+    assert drive.current_limit * drive.tension_per_ampere >= 1.4 * 300.0 and drive.current_limit <= 10.0
+    assert math.isclose(drive.torque_constant, 0.225)
