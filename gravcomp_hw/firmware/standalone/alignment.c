@@ -17,7 +17,8 @@ static float squared(float x) { return x * x; }
 static float square_of(const float *v) { return (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]; }
 
 bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after) {
-  return 0.5f * gap * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
+  const float unseen = 0.5f * gap * gc_min(1.0f, gap / GC_SWING);  // in a short gap the rate changes evenly
+  return unseen * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
 }
 
 void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity) {

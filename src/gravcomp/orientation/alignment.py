@@ -47,7 +47,8 @@ class Alignment:
 
     def lost_in(self, gap: float, *around: float) -> bool:
         """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s)."""
-        return 0.5 * gap * max(math.sqrt(self._turning), *around) > LOST
+        unseen = 0.5 * gap * min(1.0, gap / _SWING)  # in a short gap the rate changes evenly
+        return unseen * max(math.sqrt(self._turning), *around) > LOST
 
     def watch(self, dt: float, rate: Sequence[float], force: Sequence[float], gravity: float) -> None:
         """Follow the motion over `dt` s: rate (3,) in rad/s without bias, specific force (3,) in m/s^2."""
