@@ -79,9 +79,10 @@ def from_shape(published: PublishedShape) -> Deformed:
     numbers = {field.name: getattr(response, field.name) for field in dataclasses.fields(response)}
     numbers |= {"gravity": published.gravity, "cable_tension": shape.cable_tension}
     numbers |= {"contact_force": contact.force, "contact_position": contact.position, "contact_force_change": contact.change}
-    for name, values in numbers.items():
-        if not np.isfinite(values).all():
-            raise ValueError(f"{name} has numbers that are not finite")
+    # One look at all of them: this is on the way from sample to command.
+    if not np.isfinite(np.concatenate([values.ravel() for values in numbers.values()])).all():
+        wrong = next(name for name, values in numbers.items() if not np.isfinite(values).all())
+        raise ValueError(f"{wrong} has numbers that are not finite")
     check_compliance(response)
     return Deformed(
         header=published.header,

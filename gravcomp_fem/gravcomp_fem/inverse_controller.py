@@ -124,13 +124,14 @@ class InverseController(ManagedNode):
 
     def _on_deformation(self, message: Deformation) -> None:
         self._take(message.status, message.message, message.header, lambda: from_message(message))
+        self._last_arrival = self.get_clock().now()  # after the command, which the motors wait for
 
     def _on_published_shape(self, published: PublishedShape) -> None:
         self._take(published.shape.status, published.shape.message, published.header, lambda: from_shape(published))
+        self._last_arrival = self.get_clock().now()
 
     def _take(self, status: int, sentence: str, header: Header, read: Callable[[], Deformed]) -> None:
         """Follow the deformation that `read` returns, which raises ValueError for one that is not valid."""
-        self._last_arrival = self.get_clock().now()
         if status == Deformation.FAILED:
             self._publish_code(ControllerCode.STALE, f"no command on a failed deformation: {sentence}", header)
             return

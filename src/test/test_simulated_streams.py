@@ -56,6 +56,12 @@ def test_a_fault_is_found_and_nothing_else(name, fault):
     assert set(found) & set(FAULTS[fault].kinds) and len(found) == 1
 
 
+def test_a_drift_is_found_in_nine_seconds_of_rest():
+    clean = recording("arm at 2 m/s^2", seed=31, duration=60.0)
+    assert kinds(check_recording(clean)) == []
+    assert kinds(check_recording(FAULTS["bias_drift"].apply(clean, np.random.default_rng(1)))) == ["bias_drift"]
+
+
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_a_smooth_maximum_of_a_coarse_sensor_is_not_clipped(bits):
     step = np.radians(2000.0) / 2 ** (bits - 1)

@@ -91,6 +91,12 @@ def test_a_fault_is_reported_and_held(name, trial, short, clean_deg):
         assert error <= clean_deg + fault.excess_deg
 
 
+def test_a_wrong_rate_is_found_where_the_likeliest_scale_is_not_quite_2():
+    recording = averaged_trial("27_disturbed_phone_vibration_B")
+    (finding,) = check_recording(FAULTS["rate_doubled"].apply(recording, np.random.default_rng(1)))
+    assert finding.kind == "rate" and "are half those" in finding.text
+
+
 def test_a_wrong_unit_is_refused_unless_it_is_to_be_converted(short):
     in_g = replace(short, accel=short.accel / 9.80665)
     with pytest.raises(RecordingError, match=r"in g .* --units auto"):

@@ -17,6 +17,18 @@ void gc_covariance_set_bias(gc_error_covariance *covariance, float std) {
   }
 }
 
+void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float tilt, float velocity) {
+  float(*p)[GC_ERRORS] = covariance->matrix;
+  for (uint32_t i = 0; i < GC_ERRORS; ++i) {
+    if (i < 2u || i >= VELOCITY) {
+      for (uint32_t k = 0; k < GC_ERRORS; ++k) {
+        p[i][k] = p[k][i] = 0.0f;
+      }
+      p[i][i] = i < 2u ? tilt * tilt : velocity * velocity;
+    }
+  }
+}
+
 // Replace P by F P; called twice with a transposition between, this is F P F^T.
 static void propagate(float (*p)[GC_ERRORS], float dt, const float (*turn)[3], float gravity, bool with_bias) {
   const float fall = gravity * dt, bend = with_bias ? 0.5f * dt * fall : 0.0f, drift = with_bias ? dt : 0.0f;

@@ -78,9 +78,39 @@ static void start(gc_orientation *filter, const float *gyro, const float *accel,
   filter->contradicted = false;
   state->rest.started = false;
   state->rest.still = state->rest.calm = 0u;
+  state->alignment.active = false;
   gc_copy(state->last_gyro, gyro, sizeof state->last_gyro);
   state->period = 0.0f;
   filter->started = true;
+}
+
+// Return whether samples are missing in a step of dt s.
+static bool is_gap(const gc_filter_state *state, float dt) {
+  return state->period > 0.0f && dt > GC_MISSED_PERIODS * state->period;
+}
+
+// Return whether the sensor may have turned too far meanwhile for a gap of dt s to be bridged.
+static bool is_lost(const gc_filter_state *state, float dt, const float *gyro) {
+  return is_gap(state, dt) && gc_alignment_lost_in(&state->alignment, dt, distance(state->last_gyro, state->bias),
+                                                   distance(gyro, state->bias));
+}
+
+// Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty.
+static void set_aligned(gc_filter_state *state, const float *upward) {
+  float up[3], velocity_std = GC_START_VELOCITY_STD;
+  gc_quaternion_rotate(state->orientation, upward, up);
+  const float across = gc_sqrt(up[0] * up[0] + up[1] * up[1]);
+  if (across > 0.0f) {
+    const float tilt = gc_atan2(across, up[2]) / across;
+    state->orientation = gc_quaternion_normalised(
+        gc_quaternion_product(gc_quaternion_exponential(tilt * up[1], -tilt * up[0], 0.0f), state->orientation));
+  }
+  gc_zero(state->velocity, sizeof state->velocity);
+  if (!state->alignment.active) {
+    velocity_std = gc_alignment_motion(&state->alignment, state->velocity);
+    gc_quaternion_rotate(state->orientation, state->velocity, state->velocity);
+  }
+  gc_covariance_set_tilt_and_velocity(&state->errors, gc_alignment_std(&state->alignment, state->gravity_norm), velocity_std);
 }
 
 // Return the angle in rad between the mean specific force at rest and the vertical of the orientation.
@@ -97,7 +127,7 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
   const float *usable = step->gyro_usable ? step->gyro : state->bias;
   float rate[3], extra_tilt = 0.0f, extra_velocity = 0.0f;
   gc_copy(rate, usable, sizeof rate);
-  if (state->period > 0.0f && dt > GC_MISSED_PERIODS * state->period) {
+  if (is_gap(state, dt)) {
     // The missing samples are replaced by the mean of the rates around them; its uncertainty is their difference.
     for (uint32_t i = 0; i < 3u; ++i) {
       rate[i] = 0.5f * (rate[i] + state->last_gyro[i]);
@@ -194,6 +224,20 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
     state->rest.still = state->rest.calm = 0u;
   }
   predict(filter, step);
+  if (step->gyro_usable && step->accel_usable) {
+    float rate[3], up[3];
+    for (uint32_t i = 0; i < 3u; ++i) {
+      rate[i] = step->gyro[i] - state->bias[i];
+    }
+    gc_alignment_watch(&state->alignment, step->dt, rate, step->accel, s->gravity);
+    if (state->alignment.active) {
+      gc_alignment_take(&state->alignment, step->dt, rate, step->accel, state->gravity_norm, up);
+      set_aligned(state, up);
+      return true;
+    }
+  } else if (state->alignment.active) {
+    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm);
+  }
   if (step->accel_usable) {
     correct(filter, step->dt, resting && s->bias_estimation > 0.0f);
   }
@@ -248,7 +292,7 @@ static uint32_t gate(gc_orientation *filter, gc_spike_gate *of, gc_filter_step *
 // Look again at the rate of GC_REVIEW_AHEAD samples ago, from a sample as it came. Returns how many steps have to be repeated.
 static uint32_t review(gc_orientation *filter, const gc_filter_step *step) {
   float counted[3];
-  if (filter->state.period > 0.0f && step->dt > GC_MISSED_PERIODS * filter->state.period) {
+  if (is_gap(&filter->state, step->dt)) {
     gc_spike_review_reset(&filter->review);
   }
   const bool decided = gc_spike_review_take(&filter->review, filter->settings, step->dt, step->gyro, counted);
@@ -305,8 +349,11 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
   if (gc_problem_rejects(verdict.problem)) {
     return false;
   }
-  if (!filter->started || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
+  const bool lost = verdict.problem == GC_PROBLEM_NONE && is_lost(&filter->state, verdict.dt, gyro);
+  if (!filter->started || lost || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
     start(filter, gyro, accel, verdict.dt);
+    gc_alignment_begin(&filter->state.alignment, accel, filter->state.gravity_norm);
+    set_aligned(&filter->state, accel);
     gc_zero(&filter->even, sizeof filter->even);
     forget_suspects(filter);
     estimate_of(filter, gyro, estimate);

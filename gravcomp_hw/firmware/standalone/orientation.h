@@ -2,6 +2,7 @@
 #ifndef GC_ORIENTATION_H
 #define GC_ORIENTATION_H
 
+#include "alignment.h"
 #include "error_covariance.h"
 #include "even_steps.h"
 #include "rest.h"
@@ -22,6 +23,7 @@ typedef struct {
   float norm_at_rest;         // m/s^2, 0 before the first rest
   gc_error_covariance errors;
   gc_rest rest;
+  gc_alignment alignment;
 } gc_filter_state;
 
 // What the filter takes of a sample.

@@ -1,6 +1,7 @@
 """Mount of the IMU on the robot's base."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -16,7 +17,7 @@ class ImuMount:
         (0.0, 0.0, 0.0), edge="deg", description="roll, pitch, yaw of imu_link in soft_base (fixed axes x, y, z)"
     )
 
-    @property
+    @functools.cached_property
     def rotation(self) -> np.ndarray:
         """(3, 3): vector in soft_base = rotation @ vector in imu_link."""
         (cr, cp, cy), (sr, sp, sy) = np.cos(self.rpy), np.sin(self.rpy)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.orientation import quaternion as quat
+from gravcomp.orientation.alignment import Alignment
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.even_steps import EvenSteps
@@ -51,12 +52,14 @@ class OrientationFilter:
         self._rest = RestDetector(self.options.rest)
         self._steps = LastSteps(self.options.spikes)
         self._errors = ErrorCovariance()
+        self._alignment = Alignment()
         self.reset()
 
     def reset(self) -> None:
         """Reset all state: the next sample starts with yaw 0 and no bias."""
         self._guard.reset()
         self._even.reset()
+        self._alignment.reset()
         self._started = False
         self._orientation = quat.IDENTITY
         self._velocity = (0.0, 0.0, 0.0)
@@ -97,14 +100,17 @@ class OrientationFilter:
         if verdict.problem in REJECTED:
             self.rejected += 1
             return verdict.problem
-        if not self._started or verdict.problem in RESTARTED:
+        problem = Problem.GAP if verdict.problem is Problem.NONE and self._is_lost(verdict.dt, rate) else verdict.problem
+        if not self._started or problem in RESTARTED:
             self._start(rate, force, verdict.dt)
+            self._alignment.begin(force, self._gravity_norm)
+            self._set_aligned(force)
             self._even.reset()
             self._steps.reset()
-            return self._estimate(stamp_ns, rate, False, verdict.problem)
+            return self._estimate(stamp_ns, rate, False, problem)
 
         step = Step(self._even.take(verdict.dt), rate, force, *self._usable(verdict))
-        repeated = self._steps.take(step, gap=self._period > 0.0 and step.dt > MISSED_PERIODS * self._period)
+        repeated = self._steps.take(step, gap=self._is_gap(step.dt))
         if repeated:
             self._restore(repeated[0][0])
             for _, earlier in repeated:
@@ -136,6 +142,14 @@ class OrientationFilter:
             self._rest.reset()
             resting = False
         self._predict(dt, rate, force, step.gyro_usable, step.accel_usable)
+        if step.gyro_usable and step.accel_usable:
+            x, y, z = (w - b for w, b in zip(rate, self._bias))
+            self._alignment.watch(dt, (x, y, z), force, self.options.gravity)
+            if self._alignment.active:
+                self._set_aligned(self._alignment.take(dt, (x, y, z), force, self._gravity_norm))
+                return resting
+        elif self._alignment.active:
+            self._alignment.begin(force, self._gravity_norm)
         if step.accel_usable:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
@@ -145,13 +159,15 @@ class OrientationFilter:
     def _saved(self) -> tuple:
         """Return the state that steps change, for `_restore`."""
         state = (self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period)
-        return *state, self._gravity_norm, self._accel_norm_at_rest, self._errors.matrix.copy(), self._rest.saved()
+        learned = (self._gravity_norm, self._accel_norm_at_rest, self._errors.matrix.copy())
+        return *state, *learned, self._rest.saved(), self._alignment.saved()
 
     def _restore(self, state: tuple) -> None:
         self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period = state[:6]
         self._gravity_norm, self._accel_norm_at_rest = state[6:8]
         self._errors.reset(state[8].copy())
         self._rest.restore(state[9])
+        self._alignment.restore(state[10])
 
     def _contradicted_tilt(self) -> float:
         """Return the angle (rad) between the mean specific force and the vertical of the estimated orientation.
@@ -193,9 +209,32 @@ class OrientationFilter:
         self._velocity = (0.0, 0.0, 0.0)
         self._contradicted = False
         self._rest.reset()
+        self._alignment.active = False
         self._last_gyro = gyro
         self._period = 0.0
         self._started = True
+
+    def _is_gap(self, dt: float) -> bool:
+        """Return whether samples are missing in a step of `dt` s."""
+        return self._period > 0.0 and dt > MISSED_PERIODS * self._period
+
+    def _is_lost(self, dt: float, gyro: quat.Vector) -> bool:
+        """Return whether the sensor may have turned too far meanwhile for a gap of `dt` s to be bridged."""
+        around = (math.dist(rate, self._bias) for rate in (self._last_gyro, gyro))
+        return self._is_gap(dt) and self._alignment.lost_in(dt, *around)
+
+    def _set_aligned(self, upward: quat.Vector) -> None:
+        """Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty."""
+        x, y, z = quat.rotate(self._orientation, upward)
+        across = math.hypot(x, y)
+        if across > 0.0:
+            tilt = math.atan2(across, z) / across
+            self._orientation = quat.normalised(quat.multiply(quat.exponential(tilt * y, -tilt * x, 0.0), self._orientation))
+        self._velocity, velocity_std = (0.0, 0.0, 0.0), START_VELOCITY_STD
+        if not self._alignment.active:
+            motion, velocity_std = self._alignment.motion
+            self._velocity = quat.rotate(self._orientation, motion)
+        self._errors.set_tilt_and_velocity_std(self._alignment.std(self._gravity_norm), velocity_std)
 
     def _usable(self, verdict: Verdict) -> tuple[bool, bool]:
         """Return whether gyroscope and accelerometer can be used: repeated values can, unless they contradict each other."""
@@ -209,7 +248,7 @@ class OrientationFilter:
         options = self.options
         extra_tilt = extra_velocity = 0.0
         x, y, z = gyro if gyro_usable else self._bias
-        if self._period and dt > MISSED_PERIODS * self._period:
+        if self._is_gap(dt):
             # The missing samples are replaced by the mean of the rates around them; its uncertainty is their difference.
             a, b, c = self._last_gyro
             x, y, z = 0.5 * (x + a), 0.5 * (y + b), 0.5 * (z + c)

@@ -70,19 +70,25 @@ class RateScale:
 
     def findings(self) -> list[Finding]:
         """Return whether the rates are wrong by 2."""
-        likely = self._likelihood()
-        found = min(likely, key=lambda name: likely[name]) if likely else "same"
-        if found not in ("half", "double") or likely["same"] < chance_square(self._degrees):
+        left = self._left()
+        if len(left) != 1 or left == ["same"]:
             return []
-        text = f"the turns by the gyroscope are {'twice' if found == 'half' else 'half'} those by the accelerometer"
+        text = f"the turns by the gyroscope are {'twice' if left == ['half'] else 'half'} those by the accelerometer"
         return [Finding("rate", f"{text}: the sample rate or the gyroscope's scale is wrong by 2")]
 
     def unknown(self) -> list[str]:
         """Return what the motion does not show, a sentence each."""
-        likely = self._likelihood()
-        if likely and sum(likely[name] >= chance_square(self._degrees) for name in ("half", "same", "double")) >= 2:
+        if len(self._left()) == 1:
             return []
         return ["the motion does not show whether the sample rate or the gyroscope's scale is wrong by 2"]
+
+    def _left(self) -> list[str]:
+        """Return which of the right scale and those wrong by 2 the motion does not exclude.
+
+        The likeliest scale may lie between two of them: other errors of the rates shift it.
+        """
+        likely = self._likelihood()
+        return [name for name in ("half", "same", "double") if not likely or likely[name] < chance_square(self._degrees)]
 
     def _likelihood(self) -> dict[str, float]:
         """Return minus twice the logarithm of the likelihood of each scale, beyond that of the likeliest."""

@@ -17,6 +17,8 @@ MOVING = 2.0  # ratio of lengths that motion explains
 STEADY_LENGTH = 0.7  # lowest tenth of the lengths in motion over their median: with gravity 0.8 and more, without it 0.4 to 0.6
 UNCALIBRATED = 0.1  # m/s^2
 DRIFT = math.radians(0.15)  # rad/s
+TOGETHER = 5  # windows of which a mean rate is taken
+MEANS = 3  # at least, from which the bias drifts
 KEPT = 400  # windows
 UNITS = {"g": 1.0, "milli-g": 1000.0, "cm/s^2": 100.0 * STANDARD_GRAVITY}  # length of gravity in units that are not m/s^2
 UPSIDE_DOWN = math.cos(math.radians(15.0))
@@ -88,9 +90,10 @@ class Resting:
         return [Finding("accel_unit", text, fatal=True)]
 
     def _of_bias(self) -> list[Finding]:
-        if len(self._bias) < 20:
+        count = len(self._bias) // TOGETHER
+        if count < MEANS:
             return []
-        means = np.array([np.mean(self._bias[i : i + 5], axis=0) for i in range(0, len(self._bias) - 4, 5)])
+        means = np.array(self._bias[: count * TOGETHER]).reshape(count, TOGETHER, 3).mean(axis=1)
         drift = float(np.abs(means - means[0]).max())
         if drift <= DRIFT:
             return []

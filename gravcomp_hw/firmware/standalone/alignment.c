@@ -1,0 +1,99 @@
+#include "alignment.h"
+
+#include "../core/maths.h"
+#include "../core/memory.h"
+#include "quaternion.h"
+
+#define GC_LONGEST 5.0f               // s
+#define GC_SURE 0.0349065850f         // rad
+#define GC_START_STD 0.0872664626f    // rad
+#define GC_LARGEST_STD 1.57079633f    // rad
+#define GC_LOST 0.174532925f          // rad
+#define GC_SWING 0.3f                 // s
+#define GC_MEMORY 1.0f                // s
+
+static float squared(float x) { return x * x; }
+
+static float square_of(const float *v) { return (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]; }
+
+bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after) {
+  const float unseen = 0.5f * gap * gc_min(1.0f, gap / GC_SWING);  // in a short gap the rate changes evenly
+  return unseen * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
+}
+
+void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity) {
+  const float gain = dt / (GC_MEMORY + dt);
+  alignment->turning += gain * (square_of(rate) - alignment->turning);
+  alignment->shaken += gain * (squared(gc_sqrt(square_of(force)) / gravity - 1.0f) - alignment->shaken);
+}
+
+void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity) {
+  const float turning = alignment->turning;
+  const float shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
+  gc_zero(alignment, sizeof *alignment);
+  alignment->active = true;
+  alignment->turning = turning;
+  alignment->shaken = shaken;
+}
+
+// Write the slope (3,) of the line that fits the velocity best, m/s^2.
+static void slope_of(const gc_alignment *alignment, float *slope) {
+  const float t = alignment->elapsed;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    slope[i] = 12.0f * (alignment->moment[i] - 0.5f * t * alignment->sum[i]) / (t * t * t);
+  }
+}
+
+// Return the mean square of the velocity's distance from the line, (m/s)^2.
+static float scatter_of(const gc_alignment *alignment) {
+  const float t = alignment->elapsed;
+  float slope[3];
+  slope_of(alignment, slope);
+  const float on_line = square_of(alignment->sum) / (t * t) + square_of(slope) * t * t / 12.0f;
+  return gc_max(0.0f, alignment->square / t - on_line);
+}
+
+void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float *up) {
+  const gc_quaternion turn = gc_quaternion_exponential(-rate[0] * dt, -rate[1] * dt, -rate[2] * dt);
+  const float middle = alignment->elapsed + 0.5f * dt;
+  float mean[3], slope[3];
+  gc_quaternion_rotate(turn, alignment->velocity, alignment->velocity);
+  gc_quaternion_rotate(turn, alignment->sum, alignment->sum);
+  gc_quaternion_rotate(turn, alignment->moment, alignment->moment);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    mean[i] = alignment->velocity[i] + 0.5f * force[i] * dt;
+    alignment->velocity[i] += force[i] * dt;
+    alignment->sum[i] += mean[i] * dt;
+    alignment->moment[i] += middle * mean[i] * dt;
+  }
+  alignment->square += dt * square_of(mean);
+  alignment->elapsed += dt;
+  alignment->active = alignment->elapsed < GC_LONGEST && gc_alignment_std(alignment, gravity) > GC_SURE;
+  // Within a swing of the motion the mean is surer than the slope.
+  const float share = gc_clamp(0.5f * (alignment->elapsed / GC_SWING - 1.0f), 0.0f, 1.0f);
+  slope_of(alignment, slope);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    up[i] = share * slope[i] + (1.0f - share) * alignment->velocity[i] / alignment->elapsed;
+  }
+}
+
+float gc_alignment_motion(const gc_alignment *alignment, float *velocity) {
+  const float t = alignment->elapsed;
+  float slope[3];
+  slope_of(alignment, slope);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    velocity[i] = alignment->velocity[i] - alignment->sum[i] / t - 0.5f * t * slope[i];
+  }
+  return 2.0f * gc_sqrt(scatter_of(alignment) / (1.0f + t / GC_SWING));
+}
+
+float gc_alignment_std(const gc_alignment *alignment, float gravity) {
+  const float t = alignment->elapsed, at_rest = gc_sqrt(squared(GC_START_STD) + alignment->shaken);
+  if (!(t > 0.0f)) {
+    return gc_min(at_rest, GC_LARGEST_STD);
+  }
+  const float before = alignment->shaken * squared(GC_SWING * gravity) * GC_SWING / (GC_SWING + t);
+  const float by_motion = gc_sqrt(12.0f * (scatter_of(alignment) + before) / (1.0f + t / GC_SWING)) / (gravity * t);
+  const float least = t > GC_SWING ? GC_START_STD * GC_SWING / t : at_rest;
+  return gc_min(gc_max(by_motion, least), GC_LARGEST_STD);
+}

@@ -1,0 +1,35 @@
+// Inclination after a start or missing samples, from the velocity since then (src/gravcomp/orientation/alignment.py).
+#ifndef GC_ALIGNMENT_H
+#define GC_ALIGNMENT_H
+
+#include <stdbool.h>
+
+// Vectors are in the sensor's frame of the newest sample. Zero is the state before the first sample.
+typedef struct {
+  bool active;
+  float turning;                        // mean square of the rate, (rad/s)^2
+  float shaken;                         // mean square of the specific force's length beyond g, of g
+  float elapsed;                        // s, t
+  float velocity[3], sum[3], moment[3]; // v in m/s; the integrals of v dt and of t v dt
+  float square;                         // integral of v^2 dt
+} gc_alignment;
+
+// Whether the sensor may have turned too far, other than the rates around it (rad/s) show, in a gap (s) to bridge it.
+bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after);
+
+// Follow the motion over dt s: rate (3,) in rad/s without bias, specific force (3,) in m/s^2.
+void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity);
+
+// Begin with the first specific force (3,) after a gap.
+void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity);
+
+// Take a sample dt s after the last one; write a vector (3,) that points up.
+void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float *up);
+
+// Write the newest velocity (3,) beyond the line in m/s; returns its standard deviation on each axis.
+float gc_alignment_motion(const gc_alignment *alignment, float *velocity);
+
+// Return the standard deviation of the inclination about each horizontal axis, rad.
+float gc_alignment_std(const gc_alignment *alignment, float gravity);
+
+#endif
