@@ -84,7 +84,7 @@ class FemSimulator(ManagedNode):
         points = len(self.robot_file.robot.effectors.backbone_station)
         self._chain_names = joint_names(self.parameters.joint_prefix, points)
         self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
-        self._loads = LoadInputs(self, self.robot_file.robot, self.parameters)
+        self._loads = LoadInputs(self, self.robot_file.robot, self.parameters, self._simulator.model, scene)
 
     def activate(self) -> None:
         """Reset the simulator and subscribe."""

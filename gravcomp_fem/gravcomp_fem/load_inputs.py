@@ -15,10 +15,12 @@ from std_srvs.srv import Trigger
 
 from gravcomp.description import Robot
 from gravcomp.external_loads import LivePayload, WrenchInput
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
-from gravcomp.load_estimation import LoadEstimate, LoadObserver
+from gravcomp.load_estimation import LoadEstimate, LoadObserver, anchored_model
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.scene.scene import Scene
 from gravcomp.simulation import DynamicSimulator, Shape, Simulator
 from gravcomp_fem.conversion import doubles, seconds, vector_of
 from gravcomp_msgs.msg import WrenchEstimate
@@ -30,8 +32,16 @@ _COMPLIANCE_EVERY = 10  # samples between two computations of the tip's complian
 class LoadInputs:
     """The loads of `node`'s robot."""
 
-    def __init__(self, node: LifecycleNode, robot: Robot, parameters: FemSimulatorParameters):
-        self._node, self._robot = node, robot
+    def __init__(
+        self,
+        node: LifecycleNode,
+        robot: Robot,
+        parameters: FemSimulatorParameters,
+        model: RobotModel,
+        scene: Scene | None,
+    ):
+        """model: of the robot, as the simulator has it; scene: what it touches."""
+        self._node, self._robot, self._model, self._scene = node, robot, model, scene
         self._frames = parameters.base_frame, parameters.tip_frame
         self.payload = LivePayload(robot, parameters.external.ramp_time)
         self._publisher = node.create_publisher(WrenchEstimate, "estimated/wrench", SENSOR)
@@ -57,7 +67,9 @@ class LoadInputs:
         self._wrenches = WrenchInput(self._robot, parameters.external, *self._frames)
 
     def _begin_observer(self, parameters: FemSimulatorParameters) -> None:
-        self._observer = None if parameters.load.kind == "none" else LoadObserver(self._robot, parameters.load)
+        self._observer, kind = None, parameters.load.kind
+        if kind != "none":
+            self._observer = LoadObserver(self._robot, parameters.load, anchored_model(self._model, kind, self._scene))
         self._samples, self._compliance = 0, np.zeros((3, 3))
 
     def begin(self) -> None:
@@ -99,20 +111,26 @@ class LoadInputs:
         wound: np.ndarray | None,
     ) -> None:
         """Compare a shape with what is measured, and publish the estimate."""
-        if self._observer is None or not shape.is_equilibrium:
+        if self._observer is None:
             return
         stamp = seconds(header)
+        # Wrenches that are known are part of the model; the observer looks for what is missing.
+        if not self._observer.follow(stamp, shape, wound, self._observer.without(carried)):
+            if not shape.is_equilibrium or not self._has_compliance(simulator):
+                return
+            self._observer.predict(stamp, shape, self._compliance, self._observer.carries(carried), wound)
+        if self._publisher.get_subscription_count():
+            self._publisher.publish(_message(header, self._observer.estimate(shape.gravity, stamp)))
+
+    def _has_compliance(self, simulator: Simulator | DynamicSimulator) -> bool:
+        """Renew the tip's compliance occasionally; return False where the shape is not stable."""
         if self._samples % _COMPLIANCE_EVERY == 0:
             try:
                 self._compliance = simulator.tip_compliance()
             except NotPositiveDefinite:
-                return
+                return False
         self._samples += 1
-        # Wrenches that are known are part of the model; the observer looks for what is missing.
-        unknown = self._observer.carries(carried)
-        self._observer.predict(stamp, shape, self._compliance, unknown, wound)
-        if self._publisher.get_subscription_count():
-            self._publisher.publish(_message(header, self._observer.estimate(shape.gravity, stamp)))
+        return True
 
     def report(self, gravity: np.ndarray, stamp: float) -> tuple[str, dict[str, Any]]:
         """Return what the user has to know, empty while all is well, and the values for /diagnostics."""

@@ -35,7 +35,7 @@ from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParamete
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import Command, InverseController, Target
 from gravcomp.inverse.limits import within_limits
-from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver
+from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver, anchored_model
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
@@ -120,7 +120,10 @@ class ClosedLoop:
         self.observer = TipObserver(setup.robot, setup.controller.tracker)
         limits = setup.robot.limits
         self._cells = None if cells is None else VirtualLoadCells(cells, limits.tension_max, setup.seed)
-        self._load = None if load is None else LoadObserver(setup.robot, load)
+        self._load = None
+        if load is not None:
+            kind = load.kind if tracker is not None else "none"
+            self._load = LoadObserver(setup.robot, load, anchored_model(self._simulator.model, kind, setup.modelled_scene))
         self._tip_compliance: np.ndarray | None = None
         self._target: Target | None = None
         self._weightless = False
@@ -275,8 +278,17 @@ class ClosedLoop:
 
     def _observe_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
         """Pass the shape, its wrench, the winches' displacements (m,) and the load cells' tensions to the observer."""
-        if self._load is None or not shape.is_equilibrium:
+        if self._load is None:
             return
+        if not self._load.follow(self.time, shape, wound) and shape.is_equilibrium:
+            self._predict_load(shape, carried, wound)
+        measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
+        if measured is not None:
+            self._load.measure_tensions(self.time, measured)
+
+    def _predict_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
+        """Let the observer expect tip and tensions of the simulator's shape."""
+        assert self._load is not None
         if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < SAMPLE_PERIOD / _BUS_STEP:
             try:
                 self._tip_compliance = self._simulator.tip_compliance()
@@ -284,9 +296,6 @@ class ClosedLoop:
                 return
         force = np.zeros(3) if carried is None else carried.force
         self._load.predict(self.time, shape, self._tip_compliance, force, wound)
-        measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
-        if measured is not None:
-            self._load.measure_tensions(self.time, measured)
 
     def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         free = shape.response.displacement_free - self._release_slack

@@ -11,7 +11,7 @@ import numpy as np
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.tracking import StaticTracker
-from gravcomp.full_model.wrench import PointLoads, Wrench
+from gravcomp.full_model.wrench import Load, PointLoads
 
 # Parts of the load in which it is applied where an obstacle has friction.
 _RUBBING_PART = 0.1
@@ -23,7 +23,7 @@ class StaticSolver(StaticTracker):
     """Finds equilibria of a model and tracks them."""
 
     def solve(
-        self, gravity: np.ndarray, cables: CableInput, parts: int = 64, wrench: Wrench | tuple[Wrench, ...] | None = None
+        self, gravity: np.ndarray, cables: CableInput, parts: int = 64, wrench: Load | tuple[Load, ...] | None = None
     ) -> Equilibrium:
         """Return the equilibrium under gravity (3,), the cables' input and point loads.
 

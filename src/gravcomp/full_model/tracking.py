@@ -24,6 +24,7 @@ from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.payload import with_payload
+from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.turning_loads import TurningFactor, add_symmetric_part, slopes_of
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix, NotPositiveDefinite
@@ -74,6 +75,7 @@ class StaticTracker:
     def reset(self) -> None:
         """Return to the straight robot without tension."""
         self._contained: list[np.ndarray] = []  # of the loads that turn, in the last factor
+        self._springs: tuple[tuple[float, ...], ...] = ()  # that the kept factor holds, see `_Load.springs`
         self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
         self._before: np.ndarray | None = None  # displacements (n, 3) of the equilibrium before the current one
         count = self.model.tendons.count
@@ -113,8 +115,9 @@ class StaticTracker:
             iterations *= _MORE_IN_CONTACT
         loads = with_payload(self.model, gravity / fraction, loads)
         load = _Load(self.model.weight(gravity), loads, fraction)
-        if load.turns:
+        if load.turns or load.springs != self._springs:
             self._kept = None  # it may be of other loads
+        self._springs = load.springs
         origin: np.ndarray | None = None
         finer = 1e-3 if exact else 1.0
         while not state.converged and state.iterations < iterations:
@@ -140,14 +143,21 @@ class StaticTracker:
 
         Raises NotPositiveDefinite where the state is not stable.
         """
-        model, state = self.model, self.state
+        return self.compliance(np.kron(self.model.section_rows(1.0)[0, : self.model.n_free, None], np.eye(3)))
+
+    def compliance(self, pulls: np.ndarray, loads: PointLoads | None = None) -> np.ndarray:
+        """Return pulls^T A^-1 pulls for forces on the unknowns, the columns of `pulls` (3 n_free, k), at the present state.
+
+        loads: those that turn or come from springs change A. Raises NotPositiveDefinite where the state is not stable.
+        """
+        model, state, load = self.model, self.state, _Load(np.zeros(0), loads, 1.0)
         self._kept = None
         self._matrix.values[:] = 0.0
         model.elements.assemble(state.u, self._matrix, self.viscous)
         if state.tension.any():
             model.tendons.add_stiffness(state.tendons, state.tension, self._matrix)
-        pulls = np.kron(model.section_rows(1.0)[0, : model.n_free, None], np.eye(3))
-        compliance: np.ndarray = pulls.T @ self._matrix.factor().solve(pulls)
+        contained = load.add_to_tangent(self._matrix, state.u)
+        compliance: np.ndarray = pulls.T @ load.turned(self._matrix.factor(), state.u, contained).solve(pulls)
         return compliance
 
     def _newton_step(
@@ -370,7 +380,15 @@ class _Load:
     @property
     def turns(self) -> bool:
         """Whether a part of the load turns with its section."""
-        return self._loads is not None and bool(self._loads.turning)
+        return self._loads is not None and any(not isinstance(one, Spring) for one, _ in self._loads.turning)
+
+    @property
+    def springs(self) -> tuple[tuple[float, ...], ...]:
+        """Fraction of the load, station and stiffness of each spring."""
+        if self._loads is None:
+            return ()
+        springs = (one for one, _ in self._loads.turning if isinstance(one, Spring))
+        return tuple((self._fraction, one.station, *one.stiffness) for one in springs)
 
     def add_to_tangent(self, matrix: BlockMatrix, u: np.ndarray) -> list[np.ndarray]:
         """Add to the stiffness what is symmetric of the loads that turn, at u (n, 3), and return it."""
@@ -382,4 +400,7 @@ class _Load:
         """Return the factor with the rest of what loads that turn add to the tangent at u (n, 3); contained: in the factor."""
         if self._loads is None or not self._loads.turning:
             return factor
-        return TurningFactor(factor, self._loads, slopes_of(self._loads, u, self._fraction), contained)
+        slopes = slopes_of(self._loads, u, self._fraction)
+        if len(contained) == len(slopes) and all(np.array_equal(h, j) for h, j in zip(contained, slopes)):
+            return factor
+        return TurningFactor(factor, self._loads, slopes, contained)

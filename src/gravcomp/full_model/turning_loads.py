@@ -1,4 +1,4 @@
-"""Newton's tangent with loads that turn with their sections.
+"""Newton's tangent with loads that turn with their sections, or that springs bring.
 
 Such a load depends on the unknowns only by s = (p, f_1, f_2) of its section, s = S u, so its part of the tangent has a low rank:
 
@@ -12,6 +12,7 @@ definite. The factor is enough for the rest (Woodbury 1950): y = y_0 + Z a, y_0 
 import numpy as np
 
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.wrench import PointLoads, Wrench
 from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix
 
@@ -49,8 +50,10 @@ def slopes_of(loads: PointLoads, u: np.ndarray, fraction: float) -> list[np.ndar
     """Return J (9, 9) of each turning load at the displacements u (n, 3), for `fraction` of the loads."""
     found = []
     for wrench, rows in loads.turning:
-        _, one, two = rows @ (loads.model.mesh.nodes + u)
-        found.append(fraction * _slopes(wrench, one, two))
+        if isinstance(wrench, Spring):
+            found.append(fraction * wrench.slopes)
+        else:
+            found.append(fraction * _slopes(wrench, *(rows @ (loads.model.mesh.nodes + u))))
     return found
 
 
@@ -74,13 +77,14 @@ def _add(matrix: BlockMatrix, model: MeshedModel, rows: np.ndarray, part: np.nda
     return part
 
 
-def _slopes(wrench: Wrench, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+def _slopes(wrench: Wrench, place: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
     """Return the derivatives (9, 9) of the forces on p, f_1 and f_2 by p, f_1 and f_2."""
     start = np.concatenate([one, two])
     step = _SMALL * float(np.linalg.norm(one))
     slopes = np.zeros((9, 9))
     for column in range(6):
-        change = step * np.eye(6)[column]
-        ahead, behind = start + change, start - change
-        slopes[:, 3 + column] = (wrench.pulls(ahead[:3], ahead[3:]) - wrench.pulls(behind[:3], behind[3:])).ravel() / (2.0 * step)
+        part = step * np.eye(6)[column]
+        ahead, behind = start + part, start - part
+        change = wrench.pulls(place, ahead[:3], ahead[3:]) - wrench.pulls(place, behind[:3], behind[3:])
+        slopes[:, 3 + column] = change.ravel() / (2.0 * step)
     return slopes

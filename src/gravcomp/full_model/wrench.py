@@ -13,6 +13,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.spring import Spring
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,8 +44,8 @@ class Wrench:
         """Whether its forces on the nodes do not depend on the shape."""
         return not (self.moment.any() or self.follower or self.lever.any())
 
-    def pulls(self, one: np.ndarray, two: np.ndarray) -> np.ndarray:
-        """Return the forces (3, 3) on p, f_1 and f_2 of its section, where f_1 is `one` (3,) and f_2 is `two` (3,)."""
+    def pulls(self, place: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+        """Return the forces (3, 3) on p, f_1 and f_2 of its section: p is `place` (3,), f_1 `one` (3,) and f_2 `two` (3,)."""
         if self.constant:
             return np.array([self.force, np.zeros(3), np.zeros(3)])
         d = np.cross(one, two)
@@ -61,27 +62,32 @@ class Wrench:
         )
 
 
-class PointLoads:
-    """The loads of some wrenches on a model. turning: those that depend on the shape, with the rows of `section_rows`."""
+Load = Wrench | Spring
 
-    def __init__(self, model: MeshedModel, wrenches: tuple[Wrench, ...]):
+
+class PointLoads:
+    """The loads of some wrenches and springs on a model.
+
+    turning: those that depend on the shape, with the rows of `section_rows`.
+    """
+
+    def __init__(self, model: MeshedModel, wrenches: tuple[Load, ...]):
         self.model = model
         self._rows = [model.section_rows(wrench.station) for wrench in wrenches]
         self.wrenches = wrenches
         self.turning = [(wrench, rows) for wrench, rows in zip(wrenches, self._rows) if not wrench.constant]
 
     @staticmethod
-    def of(model: MeshedModel, wrench: "Wrench | tuple[Wrench, ...] | None") -> "PointLoads | None":
+    def of(model: MeshedModel, wrench: Load | tuple[Load, ...] | None) -> "PointLoads | None":
         """Return the loads of one wrench or several; None without any."""
-        wrenches = (wrench,) if isinstance(wrench, Wrench) else wrench
+        wrenches = wrench if isinstance(wrench, tuple) or wrench is None else (wrench,)
         return PointLoads(model, tuple(wrenches)) if wrenches else None
 
     def at(self, u: np.ndarray, fraction: float = 1.0) -> np.ndarray:
         """Return the forces (3 n_free,) in N on the unknowns at the displacements u (n, 3), `fraction` of the whole load."""
         load = np.zeros_like(u)
         for wrench, rows in zip(self.wrenches, self._rows):
-            _, one, two = rows @ (self.model.mesh.nodes + u)
-            load += rows.T @ wrench.pulls(one, two)
+            load += rows.T @ wrench.pulls(*(rows @ (self.model.mesh.nodes + u)))
         return fraction * self.model.free(load)
 
 

@@ -1,6 +1,8 @@
 """The external force on the tip, or a payload of unknown mass, from measured tips and cable tensions."""
 
-from gravcomp.load_estimation.observer import LoadEstimate, LoadObserver
+from gravcomp.load_estimation.anchored_model import AnchoredModel, anchored_model
+from gravcomp.load_estimation.estimate import LoadEstimate
+from gravcomp.load_estimation.observer import LoadObserver
 from gravcomp.load_estimation.options import LoadEstimationOptions
 
-__all__ = ["LoadEstimate", "LoadEstimationOptions", "LoadObserver"]
+__all__ = ["AnchoredModel", "LoadEstimate", "LoadEstimationOptions", "LoadObserver", "anchored_model"]

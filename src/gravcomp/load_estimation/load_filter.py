@@ -66,16 +66,16 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(self, elapsed: float, deviation: float, time: float, tension_change: np.ndarray) -> None:
+    def diffuse(self, elapsed: float, around: np.ndarray, deviation: float, time: float, tension_change: np.ndarray) -> None:
         """Let what walks walk, for `elapsed` s.
 
-        The load forgets what it was within `time` s and is then anything of this standard deviation around 0, so that what no
-        sensor sees of it stays bounded. tension_change (m,) N: since the last call.
+        The load forgets what it was within `time` s and is then anything of this standard deviation around a load (k,), so that
+        what no sensor sees of it stays bounded. tension_change (m,) N: since the last call.
         """
         k, m = self._k, self._m
         step = np.zeros(len(self.state))
         kept = np.exp(-elapsed / time)
-        self.state[:k] *= kept
+        self.state[:k] = around + kept * (self.state[:k] - around)
         self.covariance[:k] *= kept
         self.covariance[:, :k] *= kept
         step[:k] = (1.0 - kept**2) * deviation**2

@@ -1,5 +1,6 @@
 """The observer: compares tips and tensions with the model that carries the load estimated so far, and improves the estimate.
 
+    observer.follow(stamp, shape, wound, known)              # the model whose tip is held where it was measured; without it
     observer.predict(stamp, shape, tip_compliance, carried, wound)   # each shape of the model, and the force that it carries
     observer.zero(now)                                        # the robot carries nothing now: what differs is the model's error
     observer.measure_tip(stamp, position), observer.measure_tensions(stamp, tensions)
@@ -7,13 +8,13 @@
     observer.estimate(gravity, now)
 
 The model that carries the estimate is nearly that of the robot: the residuals are linear in what the estimate lacks, also where
-the load bends the robot far. G. Zhang, Z. Chen, L. Wang (arXiv 2501.05418) find the shape from the tip's pose first and then the
-force from the tensions by virtual work; here both enter with their variances, gravity and the model's errors are part of it, and
-either sensor alone is enough.
+the load bends the robot far. Where the running model's tip is far from the measured one, an `AnchoredModel` takes over for a
+force: it has an equilibrium whatever the force is. G. Zhang, Z. Chen, L. Wang (arXiv 2501.05418) find the shape from the tip's
+pose first and then the force from the tensions by virtual work; here both enter with their variances, gravity and the model's
+errors are part of it, and either sensor alone is enough.
 """
 
 import collections
-import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ from gravcomp.description import Robot
 from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
+from gravcomp.load_estimation.anchored_model import AnchoredModel
+from gravcomp.load_estimation.estimate import LoadEstimate
 from gravcomp.load_estimation.load_filter import LoadFilter
 from gravcomp.load_estimation.options import LoadEstimationOptions
 from gravcomp.load_estimation.sensitivity import HeldRobot
@@ -32,34 +35,11 @@ from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _KEPT = 2.0  # s of predictions, for measurements that arrive late
 _APART = 0.1  # s, farthest of a measurement from the predictions: without an equilibrium the model has no new ones
-_INTERVAL = 1.96  # standard deviations of an interval of 95 %
 # Squared Mahalanobis distance of an outlier: 1 in 10000 good measurements is farther (chi-square, 3 and about 6 numbers).
 _GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
 _OUTLIERS = 6  # in a row: then it is the load that has changed
+_REACH = 1.2  # lengths of the robot from its base: a tip that is measured beyond is none
 _CONSTANT = 1e5  # s: a payload changes at once or not at all
-
-
-@dataclasses.dataclass(frozen=True)
-class LoadEstimate:
-    """The load at the tip.
-
-    force (3,) in N in soft_base, with covariance (3, 3); mass in kg and its standard deviation, for a payload; zeroed: the
-    model's errors were measured without load; sources: what was measured lately; sentence: what the user has to know, empty while
-    all is well.
-    """
-
-    force: np.ndarray
-    covariance: np.ndarray
-    mass: float
-    mass_std: float
-    zeroed: bool
-    sources: tuple[str, ...]
-    sentence: str
-
-    @property
-    def mass_interval(self) -> tuple[float, float]:
-        """The interval in kg that holds the mass in 95 of 100 cases, if the errors are as the options say."""
-        return self.mass - _INTERVAL * self.mass_std, self.mass + _INTERVAL * self.mass_std
 
 
 class _Prediction(NamedTuple):
@@ -69,13 +49,16 @@ class _Prediction(NamedTuple):
     robot: HeldRobot
     carried: np.ndarray
     gravity: np.ndarray
+    anchored: bool
 
 
 class LoadObserver:
     """Estimates the load of one robot."""
 
-    def __init__(self, robot: Robot, options: LoadEstimationOptions):
+    def __init__(self, robot: Robot, options: LoadEstimationOptions, anchored: AnchoredModel | None = None):
+        """anchored: predicts for a force while the tip is measured; None: shapes are given to `predict` only."""
         self._robot, self.options = robot, options
+        self._anchored = anchored if options.kind == "force" else None
         self._rest_tip = rest_tip(robot)[0]
         self.reset()
 
@@ -92,20 +75,50 @@ class LoadObserver:
         self._outliers: dict[str, int] = {}
         self._sentence = ""
         self._last_wrench: Wrench | None = None
+        self._anchored_at, self._followed_at = -np.inf, -np.inf
+        if self._anchored is not None:
+            self._anchored.reset()
 
     @property
     def _numbers(self) -> int:
         return 1 if self.options.kind == "payload" else 3
 
+    def follow(self, stamp: float, shape: Shape, wound: np.ndarray | None, known: tuple[Wrench, ...] = ()) -> bool:
+        """Predict with the model whose tip is held where it was measured, if `shape` of the running model is far from there.
+
+        False: that shape predicts, if it is an equilibrium. wound (m,) in m as in `predict`; known wrenches act in addition.
+        """
+        if self._anchored is None or self._filter is None or wound is None:
+            return False
+        if stamp - self._anchored_at > self.options.stale_after:
+            return False
+        if shape.is_equilibrium and not self._anchored.is_off(shape.tip_position):
+            return False
+        elapsed = stamp - self._followed_at
+        found = self._anchored.step(shape.gravity, wound, known, elapsed if 0.0 < elapsed <= _KEPT else None)
+        self._followed_at = stamp
+        if found is None:  # it is on its way to the tip
+            return True
+        self.predict(stamp, found.shape, found.tip_compliance, found.carried, wound, found.by_loads)
+        return True
+
     def predict(
-        self, stamp: float, shape: Shape, tip_compliance: np.ndarray, carried: np.ndarray, wound: np.ndarray | None
+        self,
+        stamp: float,
+        shape: Shape,
+        tip_compliance: np.ndarray,
+        carried: np.ndarray,
+        wound: np.ndarray | None,
+        by_loads: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         """Remember a shape of the model: stamp in s, compliance (3, 3) m/N of the tip, and the force (3,) N that it carries.
 
-        wound (m,) m: displacements that its winches hold, None: released.
+        wound (m,) m: displacements that its winches hold, None: released; by_loads: of a shape whose tip is held where it was
+        measured, see `HeldRobot`.
         """
-        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip)
-        self._history.append(_Prediction(stamp, shape.tip_position, shape.cable_tension, robot, carried, shape.gravity))
+        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip, by_loads)
+        tip, tension = shape.tip_position, shape.cable_tension
+        self._history.append(_Prediction(stamp, tip, tension, robot, carried, shape.gravity, by_loads is not None))
         while self._history[0].stamp < stamp - _KEPT:
             self._history.popleft()
         if self._filter is None:
@@ -134,8 +147,14 @@ class LoadObserver:
         then = self._at(stamp)
         if then is None or self._filter is None or not np.isfinite(position).all():
             return
+        if self._anchored is not None and np.linalg.norm(position) < _REACH * self._robot.length:
+            self._anchored.anchor(position)
+            self._anchored_at = stamp
+            reach = self._anchored.near if then.anchored else self._anchored.far
+            if np.linalg.norm(position - then.tip) > reach:  # the anchored model comes to it first
+                return
         self._diffuse(then)
-        moved = then.tip - self._behind(then).tip
+        moved, _ = self._moved(then)
         direction = self._direction(then.gravity)
         self._take(
             "tip", then, lambda one: one.take_tip(position - then.tip, then.robot, direction, then.carried, moved), _GATE_TIP
@@ -150,7 +169,7 @@ class LoadObserver:
         if self._sentence:
             return
         self._diffuse(then)
-        moved = then.tension - self._behind(then).tension
+        _, moved = self._moved(then)
         residual, direction = tension - then.tension, self._direction(then.gravity)
         self._take(
             "tensions",
@@ -164,6 +183,8 @@ class LoadObserver:
         if self._filter is None or not self.options.compensate or not self._released:
             return None
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
+        if self._history[-1].anchored:  # the running model would lose its equilibrium under what has pushed the robot so far
+            wanted = np.zeros(self._numbers)
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
@@ -176,6 +197,10 @@ class LoadObserver:
     def carries(self, wrenches: tuple[Wrench, ...]) -> np.ndarray:
         """Return the force (3,) in N of the last one of a model's wrenches if it is that of `wrench`, else zeros."""
         return wrenches[-1].force if wrenches and self._last_wrench is wrenches[-1] else np.zeros(3)
+
+    def without(self, wrenches: tuple[Wrench, ...]) -> tuple[Wrench, ...]:
+        """Return a model's wrenches without that of `wrench`."""
+        return tuple(one for one in wrenches if one is not self._last_wrench)
 
     def estimate(self, gravity: np.ndarray, now: float) -> LoadEstimate:
         """Return the estimate under gravity (3,) m/s^2 at `now` (s)."""
@@ -195,9 +220,12 @@ class LoadObserver:
         if self._filter is None:
             return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
         load, covariance = self._filter.load, self._filter.load_covariance
-        payload = self.options.kind == "payload"
+        payload, force = self.options.kind == "payload", direction @ load
+        if self._history and self._history[-1].anchored and sources:
+            # Far bent, friction and stretch of the cables are not those that were learnt: the force is what the tip needs.
+            force = np.mean([entry.carried for entry in self._history if entry.anchored], axis=0)
         return LoadEstimate(
-            force=direction @ load,
+            force=force,
             covariance=direction @ covariance @ direction.T,
             mass=float(load[0]) if payload else np.nan,
             mass_std=float(np.sqrt(covariance[0, 0])) if payload else np.nan,
@@ -236,13 +264,22 @@ class LoadObserver:
         """Return the prediction at which the robot may still be."""
         return self._at(max(then.stamp - self.options.lag, self._history[0].stamp)) or then
 
+    def _moved(self, then: _Prediction) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how much the robot may be behind the model: tip (3,) m and tensions (m,) N."""
+        behind = self._behind(then)
+        if then.anchored:
+            return then.robot.by_winding(behind.robot)
+        return then.tip - behind.tip, then.tension - behind.tension
+
     def _diffuse(self, then: _Prediction) -> None:
         """Let the filter forget with the time and the change of tensions since the last measurement."""
         assert self._filter is not None
         if self._last_change is not None:
             before, tension = self._last_change
             time = _CONSTANT if self.options.kind == "payload" else self.options.change_time
+            # Nothing is known of a load but that the cables hold it, or what the anchored model needs to be where it is.
+            around = then.carried if then.anchored and self._released else np.zeros(self._numbers)
             self._filter.diffuse(
-                max(0.0, then.stamp - before), self._scale if self._released else 0.0, time, then.tension - tension
+                max(0.0, then.stamp - before), around, self._scale if self._released else 0.0, time, then.tension - tension
             )
         self._last_change = then.stamp, then.tension

@@ -9,8 +9,9 @@ A load makes cables slack, and the robot is softer without them. So tensions and
 that is assumed, and the derivatives d lambda = -W_aa^-1 W_af df, de = (C - W_ea W_aa^-1 W_af) df hold for these. A weight that is
 larger by the share s_w acts like more of delta_g and e_g. A body that is more compliant by the share s_E has all three W and C
 larger by it: it keeps the tensions of a straight robot, whose cables carry its weight whatever its stiffness, and moves the tip
-as more weight does. Displacements that differ from the commanded ones by b_u (backlash, friction, line) give d lambda = W_aa^-1
-b_u and de = W_ea W_aa^-1 b_u.
+as more weight does. Where the robot is bent far this holds for the tangent: a body with less stress is out of balance by s_E of
+all forces on it, which moves tip and cables by what its compliance makes of them. Displacements that differ from the commanded
+ones by b_u (backlash, friction, line) give d lambda = W_aa^-1 b_u and de = W_ea W_aa^-1 b_u.
 """
 
 from typing import NamedTuple
@@ -43,11 +44,30 @@ class Sensitivity(NamedTuple):
 class HeldRobot:
     """The linear response of a shape whose winches hold their displacements."""
 
-    def __init__(self, shape: Shape, tip_compliance: np.ndarray, wound: np.ndarray | None, rest_tip: np.ndarray):
-        """tip_compliance (3, 3) m/N at given tensions; wound (m,) m, None: released; rest_tip (3,) m: without any load."""
+    def __init__(
+        self,
+        shape: Shape,
+        tip_compliance: np.ndarray,
+        wound: np.ndarray | None,
+        rest_tip: np.ndarray,
+        by_loads: tuple[np.ndarray, np.ndarray] | None = None,
+    ):
+        """tip_compliance (3, 3) m/N at given tensions; wound (m,) m, None: released; rest_tip (3,) m: without any load.
+
+        by_loads: what all loads but the cables move the tip (3,) m and the cables (m,) m in the shape's tangent, at given
+        tensions; None: what they have moved them from rest, which is the same where the robot is little bent.
+        """
         self._shape, self._tip_compliance = shape, tip_compliance
         self._wound = np.full(len(shape.cable_tension), np.nan) if wound is None else wound
-        self._free_tip = shape.response.effector_free[:3] - rest_tip
+        from_rest = shape.response.effector_free[:3] - rest_tip, shape.response.displacement_free
+        tip, cables = from_rest if by_loads is None else by_loads
+        self._tip_by_loads: np.ndarray = tip
+        self._cables_by_loads: np.ndarray = cables
+
+    def by_winding(self, before: "HeldRobot") -> tuple[np.ndarray, np.ndarray]:
+        """Return what the winches have changed since another shape: of the tip (3,) in m and of the tensions (m,) in N."""
+        wound, here = np.nan_to_num(self._wound - before._wound), self.under(np.zeros(3))
+        return here.tip_cables @ wound, here.tension_cables @ wound
 
     def under(self, force: np.ndarray) -> Sensitivity:
         """Return what another force (3,) in N than the model's changes."""
@@ -63,13 +83,13 @@ class HeldRobot:
             inverse = np.linalg.pinv(compliance[np.ix_(taut, taut)], rcond=1e-9)
             cables[np.ix_(taut, taut)] = inverse
             by_force[taut] = -inverse @ to_tip[:, taut].T
-            weight[taut] = -inverse @ (response.displacement_free + to_tip.T @ force)[taut]
+            weight[taut] = -inverse @ (self._cables_by_loads + to_tip.T @ force)[taut]
             stiffness[taut] = weight[taut] - tension[taut]
         return Sensitivity(
             tip=self._tip_compliance @ force + to_tip @ (tension - before),
             tension=tension - before,
             tip_force=self._tip_compliance + to_tip @ by_force,
-            tip_error=self._free_tip + self._tip_compliance @ force + to_tip @ weight,
+            tip_error=self._tip_by_loads + self._tip_compliance @ force + to_tip @ weight,
             tip_cables=to_tip @ cables,
             tension_force=by_force,
             tension_stiffness=stiffness,

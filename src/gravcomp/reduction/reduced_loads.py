@@ -20,8 +20,7 @@ class ReducedLoads:
         force = np.zeros_like(q)
         for wrench in loads.wrenches:
             rest, change = self._section(wrench.station)
-            _, one, two = rest + change @ q
-            force += np.einsum("vi,vir->r", wrench.pulls(one, two), change)
+            force += np.einsum("vi,vir->r", wrench.pulls(*(rest + change @ q)), change)
         return force
 
     def _section(self, station: float) -> tuple[np.ndarray, np.ndarray]:

@@ -19,7 +19,7 @@ from gravcomp.full_model.linear_response import observed
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
-from gravcomp.full_model.wrench import PointLoads, Wrench
+from gravcomp.full_model.wrench import Load, PointLoads
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Simulator:
         displacement: np.ndarray | None = None,
         tension: np.ndarray | None = None,
         duration: float | None = None,
-        wrench: Wrench | tuple[Wrench, ...] | None = None,
+        wrench: Load | tuple[Load, ...] | None = None,
     ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
@@ -166,7 +166,7 @@ class Simulator:
         gravity: np.ndarray,
         displacement: np.ndarray | None = None,
         tension: np.ndarray | None = None,
-        wrench: Wrench | tuple[Wrench, ...] | None = None,
+        wrench: Load | tuple[Load, ...] | None = None,
     ) -> Shape:
         """Return the equilibrium found from the straight robot, independent of all earlier shapes.
 

@@ -48,7 +48,8 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     kind = "payload" if case.force is None else "force"
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
     share = _BRIEF if case.brief else 1.0
-    options = LoadEstimationOptions(kind=kind)
+    # A force that pushes the robot far cannot be compensated, and one that comes suddenly is not known soon enough.
+    options = LoadEstimationOptions(kind=kind, compensate=case.force is None)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = rest_target(setup.robot, tip_direction_weight=setup.direction_weight)
     loop.hold(target)
