@@ -12,6 +12,7 @@ from gravcomp.calibration.mapping import Mapping, load_mapping
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.pose_fit import MODULUS, PosePriors, base_unknowns, fit_poses, held_out
+from gravcomp.calibration.pose_intervals import design_effect, not_shown
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
@@ -89,6 +90,39 @@ def test_a_fit_finds_the_modulus_and_the_base_and_predicts_a_pose_it_has_not_see
     assert robot_of_poses(ROBOT, fit.parameters).segments[0].material.youngs_modulus == fit.parameters.youngs_modulus
     left_out = held_out(ROBOT, poses, (MODULUS,), [np.array([2])], start=np.array([np.log(0.8)]))
     assert np.isnan(left_out[:2]).all() and np.isfinite(left_out[2]).all()
+
+
+def test_residuals_that_are_alike_count_once():
+    rng = np.random.default_rng(1)
+    single = rng.normal(size=(8, 4, 3))
+    assert design_effect(single) < 1.5
+    of_marker = 0.1 * single + rng.normal(size=(1, 4, 3))  # markers that are not placed as described
+    of_pose = 0.1 * single + rng.normal(size=(8, 1, 3))
+    assert design_effect(of_marker) == pytest.approx(8.0, rel=0.05)
+    assert design_effect(of_pose) == pytest.approx(4.0, rel=0.05)
+
+
+def test_what_the_poses_do_not_show_is_said():
+    prior = np.array([False, True, True])
+    names = ["modulus", "gain", "base"]
+    shown = np.diag([1e-4, 0.01, 0.04])
+    assert not not_shown(names, shown, prior)
+    (hidden,) = not_shown(names, np.diag([1e-4, 0.01, 0.9]), prior)
+    assert "hardly show base:" in hidden
+    matrix = shown.copy()
+    matrix[0, 1] = matrix[1, 0] = 0.98e-3
+    (together,) = not_shown(names, matrix, prior)
+    assert "modulus and gain together only (correlation +0.98)" in together
+
+
+def test_poses_under_the_robots_weight_alone_show_modulus_over_density():
+    poses = known_poses(np.zeros(3))
+    pulled = fit_poses(ROBOT, poses.rows([0, 1]), (MODULUS,))
+    assert not any("over density" in sentence for sentence in pulled.open)
+    hanging = fit_poses(ROBOT, poses.rows([0]), (MODULUS,))
+    assert any("over density" in sentence for sentence in hanging.open)
+    # What the model lacks is in the interval, however well the poses fit.
+    assert hanging.estimates[0].interval > 1.96 * PosePriors().stiffness * hanging.estimates[0].value
 
 
 def test_a_fit_leaves_cables_inside_the_body_and_refuses_those_that_it_cannot_move():
