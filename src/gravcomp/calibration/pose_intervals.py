@@ -1,9 +1,9 @@
 """Intervals of what is fitted to poses, and what the poses do not show.
 
-cov = (J^T J / (s^2 d) + P)^-1, with the residuals' variance s^2, the prior P, and the design effect d. Residuals of one marker are
-alike in all poses where it was not placed quite as described, and those of one pose are alike in all markers where friction or
-creep holds the body; k alike residuals count as one. With the intraclass correlation rho of groups of k residuals, by the analysis
-of variance, d = 1 + (k - 1) rho (L. Kish, Survey Sampling, 1965; B. R. Moulton, Journal of Econometrics 32, 1986).
+cov = (J^T J / (s^2 d) + P)^-1, with the residuals' variance s^2, the prior P, and the design effect d. Residuals of one marker
+are alike in all poses where it was not placed quite as described, and those of one pose are alike in all markers where friction
+or creep holds the body; k alike residuals count as one. With the intraclass correlation rho of groups of k residuals, by the
+analysis of variance, d = 1 + (k - 1) rho (L. Kish, Survey Sampling, 1965; B. R. Moulton, Journal of Econometrics 32, 1986).
 """
 
 from collections.abc import Sequence
