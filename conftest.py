@@ -13,6 +13,7 @@ those that take longest first. A test of the commands in test/ without a mark st
 
 import fcntl
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -71,6 +72,14 @@ def _own_priority():
     yield
     if os.getpriority(os.PRIO_PROCESS, 0) != before:
         os.setpriority(os.PRIO_PROCESS, 0, before)
+
+
+@pytest.fixture(autouse=True)
+def _own_output():
+    """Forget --json and --quiet of a command that a test has run in this process: the next test reads the notes."""
+    yield
+    if "gravcomp.commands.output" in sys.modules:
+        sys.modules["gravcomp.commands.output"].configure(json=False, quiet=False)
 
 
 def _mark(item: pytest.Item) -> str:
