@@ -164,6 +164,16 @@ def read(tmp_path, mapping: Mapping, table: str) -> Poses:
     return read_poses(path, mapping, ("c",))
 
 
+@pytest.mark.parametrize(("unit", "words"), [("cm", "10 times as far"), ("m", "1000 times as far")])
+def test_markers_in_another_unit_than_the_mapping_says_are_refused(tmp_path, mapping, unit, words):
+    marker = dataclasses.replace(mapping.markers[0], columns=("x", "y", "z"), unit=unit)
+    second = dataclasses.replace(marker, name="n", at=(0.0, 0.0, 0.11), columns=("a", "b", "c"))
+    table = "case,gx,gy,gz,pull_n,weight_g,x,y,z,a,b,c\nfirst,0,-9.81,0,1.5,20,-20,1,40,-20,1,110\n"
+    place = dataclasses.replace(marker, at=(0.0, 0.0, 0.04))
+    with pytest.raises(MeasurementError, match=words):
+        read(tmp_path, dataclasses.replace(mapping, markers=(place, second)), table)
+
+
 def test_a_table_is_read_in_the_frame_of_the_base(tmp_path, mapping):
     poses = read(tmp_path, mapping, TABLE)
     assert poses.name == ("first", "second")
