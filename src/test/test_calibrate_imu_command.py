@@ -55,6 +55,8 @@ def test_the_written_robot_makes_the_imu_right(recorded, capsys):
     assert main(["calibrate-imu", recorded, *ups(), "--json"]) == 0
     figures = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert len(figures["poses"]) == 6 and not figures["notes"]
+    assert "accel_calibration" not in figures["findings"]
+    assert not any("negated" in sentence for sentence in figures["not_shown"])
     assert figures["norm_error_after_m_s2"] < 0.05 * figures["norm_error_before_m_s2"]
 
     parameters, file = estimator_of("article-calibrated.yaml")
@@ -84,7 +86,8 @@ def test_one_pose_says_what_it_does_not_show(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     np.savez("flat.npz", **lying_in(SIX[:1]))
     assert main(["calibrate-imu", "flat.npz", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out.splitlines()[-1])["notes"]
+    figures = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert figures["notes"] and any("--up in three poses" in sentence for sentence in figures["not_shown"])
 
 
 def warming(monkeypatch):
@@ -124,13 +127,15 @@ def test_the_bias_over_temperature_is_learned_beyond_the_offset(tmp_path, monkey
         (["poses.npz", "--up", "0", "0", "0"], "other than zero"),
         (["poses.npz", "--bias-model", "b.json"], "contains no imu/temperature"),
         (["poses.npz", "--write", "nowhere/robot.yaml"], "cannot be written"),
-        (["in_g.npz"], "wrong unit (m/s^2 is needed)"),
+        (["in_g.npz"], "in_g.npz: the accelerometer is in g (0.997 at rest): m/s^2 is needed; convert the recording"),
+        (["negated.npz", *ups()], "negated.npz: the accelerometer is negated"),
         (["hand.npz"], "never rests"),
     ],
 )
 def test_what_cannot_be_used_is_one_sentence_and_code_2(recorded, capsys, arguments, words):
     trial = lying_in(SIX)
     np.savez("in_g.npz", **{**trial, "acc": trial["acc"] / 9.81})
+    np.savez("negated.npz", **{**trial, "acc": -trial["acc"]})
     np.savez("hand.npz", **{**trial, "gyr": trial["gyr"] + np.random.default_rng(3).normal(0, 1.0, trial["gyr"].shape)})
     assert main(["calibrate-imu", *arguments]) == 2
     error = capsys.readouterr().err

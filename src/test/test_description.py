@@ -84,6 +84,14 @@ MISTAKES = [
     (change(["body"], {"file": "a.stl", "length_mm": 100.0}), ["both of segments and body"]),
     (change(["segments"], None), ["neither of segments and body"]),
     (change(["segments", 0, "material", "density"], 1.07), ["density is 1.07", "1.07 g/cm^3 would be 1070 kg/m^3"]),
+    (
+        change(["segments", 1, "material"], {"law": "yeoh", "c20_ratio": -0.5}),
+        ["robot.segments[1].material: the law yeoh is not stable with c20_ratio: -0.5", "a sheet at a stretch of 1.18 falls"],
+    ),
+    (
+        change(["segments", 1, "cap"], {"length_mm": 2, "material": {"law": "yeoh", "c30_ratio": -0.2}}),
+        ["robot.segments[1].cap.material: the law yeoh is not stable", "from a stretch of 0.5 to 2"],
+    ),
     (change(["cables", 1, "angle_deg"], 0.0), ["'s1c1' and 's1c2' are the same line"]),
     (change(["cables", 1], BACKWARDS), ["cables[1]", "begin at z = 50 and end at 5", "farther from the base"]),
 ]

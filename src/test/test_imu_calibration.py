@@ -8,6 +8,7 @@ import pytest
 from gravcomp.orientation import quaternion as quat
 from gravcomp.orientation.calibration import fit_accelerometer, fit_gyro_offset, fit_mount
 from gravcomp.orientation.errors import CalibrationError
+from gravcomp.orientation.known_directions import show_sign
 from gravcomp.orientation.resting_poses import RestingPose, resting_poses
 from gravcomp.recordings.imu import Recording
 
@@ -44,6 +45,24 @@ def test_the_mount_is_found_from_two_poses():
 def test_poses_along_one_line_do_not_determine_the_mount():
     with pytest.raises(CalibrationError, match="one more pose"):
         fit_mount(np.array([[0, 0, 9.81], [0, 0, -9.81]]), np.array([[0, 0, 1.0], [0, 0, -1.0]]))
+
+
+@pytest.mark.parametrize("mirrored", [-np.eye(3), np.diag([1.0, -1.0, 1.0])])
+def test_a_negated_accelerometer_is_refused_where_the_poses_show_it(mirrored):
+    up = SIX[:3]
+    measured = 9.81 * up @ mirrored @ quat.matrix(quat.from_roll_pitch_yaw(0.2, -0.5, 1.1))
+    with pytest.raises(CalibrationError, match="the accelerometer is negated, or its axes are left-handed"):
+        fit_mount(measured, up)
+
+
+def test_poses_in_another_order_than_their_directions_are_refused():
+    up = np.vstack([SIX[:4], [[0.6, 0.8, 0.0]]])
+    with pytest.raises(CalibrationError, match=r"pose \d of 5 is off by \d+ deg, at most 15 deg"):
+        fit_mount(9.81 * up[[0, 1, 2, 4, 3]], up)
+
+
+def test_poses_in_one_plane_do_not_show_the_sign():
+    assert not show_sign(SIX[:2]) and not show_sign(SIX[[0, 1, 3, 4]]) and show_sign(SIX[:3])
 
 
 def test_rests_are_found_in_a_recording_and_the_same_pose_counts_once():

@@ -12,6 +12,7 @@ from gravcomp.calibration.mapping import Mapping, load_mapping
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.pose_fit import MODULUS, PosePriors, base_unknowns, fit_poses, held_out
+from gravcomp.calibration.pose_intervals import design_effect, not_shown
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
@@ -91,6 +92,39 @@ def test_a_fit_finds_the_modulus_and_the_base_and_predicts_a_pose_it_has_not_see
     assert np.isnan(left_out[:2]).all() and np.isfinite(left_out[2]).all()
 
 
+def test_residuals_that_are_alike_count_once():
+    rng = np.random.default_rng(1)
+    single = rng.normal(size=(8, 4, 3))
+    assert design_effect(single) < 1.5
+    of_marker = 0.1 * single + rng.normal(size=(1, 4, 3))  # markers that are not placed as described
+    of_pose = 0.1 * single + rng.normal(size=(8, 1, 3))
+    assert design_effect(of_marker) == pytest.approx(8.0, rel=0.05)
+    assert design_effect(of_pose) == pytest.approx(4.0, rel=0.05)
+
+
+def test_what_the_poses_do_not_show_is_said():
+    prior = np.array([False, True, True])
+    names = ["modulus", "gain", "base"]
+    shown = np.diag([1e-4, 0.01, 0.04])
+    assert not not_shown(names, shown, prior)
+    (hidden,) = not_shown(names, np.diag([1e-4, 0.01, 0.9]), prior)
+    assert "hardly show base:" in hidden
+    matrix = shown.copy()
+    matrix[0, 1] = matrix[1, 0] = 0.98e-3
+    (together,) = not_shown(names, matrix, prior)
+    assert "modulus and gain together only (correlation +0.98)" in together
+
+
+def test_poses_under_the_robots_weight_alone_show_modulus_over_density():
+    poses = known_poses(np.zeros(3))
+    pulled = fit_poses(ROBOT, poses.rows([0, 1]), (MODULUS,))
+    assert not any("over density" in sentence for sentence in pulled.open)
+    hanging = fit_poses(ROBOT, poses.rows([0]), (MODULUS,))
+    assert any("over density" in sentence for sentence in hanging.open)
+    # What the model lacks is in the interval, however well the poses fit.
+    assert hanging.estimates[0].interval > 1.96 * PosePriors().stiffness * hanging.estimates[0].value
+
+
 def test_a_fit_leaves_cables_inside_the_body_and_refuses_those_that_it_cannot_move():
     predictor = PosePredictor(ROBOT, known_poses(np.zeros(3)))
     outside = dataclasses.replace(predictor.initial(), tip_radius=np.array([4e-3]))
@@ -128,6 +162,16 @@ def read(tmp_path, mapping: Mapping, table: str) -> Poses:
     path = tmp_path / "poses.csv"
     path.write_text(table)
     return read_poses(path, mapping, ("c",))
+
+
+@pytest.mark.parametrize(("unit", "words"), [("cm", "10 times as far"), ("m", "1000 times as far")])
+def test_markers_in_another_unit_than_the_mapping_says_are_refused(tmp_path, mapping, unit, words):
+    marker = dataclasses.replace(mapping.markers[0], columns=("x", "y", "z"), unit=unit)
+    second = dataclasses.replace(marker, name="n", at=(0.0, 0.0, 0.11), columns=("a", "b", "c"))
+    table = "case,gx,gy,gz,pull_n,weight_g,x,y,z,a,b,c\nfirst,0,-9.81,0,1.5,20,-20,1,40,-20,1,110\n"
+    place = dataclasses.replace(marker, at=(0.0, 0.0, 0.04))
+    with pytest.raises(MeasurementError, match=words):
+        read(tmp_path, dataclasses.replace(mapping, markers=(place, second)), table)
 
 
 def test_a_table_is_read_in_the_frame_of_the_base(tmp_path, mapping):

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 from test_estimate_command import write_trial
 
-from gravcomp.commands import estimate, output
+from gravcomp.commands import estimate, output, reproduce
 from gravcomp.commands.__main__ import main
 from gravcomp.commands.parsers import namespace
+from gravcomp.mesh import MeshError
 
 ROBOT_TAKERS = [
     "model build ROBOT",
@@ -147,6 +148,16 @@ def test_values_of_options_are_checked_when_they_are_read(capsys, line, said):
 
 def test_the_global_namespace_and_a_slash_at_the_end_are_allowed():
     assert [namespace(text) for text in ("", "/", "/left", "/left/", "/a/b")] == ["", "", "/left", "/left", "/a/b"]
+
+
+def test_a_body_that_cannot_be_meshed_is_named_with_its_file(capsys, monkeypatch, tmp_path):
+    def run(_):
+        raise MeshError("elements are flat")
+
+    path = tmp_path / "mine.yaml"
+    path.write_text("robot: {}")
+    monkeypatch.setattr(reproduce, "run", run)
+    refused(capsys, f"reproduce static --robot {path}", f"gravcomp reproduce: {path}: robot: elements are flat")
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_a_wrong_rate_is_found_where_the_likeliest_scale_is_not_quite_2():
 def test_a_wrong_unit_is_refused_unless_it_is_to_be_converted(short):
     in_g = replace(short, accel=short.accel / 9.80665)
     with pytest.raises(RecordingError, match=r"in g .* --units auto"):
-        in_si(in_g, convert=False)
+        in_si(in_g, convert=False, option="--units auto")
     recording, findings, _ = in_si(in_g, convert=True)
     np.testing.assert_allclose(recording.accel, short.accel)
     assert [finding.kind for finding in findings] == ["accel_unit"]

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.orientation.errors import CalibrationError
+from gravcomp.orientation.known_directions import check_directions
 from gravcomp.orientation.resting_poses import DISTINCT
 
 CONFIDENCE = 0.95
@@ -50,7 +51,7 @@ def fit_mount(accel: np.ndarray, base: np.ndarray, *, with_tilt: bool = False) -
     """Return the mount from k rests.
 
     accel (k, 3): mean specific forces in the IMU's frame; base (k, 3, 3): rotations of soft_base in the arm's world. Raises
-    CalibrationError where the rests do not determine what is sought.
+    CalibrationError where the rests do not determine what is sought, and where no mount fits them.
     """
     from scipy.optimize import least_squares
     from scipy.stats import t as student
@@ -83,6 +84,7 @@ def fit_mount(accel: np.ndarray, base: np.ndarray, *, with_tilt: bool = False) -
         raise CalibrationError(
             f"the {len(up)} poses do not determine mount and tilt together; rest in more directions of the flange"
         )
+    check_directions(*directions(solution.x))
     freedom = equations - unknown
     width = student.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * math.sqrt(2.0 * solution.cost / freedom)
     half = width * np.sqrt(np.diag(np.linalg.inv(normal)))

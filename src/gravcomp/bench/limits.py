@@ -123,7 +123,7 @@ ROWS = {
         Row("robots.*.similarity_pct", "robots of 0.5 to 4 times the size, largest difference", "%", 2.0, optional=True),
         Row("ccx_error_pct", "against CalculiX, worst row, share of the length", "%", 0.2),
         Row("disks_error_pct", "backbones with disks, worst, share of the length", "%", 0.3),
-        Row("rod_error_pct", "rod under gravity, worst, share of the length", "%", 0.3),
+        Row("rod_error_pct", "rod under gravity and wrenches, worst, share of the length", "%", 0.3),
         Row("beam_rest_mm", "beam at rest under load, worst marker", "mm", 0.8),
         Row("beam_motion_mm", "beam in motion, RMS", "mm", 2.5),
         Row("tentacle_mm", "tentacle, fitted", "mm", 8.0),

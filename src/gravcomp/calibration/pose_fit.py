@@ -3,7 +3,7 @@
     min over x of  sum |marker(x) - measured|^2 / sigma^2 + sum_i x_i^2
 
 x holds the logarithm of the modulus, which has no prior, and the other unknowns in units of the standard deviation of their
-priors. Intervals hold at 95 %, from the Jacobian at the solution as in `fit`.
+priors. Intervals hold at 95 % (`pose_intervals`); that of the modulus contains what the model lacks, as in `fit`.
 """
 
 import dataclasses
@@ -11,7 +11,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from gravcomp.calibration.fit import TipNoise
 from gravcomp.calibration.measured import MeasurementError, rms_distance
+from gravcomp.calibration.pose_intervals import covariance, not_shown
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import PoseParameters, Poses
 from gravcomp.config import parameter
@@ -34,6 +36,9 @@ class PosePriors:
     radius: float = parameter(0.045, minimum=1e-6, maximum=1.0, description="distance of a cable's end from the axis, relative")
     angle: float = parameter(4.0, edge="deg", minimum=1e-4, maximum=90.0, description="angle of a cable about the axis")
     gain: float = parameter(0.1, minimum=1e-6, maximum=10.0, description="gain of a measured tension, relative")
+    stiffness: float = parameter(
+        TipNoise.stiffness, minimum=0.0, maximum=0.5, description="error of the stiffness that no fit sees, relative"
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +102,10 @@ class PoseEstimate:
 
 @dataclasses.dataclass(frozen=True)
 class PoseFit:
-    """Result of a fit: x, parameters, estimates, the predicted markers (k, p, 3) in m, and the root mean square distance in m."""
+    """Result of a fit: x, parameters, estimates, the predicted markers (k, p, 3) in m, and the root mean square distance in m.
+
+    open: sentences on what the poses do not show.
+    """
 
     x: np.ndarray
     parameters: PoseParameters
@@ -106,6 +114,7 @@ class PoseFit:
     rms_before: float
     rms: float
     evaluations: int
+    open: tuple[str, ...] = ()
 
 
 def fit_poses(
@@ -125,7 +134,8 @@ def fit_poses(
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 
-    noise = (priors or PosePriors()).noise_share * robot.length
+    priors = priors or PosePriors()
+    noise = priors.noise_share * robot.length
     predictor = PosePredictor(robot, poses)
     initial = predictor.initial()
     prior = np.array([not unknown.free for unknown in unknowns])
@@ -164,17 +174,28 @@ def fit_poses(
     solution = least_squares(residuals, x, jac=jacobian, bounds=(-_FARTHEST, _FARTHEST), xtol=1e-3, ftol=1e-4, max_nfev=15)
     parameters = at(solution.x)
     predicted = predictor.predict(parameters)
-    freedom = max(1, poses.measured.size - len(unknowns))
-    data = solution.jac[: poses.measured.size]
-    misfit = (predicted - poses.measured).ravel() / noise
-    precision = data.T @ data / max(float(misfit @ misfit) / freedom, 1e-12) + np.diag(prior.astype(float))
-    half = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(np.linalg.pinv(precision)))
+    matrix = covariance(solution.jac[: poses.measured.size], (predicted - poses.measured) / noise, prior)
+    variance = np.diag(matrix) + np.where(prior, 0.0, priors.stiffness**2)
+    half = float(student.ppf(0.975, max(1, poses.measured.size - len(unknowns)))) * np.sqrt(variance)
     estimates = tuple(
         _estimate(unknown, initial, parameters, float(value), float(width))
         for unknown, value, width in zip(unknowns, solution.x, half)
     )
     rms_before = rms_distance(before[: poses.measured.size].reshape(poses.measured.shape) * noise)
-    return PoseFit(solution.x, parameters, estimates, predicted, rms_before, rms_distance(predicted - poses.measured), count)
+    sentences = not_shown([unknown.name for unknown in unknowns], matrix, prior)
+    if not prior.all() and _weight_alone(robot, poses):
+        sentences.append(
+            "Only the robot's own weight bends it against its stiffness here, so the poses show Young's modulus over density: a"
+            " density that is 1 % off makes the modulus 1 % off. Weigh the robot, or hang weights of known mass from it."
+        )
+    rms = rms_distance(predicted - poses.measured)
+    return PoseFit(solution.x, parameters, estimates, predicted, rms_before, rms, count, tuple(sentences))
+
+
+def _weight_alone(robot: Robot, poses: Poses) -> bool:
+    """Return whether no known force acts on the robot: all forces are its own weight's, or follow from its stiffness."""
+    hung = robot.payload.mass or any(load.mass for load in robot.loads) or any(load.mass for row in poses.loads for load in row)
+    return not hung and (poses.tension is None or not poses.tension.any())
 
 
 def held_out(

@@ -31,8 +31,9 @@ def pose_result(poses: Poses, fit: PoseFit, written: str) -> Result:
         notes=[
             "Gains, zeros and the offset of the base belong to the measurement and are reported here only; the robot file"
             " contains modulus and cables.",
+            *fit.open,
         ],
-        data={"parameters": [vars(e) for e in fit.estimates]},
+        data={"parameters": [vars(e) for e in fit.estimates], "not_shown": list(fit.open)},
     )
 
 

@@ -13,6 +13,7 @@ from gravcomp.calibration.poses import Poses
 from gravcomp.description import PointLoad
 
 _SUFFIX = re.compile(r"_(mm|cm|m|kg|g|n|mn)$", re.IGNORECASE)
+_SAME_SCALE = 4.0  # largest ratio of measured to described distances between markers, and its inverse
 _STRAIGHT = 1e-3  # spread across the line over spread along it, below which base markers lie on one line
 
 
@@ -20,7 +21,8 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
     """Read a CSV file with a header and one row for each pose.
 
     Raises MeasurementError, naming file, line and column, for a missing column, a cell that is empty or not a number, a column
-    whose name ends in another unit than the mapping says, and a cable that the robot does not have.
+    whose name ends in another unit than the mapping says, markers at distances in another unit, and a cable that the robot does
+    not have.
     """
     table = CsvTable.read(Path(path).expanduser())
     if not table.rows:
@@ -37,6 +39,7 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
         for k in range(count)
     )
     measured = np.stack([_place(table, marker) for marker in mapping.markers], axis=1)
+    _check_scale(table, measured, np.array([marker.at for marker in mapping.markers]))
     driven = mapping.cables.input if mapping.cables else None
     return Poses(
         source=str(path),
@@ -60,6 +63,25 @@ def _column(table: CsvTable, name: str, unit: str = "") -> np.ndarray:
             f"{table.path}: the column '{name}' ends in the unit {suffix.group(1)}, and the mapping says {unit}"
         )
     return table.numbers(name, UNITS.get(unit, 1.0))
+
+
+def _check_scale(table: CsvTable, measured: np.ndarray, at: np.ndarray) -> None:
+    """Raise MeasurementError where the markers (k, p, 3) are many times as far from each other as they are described (p, 3).
+
+    A bend changes these distances, too, but not by a factor of four in most pairs of most poses.
+    """
+    one, other = np.triu_indices(len(at), 1)
+    described = np.linalg.norm(at[one] - at[other], axis=1)
+    if not len(one) or not described.any():
+        return
+    found = np.linalg.norm(measured[:, one] - measured[:, other], axis=2)[:, described > 0.0] / described[described > 0.0]
+    ratio = float(np.median(found))
+    if 1.0 / _SAME_SCALE <= ratio <= _SAME_SCALE:
+        return
+    raise MeasurementError(
+        f"{table.path}: the markers are {float(f'{ratio:.3g}'):g} times as far from each other as at_mm of the mapping says: is"
+        " their unit in the mapping right, and are they the same markers?"
+    )
 
 
 def _place(table: CsvTable, marker: MarkerColumns) -> np.ndarray:

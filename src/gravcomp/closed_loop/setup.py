@@ -82,7 +82,7 @@ class Setup:
     @functools.cached_property
     def true_robot(self) -> TrueRobot:
         """The virtual robot as it truly is. Raises ConfigError where `truth` describes no robot."""
-        return draw(self.truth, self.nominal, self.virtual_hardware, self.seed)
+        return draw(self.truth, self.nominal, self.virtual_hardware, self.seed, f"{self.source}: virtual_robot")
 
     @functools.cached_property
     def first_period(self) -> float:

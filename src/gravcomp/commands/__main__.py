@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
         code = _exit_code(error)
         if code is None:
             raise
-        print(f"gravcomp {name}: {_sentence(error)}", file=sys.stderr)
+        print(f"gravcomp {name}: {_body(error, getattr(args, 'robot', None))}{_sentence(error)}", file=sys.stderr)
         return code
 
 
@@ -40,12 +40,21 @@ def _exit_code(error: Exception) -> int | None:
     from gravcomp.config import ConfigError
     from gravcomp.environment.errors import SetupError
     from gravcomp.launcher import LaunchError, NodeDied
+    from gravcomp.mesh_files.errors import MeshError
 
     if isinstance(error, SetupError):
         return 3
     if isinstance(error, OSError) and (error.filename is not None or error.errno in _FULL):
         return 2  # a file that cannot be read or written, in the cache as well
-    return 2 if isinstance(error, (ConfigError, LaunchError, NodeDied, TimeoutError)) else None
+    return 2 if isinstance(error, (ConfigError, MeshError, LaunchError, NodeDied, TimeoutError)) else None
+
+
+def _body(error: Exception, robot: str | None) -> str:
+    """Return file and key for the error of a body that cannot be meshed: the model, from which it comes, knows no file."""
+    from gravcomp.description.robot_file import robot_path
+    from gravcomp.mesh_files.errors import MeshError
+
+    return f"{robot_path(robot)}: robot: " if robot and isinstance(error, MeshError) else ""
 
 
 def _sentence(error: Exception) -> str:

@@ -158,21 +158,16 @@ def _plan(args: argparse.Namespace, file: "RobotFile") -> int:
 
 
 def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
-    """Return the plan of the robot. Raises ConfigError."""
+    """Return the plan of the robot. Raises ConfigError, and MeshError for a body that cannot be meshed."""
     from gravcomp.calibration.plan import make_plan
     from gravcomp.closed_loop.setup import Setup
-    from gravcomp.config import ConfigError
     from gravcomp.full_model.modes import first_period
-    from gravcomp.mesh import MeshError
 
     setup = Setup.of(file)
     inverse = None if args.plan else setup.controller.inverse  # by hand, one cable at a time is enough
     period, transmission = first_period(setup.robot), setup.hardware.transmission
     with output.stages("planning") as show:
-        try:
-            return make_plan(setup.robot, period, transmission, plan_options(args), progress=show, inverse=inverse)
-        except MeshError as error:
-            raise ConfigError(str(error)) from error
+        return make_plan(setup.robot, period, transmission, plan_options(args), progress=show, inverse=inverse)
 
 
 def _measured_live(args: argparse.Namespace, file: "RobotFile") -> Path | None:

@@ -49,7 +49,9 @@ def run(args: argparse.Namespace) -> int:
     from gravcomp.description import load_robot_file
     from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
     from gravcomp.orientation.calibration import calibrate
+    from gravcomp.orientation.known_directions import show_sign
     from gravcomp.recordings.imu import read_mapping, read_recording
+    from gravcomp.stream_checks import in_si
 
     file = load_robot_file(args.robot)
     section = file.section("nodes").get("imu_estimator")
@@ -64,10 +66,20 @@ def run(args: argparse.Namespace) -> int:
     columns = read_mapping(args.columns) if args.columns else None
     with output.progress(f"reading {args.file}") as progress:
         recording = read_recording(args.file, args.topic, columns, progress)
-    found = calibrate(recording, options.filter, np.array(args.up) if args.up else None)
+    recording, findings, unknown = in_si(recording, convert=False)
+    up = np.array(args.up) if args.up else None
+    found = calibrate(recording, options.filter, up)
+    if up is None or not show_sign(up / np.linalg.norm(up, axis=1, keepdims=True)):
+        unknown.append("whether the accelerometer is negated shows only with --up in three poses that are not in one plane")
     span = _learn_bias(recording, options, found, bias_model) if bias_model is not None else None
     write_imu_calibration(file.source, target, found, bias_model)
-    figures = _figures(args, found, span, target)
+    # What it is said to be calibrated for is no news here.
+    odd = [finding for finding in findings if finding.kind != "accel_calibration"]
+    figures = _figures(args, found, span, target) | {
+        "problems": [*recording.notes, *(finding.text for finding in odd)],
+        "findings": [finding.kind for finding in odd],
+        "not_shown": unknown,
+    }
     output.result(figures, _text(figures))
     return 0
 
@@ -148,6 +160,7 @@ def _text(figures: dict[str, Any]) -> str:
     if figures["bias_model"] is not None:
         model = figures["bias_model"]
         lines.append(f"  bias model            {model['from_degc']:.1f} to {model['to_degc']:.1f} degC: {model['file']}")
-    lines += [f"- {note}" for note in figures["notes"]]
+    lines += [f"- {note}" for note in (*figures["notes"], *figures["problems"])]
+    lines += [f"- not checked: {sentence}" for sentence in figures["not_shown"]]
     lines.append(f"written: {figures['written']}")
     return "\n".join(lines)

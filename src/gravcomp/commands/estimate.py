@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         columns = read_mapping(args.columns) if args.columns else None
         with output.progress(f"reading {args.file}") as reading:
             recording = read_recording(args.file, args.topic, columns, reading)
-        recording, findings, unknown = in_si(recording, convert=args.units == "auto")
+        recording, findings, unknown = in_si(recording, convert=args.units == "auto", option="--units auto")
         options, mount = _of_robot(args.robot)
         correction = None
         if args.calibrate:

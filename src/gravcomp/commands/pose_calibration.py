@@ -28,7 +28,9 @@ def fit_pose_table(args: argparse.Namespace, file: "RobotFile", target: Path) ->
         try:
             poses = read_poses(args.data, mapping, file.robot.cable_names)
             fit = fit_poses(file.robot, poses, unknowns_of(mapping.fit, file.robot), progress=show)
-        except (MeasurementError, MeshError) as error:
+        except MeasurementError as error:
             raise ConfigError(str(error)) from error
+        except MeshError as error:  # weights that the mapping hangs outside the body, or a body that cannot be meshed
+            raise ConfigError(f"{args.mapping}, with the robot of {file.source}: {error}") from error
     write_calibrated(file.source, target, file.robot, robot_of_poses(file.robot, fit.parameters), None)
     return pose_result(poses, fit, str(target))

@@ -29,7 +29,10 @@ KEPT = {
 
 
 def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Result":
-    """Fit to resting tips and to motion, write the robot file `target`, and return the result. Raises ConfigError."""
+    """Fit to resting tips and to motion, write the robot file `target`, and return the result.
+
+    Raises ConfigError, and MeshError for a body that cannot be meshed.
+    """
     from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, with_behaviour, write_calibrated
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError
@@ -39,7 +42,6 @@ def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Resu
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.config import ConfigError
     from gravcomp.full_model.modes import first_period
-    from gravcomp.mesh import MeshError
     from gravcomp.sweep import Sweep
 
     setup = Setup.of(file, seed_of(args))
@@ -63,7 +65,7 @@ def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Resu
             motion, kept = _motion(robot, courses, args, sweep, show)
             if motion is not None and motion.damping_seen:
                 robot = with_behaviour(robot, motion)
-        except (MeasurementError, MeshError, RuntimeError) as error:
+        except (MeasurementError, RuntimeError) as error:
             raise ConfigError(str(error)) from error
     write_calibrated(
         file.source,

@@ -51,7 +51,7 @@ def from_mapping(cls: type[T], mapping: Any, *, source: str, key: str = "") -> T
     except ConfigError:
         raise
     except ValueError as error:  # a check of several fields in the data class's __post_init__
-        raise ConfigError(f"{source}: {key or cls.__name__}: {error}") from error
+        raise ConfigError(f"{source}: {key}: {error}" if key else f"{source}: {error}") from error
 
 
 def _with_present_names(cls: type, mapping: dict, source: str, key: str) -> dict:

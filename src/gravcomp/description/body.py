@@ -4,6 +4,7 @@ import dataclasses
 import math
 
 from gravcomp.config import parameter
+from gravcomp.description.law_stability import RANGE_OF_USE, yeoh_falls
 
 # Below it (kg/m^3) there are no solids but aerogels: the number is in another unit.
 _LIGHTEST = 10.0
@@ -65,6 +66,13 @@ class Material:
             raise ValueError(
                 f"density is {self.density:g} kg/m^3; allowed: 0 (weightless) or {_LIGHTEST:g} to 30000"
                 f" ({self.density:g} g/cm^3 would be {1e3 * self.density:g} kg/m^3)"
+            )
+        falling = yeoh_falls(self.c20_ratio, self.c30_ratio) if self.law == "yeoh" else ""
+        if falling:
+            raise ValueError(
+                f"the law yeoh is not stable with c20_ratio: {self.c20_ratio:g}, c30_ratio: {self.c30_ratio:g}: the force on"
+                f" {falling} falls; allowed are constants for which it rises from a stretch of {RANGE_OF_USE[0]:g} to"
+                f" {RANGE_OF_USE[1]:g}"
             )
         if not self.prony:
             return

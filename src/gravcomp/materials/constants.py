@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 
 from gravcomp.materials.laws import LAWS
-from gravcomp.materials.stability import RANGE_OF_USE, falling_force
-from gravcomp.mesh import Mesh, MeshError
+from gravcomp.mesh import Mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,10 +32,7 @@ class MaterialConstants:
 
     @staticmethod
     def of(mesh: Mesh) -> "MaterialConstants":
-        """Return the constants that the mesh's materials give its elements.
-
-        Raises MeshError for own constants with which a law is not stable in the range of use.
-        """
+        """Return the constants that the mesh's materials give its elements."""
         young = np.array([m.youngs_modulus for m in mesh.materials])
         nu = np.array([m.poissons_ratio for m in mesh.materials])
         laws = [LAWS[m.law] for m in mesh.materials]
@@ -44,13 +40,6 @@ class MaterialConstants:
         values[:, 0], values[:, 1] = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
         for row, (material, law) in enumerate(zip(mesh.materials, laws)):
             values[row, 2 : 2 + len(law.own_constants)] = [getattr(material, name) for name in law.own_constants]
-            falling = falling_force(material.law, values[row]) if law.own_constants else ""
-            if falling:
-                given = ", ".join(f"{name}: {getattr(material, name):g}" for name in law.own_constants)
-                raise MeshError(
-                    f"the law '{material.law}' with {given} is not stable: the force on {falling} falls; allowed are constants"
-                    f" for which it rises from a stretch of {RANGE_OF_USE[0]:g} to {RANGE_OF_USE[1]:g}"
-                )
         code = np.array([law.code for law in laws], dtype=np.int64)
         density = np.array([m.density for m in mesh.materials])
         return MaterialConstants(code[mesh.region], np.ascontiguousarray(values[mesh.region]), density[mesh.region])

@@ -72,7 +72,7 @@ def _surface(path: Path) -> RawMesh:
         surface: Any = trimesh.load(path, force="mesh", process=False)
         nodes, cells = np.asarray(surface.vertices, dtype=float), np.asarray(surface.faces, dtype=np.int64)
     except Exception as error:  # the readers of trimesh pass on the exceptions of many libraries
-        raise MeshError(f"{path}: cannot be read as a surface: {error}") from error
+        raise MeshError(f"{path}: cannot be read as a surface: its content is not what '{path.suffix}' stands for") from error
     if len(cells) == 0:
         raise MeshError(f"{path}: has no triangles")
     return RawMesh("tri3", nodes, cells)

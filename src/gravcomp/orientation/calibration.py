@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.orientation.errors import CalibrationError
 from gravcomp.orientation.imu_calibration import ImuCalibration
+from gravcomp.orientation.known_directions import check_directions
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.resting_poses import DISTINCT, RestingPose, resting_poses
 from gravcomp.recordings.imu import Recording
@@ -84,7 +85,10 @@ def calibrate(recording: Recording, options: FilterOptions | None = None, base_u
                 f"{recording.source}: has {len(poses)} distinct pose(s) at rest,"
                 f" but {len(base_up)} direction(s) that pointed up are given"
             )
-        mount = fit_mount(np.array([fit.scale * (pose.accel - fit.offset) for pose in poses]), base_up)
+        try:
+            mount = fit_mount(np.array([fit.scale * (pose.accel - fit.offset) for pose in poses]), base_up)
+        except CalibrationError as error:
+            raise CalibrationError(f"{recording.source}: {error}") from error
     return RestCalibration(poses, fit, fit_gyro_offset(poses), mount)
 
 
@@ -122,7 +126,7 @@ def fit_mount(accel: np.ndarray, base_up: np.ndarray) -> tuple[float, float, flo
     """Return roll, pitch, yaw (rad) of the IMU in soft_base, from at least two poses.
 
     accel (k, 3): mean specific forces in the IMU's frame; base_up (k, 3): the direction in soft_base that pointed up at the same
-    time. Raises CalibrationError where the poses do not determine all three angles.
+    time. Raises CalibrationError where the poses do not determine all three angles, and where no mount fits them.
     """
     measured = np.asarray(accel, float) / np.linalg.norm(accel, axis=1, keepdims=True)
     known = np.asarray(base_up, float) / np.linalg.norm(base_up, axis=1, keepdims=True)
@@ -132,6 +136,7 @@ def fit_mount(accel: np.ndarray, base_up: np.ndarray) -> tuple[float, float, flo
             f"{len(measured)} pose(s) with gravity along one line do not determine the rotation about this line;"
             " one more pose, at least 15 deg away, is needed"
         )
+    check_directions(measured, known)
     rotation, _ = Rotation.align_vectors(known, measured)
     roll, pitch, yaw = rotation.as_euler("xyz").tolist()
     return roll, pitch, yaw

@@ -27,16 +27,17 @@ def looked_at(recording: Recording) -> tuple[list[Finding], list[str]]:
     return [*_of_sign(recording, monitor), *monitor.findings()], monitor.unknown()
 
 
-def in_si(recording: Recording, *, convert: bool) -> tuple[Recording, list[Finding], list[str]]:
+def in_si(recording: Recording, *, convert: bool, option: str = "") -> tuple[Recording, list[Finding], list[str]]:
     """Return the recording in rad/s, m/s^2 and right-handed axes, what is odd, and what it does not show.
 
-    convert: as far as the findings say how. Raises RecordingError for wrong units without `convert`, and for those that cannot be
-    converted.
+    convert: as far as the findings say how; option: of the command, which converts. Raises RecordingError for wrong units without
+    `convert`, and for those that cannot be converted.
     """
     findings, unknown = looked_at(recording)
     for finding in findings:
         if finding.fatal and not (convert and finding.convertible):
-            way = "; convert the recording, or let --units auto do it" if finding.convertible else ""
+            by_option = f", or let {option} do it" if option else ""
+            way = f"; convert the recording{by_option}" if finding.convertible else ""
             raise RecordingError(f"{recording.source}: {finding.text}{way}")
     return (converted(recording, findings) if convert else recording), findings, unknown
 

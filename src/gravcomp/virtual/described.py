@@ -13,16 +13,20 @@ from gravcomp.virtual.true_robot import TrueRobot
 
 @dataclass(frozen=True)
 class Described:
-    """given: the section `virtual_robot`; robot and hardware: the description that it belongs to; seed: of all that is drawn."""
+    """given: the section `virtual_robot`; robot and hardware: the description that it belongs to; seed: of all that is drawn.
+
+    source: path of the file.
+    """
 
     given: VirtualRobotParameters
     robot: Robot
     hardware: Hardware
     seed: int
+    source: str
 
     def draw(self) -> TrueRobot:
         """Return what the virtual robot truly is. Raises ConfigError for a section that describes no robot."""
-        return draw(self.given, self.robot, self.hardware, self.seed)
+        return draw(self.given, self.robot, self.hardware, self.seed, f"{self.source}: virtual_robot")
 
 
 def described(file: RobotFile, seed: int | None = None) -> Described:
@@ -52,4 +56,4 @@ def described(file: RobotFile, seed: int | None = None) -> Described:
         own = file.section("virtual_robot").get("seed")
         return described(origin, given.seed if seed is None and own is not None else seed)
     hardware = file.hardware
-    return Described(given, file.robot, hardware, given.seed if seed is None else seed)
+    return Described(given, file.robot, hardware, given.seed if seed is None else seed, file.source)

@@ -44,8 +44,10 @@ _AMBIENT = (18.0, 26.0)
 _ELEMENTS = 20
 
 
-def draw(given: VirtualRobotParameters, robot: Robot, hardware: Hardware, seed: int | None = None) -> TrueRobot:
-    """Return what the virtual robot truly is; `seed` replaces the one of the section.
+def draw(
+    given: VirtualRobotParameters, robot: Robot, hardware: Hardware, seed: int | None = None, section: str = "virtual_robot"
+) -> TrueRobot:
+    """Return what the virtual robot truly is; `seed` replaces the one of the section; section: file and key, for errors.
 
     Raises ConfigError for a section that describes no robot: values for other segments than the robot has, cables outside its
     body, a material with no stiffness left.
@@ -56,9 +58,9 @@ def draw(given: VirtualRobotParameters, robot: Robot, hardware: Hardware, seed: 
     slack = np.random.default_rng(streams[0]).standard_normal(len(robot.cables))
     body, cables, lines, motors, board = (np.random.default_rng(stream) for stream in streams[4].spawn(5))
     drawn: dict[str, str] = {}
-    true = _with_true_body(robot, given.body, body, drawn)
+    true = _with_true_body(robot, given.body, body, drawn, section)
     materials = _materials(robot, given.body, body)
-    true = _with_true_cables(true, given, cables, drawn)
+    true = _with_true_cables(true, given, cables, drawn, section)
     return TrueRobot(
         robot=true,
         materials=materials,
@@ -71,7 +73,7 @@ def draw(given: VirtualRobotParameters, robot: Robot, hardware: Hardware, seed: 
     )
 
 
-def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn: dict[str, str]) -> Robot:
+def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn: dict[str, str], section: str) -> Robot:
     described = robot.materials
     count = len(described)
     ratio = 1.0 + random.uniform(-_MODULUS_SPREAD, _MODULUS_SPREAD, count)
@@ -79,7 +81,7 @@ def _with_true_body(robot: Robot, body: Body, random: np.random.Generator, drawn
     if body.modulus_ratio is not None:
         if len(body.modulus_ratio) not in (1, count):
             raise ConfigError(
-                f"virtual_robot.body.modulus_ratio has {len(body.modulus_ratio)} entries; robot '{robot.name}' has {count}"
+                f"{section}.body.modulus_ratio has {len(body.modulus_ratio)} entries; robot '{robot.name}' has {count}"
                 f" segment{'s' if count > 1 else ''}: give one for all or one for each"
             )
         ratio = np.resize(np.array(body.modulus_ratio), count)
@@ -123,7 +125,9 @@ def _materials(robot: Robot, body: Body, random: np.random.Generator) -> tuple[T
     return tuple(found)
 
 
-def _with_true_cables(robot: Robot, given: VirtualRobotParameters, random: np.random.Generator, drawn: dict[str, str]) -> Robot:
+def _with_true_cables(
+    robot: Robot, given: VirtualRobotParameters, random: np.random.Generator, drawn: dict[str, str], section: str
+) -> Robot:
     tendons, count = given.tendons, len(robot.cables)
     radius, angle = random.uniform(-1.0, 1.0, (2, count))
     if tendons.radius_offset is None and count:
@@ -132,11 +136,11 @@ def _with_true_cables(robot: Robot, given: VirtualRobotParameters, random: np.ra
         drawn["cable angles"] = f"+-{math.degrees(_ANGLE_SPREAD):g} deg"
     for index in range(count):
         turn = _ANGLE_SPREAD * angle[index] if tendons.angle_offset is None else tendons.angle_offset
-        robot = _with_moved_cable(robot, index, _RADIUS_SPREAD * radius[index], turn, tendons)
+        robot = _with_moved_cable(robot, index, _RADIUS_SPREAD * radius[index], turn, tendons, section)
     return robot
 
 
-def _with_moved_cable(robot: Robot, index: int, drawn_radius: float, turn: float, tendons: Tendons) -> Robot:
+def _with_moved_cable(robot: Robot, index: int, drawn_radius: float, turn: float, tendons: Tendons, section: str) -> Robot:
     """The robot with one cable moved. A drawn place is moved back towards the described one until it lies inside the body."""
     relative = tendons.radius_offset is None
     offset = drawn_radius if tendons.radius_offset is None else tendons.radius_offset
@@ -147,7 +151,7 @@ def _with_moved_cable(robot: Robot, index: int, drawn_radius: float, turn: float
             return dataclasses.replace(robot, cables=(*robot.cables[:index], moved, *robot.cables[index + 1 :]))
         except ValueError as error:
             problem = str(error)
-    raise ConfigError(f"virtual_robot.tendons describes no robot: {problem}")
+    raise ConfigError(f"{section}.tendons describes no robot: {problem}")
 
 
 def _moved(cable: Cable, radius: float, turn: float, relative: bool) -> Cable:

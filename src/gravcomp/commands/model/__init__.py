@@ -21,11 +21,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the subcommand. Returns its exit code. Raises ConfigError when the robot or an argument cannot be used."""
+    """Run the subcommand. Returns its exit code.
+
+    Raises MeshError when the body cannot be meshed, ConfigError when the robot or an argument cannot be used otherwise.
+    """
     from gravcomp.config import ConfigError
     from gravcomp.mesh import MeshError
 
     try:
         return importlib.import_module(f"gravcomp.commands.model.{args.subcommand}").run(args)
-    except (MeshError, ValueError) as error:
+    except MeshError:
+        raise
+    except ValueError as error:
         raise ConfigError(str(error)) from error

@@ -153,8 +153,15 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     aside_mm = float(np.sqrt(np.mean([hand["aside_mm"] ** 2 for hand in hands.values()])))
     part = Part(
         figures=[
-            Figure("beam: markers at rest under load, worst", worst, "mm", "2.0 mm, the mean marker with their modulus", 0.8)
-        ][: len(loaded)],
+            Figure(
+                f"beam: markers at rest under load, worst, {1e3 * PLATE:g} ± {1e3 * PLATE:g} g of plate assumed",
+                worst,
+                "mm",
+                "2.0 mm, the mean marker with their modulus",
+                0.8,
+            ),
+            Figure("beam: the same without a plate", without, "mm"),
+        ][: 2 * len(loaded)],
         parts=[
             Table(
                 "Beam: at rest",
