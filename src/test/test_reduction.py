@@ -297,9 +297,11 @@ def rubber(robot, cache):
     return built_once(robot.with_material(law="neo_hookean", poissons_ratio=0.49))
 
 
-@pytest.mark.parametrize("body", ["built", "rubber"])
-def test_the_response_is_that_of_an_equilibrium_however_far_the_step(body, request):
-    simulator = Simulator(request.getfixturevalue(body)[0])
+@pytest.mark.parametrize(("body", "table_mm"), [("built", None), ("rubber", None), ("built", -40.0)])
+def test_the_response_is_that_of_an_equilibrium_however_far_the_step(body, table_mm, request):
+    """Also in a scene whose table the robot does not reach."""
+    table = table_mm and scene_of(planes=[{"name": "table", "normal": [1, 0, 0], "point_mm": [table_mm, 0, 0]}])
+    simulator = Simulator(request.getfixturevalue(body)[0], scene=table)
     simulator.step(9.81 * np.array([0.0, 0.0, -1.0]))
     for angle in (20.0, 40.0, 60.0):
         gravity = 9.81 * np.array([-np.sin(np.radians(angle)), 0.0, -np.cos(np.radians(angle))])

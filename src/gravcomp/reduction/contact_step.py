@@ -72,18 +72,19 @@ class Step(NamedTuple):
 
 @njit(cache=True, fastmath=REORDERED)
 def tracked_touching(
-    body: Body, point: Point, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray, given: np.ndarray,
-    pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
+    body: Body, point: Point, expected: np.ndarray, q: np.ndarray, tension: np.ndarray, weight: np.ndarray, wound: np.ndarray,
+    given: np.ndarray, pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
     iterations: int, longest_step: float, near: float, tolerance: float, calm: float, touching: Touching,
 ) -> tuple[
-    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray, np.ndarray,
-    Pressed,
+    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray,
+    np.ndarray, Pressed,
 ]:  # fmt: skip
     """Return what `tracking._tracked` returns, then places, their forces (c, 3), states (c,) and changes by tension (c, m).
 
     Last come the pressed places. Writes the memory of `touching`.
     """
-    m, r, start, cables = len(tension), len(q), point, body.cables
+    m, r, start, expected_first, cables = len(tension), len(q), point, expected, body.cables
+    of_law = len(body.deviation.weight) > 0
     rest, change, stations = touching.rest, touching.change, len(touching.rest)
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual, reuse, before = False, np.inf, False, 0.0
@@ -97,7 +98,7 @@ def tracked_touching(
         if not reuse:
             if iteration:
                 forget(kept)
-            definite, factor = stiffness_factor(body, point, q, tension, stress, scale, kept)
+            definite, factor = stiffness_factor(body, point, q, tension, scale * expected + offset, scale, kept)
             if not definite:
                 break
         columns = np.empty((r, m + 2))
@@ -152,6 +153,7 @@ def tracked_touching(
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
         origin = q
         q, tension = q + share * step, tension + share * (force[:m] - tension)
+        expected = point.strain + share * (step @ point.jacobian)
         point = point_at(body, q, pulling)
         sections = rest + (change @ q).reshape(stations, 3, 3)
         before = share * size
@@ -176,11 +178,14 @@ def tracked_touching(
                 touching.pull[0] = lag + force[m:] @ directions
                 forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + plain].copy())
                 q, tension = q + step, force[:m].copy()
+                expected = point.strain + step @ point.jacobian
                 point = point_at(body, q, pulling)
                 sections = rest + (change @ q).reshape(stations, 3, 3)
             converged = size < tolerance and (
                 way < touching.margin or unseen_depth(touching.scene, touching.surface, places, sections, tolerance) < tolerance
             )
+        if of_law:
+            expected = point.strain
         remember(places, forces, touching.force)
         if converged:
             pressing = by_tension[m : m + count].copy()
@@ -191,11 +196,14 @@ def tracked_touching(
             residual = np.sqrt(out @ (body.force_norm @ out))
             break
     if not converged:
-        point = start
+        point, expected = start, expected_first
         forget(kept)
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     touched = pressed_places(touching.scene, touching.surface, places, forces, sections)
-    return converged, point, q, tension, displacement, compliance, answer, residual, places, forces, held, pressing, touched
+    return (
+        converged, point, expected, q, tension, displacement, compliance, answer, residual, places, forces, held, pressing,
+        touched,
+    )  # fmt: skip
 
 
 @njit(cache=True)

@@ -155,13 +155,12 @@ class ReducedTracker:
         touching = self.contact.touching(state.q, gravity)
         longest = min(longest, touching.surface.radius.min())
         (
-            converged, self._point, q, tension, displacement, compliance, answer, residual, places, forces, held, by_tension,
-            pressed,
+            converged, self._point, self._expected, q, tension, displacement, compliance, answer, residual, places, forces, held,
+            by_tension, pressed,
         ) = tracked_touching(
-            self._body, self._point, state.q, state.tension, weight, wound, given, self.sliding.direction, scale, offset,
-            self._kept, iterations, longest, min(longest, near), tolerance, calm, touching,
+            self._body, self._point, self._expected, state.q, state.tension, weight, wound, given, self.sliding.direction, scale,
+            offset, self._kept, iterations, longest, min(longest, near), tolerance, calm, touching,
         )  # fmt: skip
-        self._expected = self._point.strain
         if not converged:
             return replace(state, residual=np.inf, converged=False)
         self.contact.keep(touching, places, forces, held, by_tension, pressed)
