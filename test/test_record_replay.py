@@ -57,7 +57,6 @@ def test_a_replayed_bag_gives_the_offline_gravity_bit_for_bit_at_any_speed(gravc
     recorded = gravity(RECORDED)
     angles = [angle_between(np.array(recorded[s]), np.array(again[0][s])) for s in sorted(recorded.keys() & again[0].keys())]
     assert np.degrees(max(angles)) < 0.5
-    assert np.degrees(max(angles)) < 2.0
 
 
 @pytest.mark.graph
