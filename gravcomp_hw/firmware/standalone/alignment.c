@@ -19,7 +19,7 @@ static float squared(float x) { return x * x; }
 static float square_of(const float *v) { return (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]; }
 
 bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after) {
-  // Between rates that swing with an angular frequency f the mean of both ends misses (f gap)^2 / 12 of the turn in a short gap.
+  // Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
   const float swings = gap * gap * alignment->changing;
   const float share = swings < 6.0f * alignment->turning ? swings / (12.0f * alignment->turning) : 0.5f;
   return share * gap * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;

@@ -54,7 +54,7 @@ class Alignment:
     def lost_in(self, gap: float, *around: float) -> bool:
         """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s).
 
-        Between rates that swing with an angular frequency f the mean of both ends misses (f gap)^2 / 12 of the turn in a short gap.
+        Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
         """
         swings = gap * gap * self._changing
         share = swings / (12.0 * self._turning) if swings < 6.0 * self._turning else 0.5
