@@ -14,6 +14,8 @@ from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
 SHAKEN = replace(KINDS["phone"], turning=2.5, turning_hz=1.2, speed=0.7, speed_hz=2.5, pauses=False)
 
+ARM = replace(KINDS["arm at 2 m/s^2"], rate=100.0, first_rest=2.0, pauses=False)
+
 
 def rows(recording, index):
     names = ("stamp_ns", "gyro", "accel", "orientation", "movement")
@@ -70,6 +72,19 @@ def test_a_short_gap_in_slow_motion_is_bridged():
     index = np.r_[0:600, 615 : len(clean)]
     error, _, problem = errors(rows(clean, index))
     assert set(problem) == {Problem.NONE} and error[600:].max() < 2.0
+
+
+def test_a_gap_of_an_arm_is_bridged_because_its_rates_change_slowly():
+    moving = simulated(ARM, 200, 8.0)
+    error, _, problem = errors(rows(moving, np.r_[0:600, 630 : len(moving)]))
+    assert set(problem) == {Problem.NONE} and error[600:615].max() < 2.0
+
+
+def test_the_filter_goes_on_from_the_alignment_without_a_new_error():
+    moving = simulated(ARM, 203, 13.2)
+    error, _, problem = errors(rows(moving, np.r_[0:600, 670 : len(moving)]))
+    assert problem[600] is Problem.GAP
+    assert error[1085:1115].max() < 1.5
 
 
 def test_at_rest_the_inclination_is_sure_after_a_second():

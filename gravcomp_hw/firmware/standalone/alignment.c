@@ -11,29 +11,40 @@
 #define GC_LOST 0.174532925f          // rad
 #define GC_SWING 0.3f                 // s
 #define GC_MEMORY 1.0f                // s
+#define GC_SMOOTHING 0.05f            // s
+#define GC_ROOT_OF_THREE 1.73205081f
 
 static float squared(float x) { return x * x; }
 
 static float square_of(const float *v) { return (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]; }
 
 bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after) {
-  const float unseen = 0.5f * gap * gc_min(1.0f, gap / GC_SWING);  // in a short gap the rate changes evenly
-  return unseen * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
+  // Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
+  const float swings = gap * gap * alignment->changing;
+  const float share = swings < 6.0f * alignment->turning ? swings / (12.0f * alignment->turning) : 0.5f;
+  return share * gap * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
 }
 
 void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity) {
   const float gain = dt / (GC_MEMORY + dt);
+  const float slower = 1.0f / (GC_SMOOTHING + dt);
+  float change[3];
+  for (uint32_t i = 0; i < 3u; ++i) {
+    change[i] = (rate[i] - alignment->smooth[i]) * slower;
+    alignment->smooth[i] += change[i] * dt;
+  }
   alignment->turning += gain * (square_of(rate) - alignment->turning);
+  alignment->changing += gain * (square_of(change) - alignment->changing);
   alignment->shaken += gain * (squared(gc_sqrt(square_of(force)) / gravity - 1.0f) - alignment->shaken);
 }
 
 void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity) {
-  const float turning = alignment->turning;
-  const float shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
-  gc_zero(alignment, sizeof *alignment);
+  alignment->shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
   alignment->active = true;
-  alignment->turning = turning;
-  alignment->shaken = shaken;
+  alignment->elapsed = alignment->square = 0.0f;
+  gc_zero(alignment->velocity, sizeof alignment->velocity);
+  gc_zero(alignment->sum, sizeof alignment->sum);
+  gc_zero(alignment->moment, sizeof alignment->moment);
 }
 
 // Write the slope (3,) of the line that fits the velocity best, m/s^2.
@@ -77,14 +88,14 @@ void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, con
   }
 }
 
-float gc_alignment_motion(const gc_alignment *alignment, float *velocity) {
+float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity) {
   const float t = alignment->elapsed;
   float slope[3];
   slope_of(alignment, slope);
   for (uint32_t i = 0; i < 3u; ++i) {
     velocity[i] = alignment->velocity[i] - alignment->sum[i] / t - 0.5f * t * slope[i];
   }
-  return 2.0f * gc_sqrt(scatter_of(alignment) / (1.0f + t / GC_SWING));
+  return gc_alignment_std(alignment, gravity) * gravity * t / GC_ROOT_OF_THREE;
 }
 
 float gc_alignment_std(const gc_alignment *alignment, float gravity) {

@@ -4,10 +4,13 @@
 
 #include <stdbool.h>
 
+#define GC_TOGETHER 0.866025404f  // correlation between the slope of a fitted line and its value at the end
+
 // Vectors are in the sensor's frame of the newest sample. Zero is the state before the first sample.
 typedef struct {
   bool active;
-  float turning;                        // mean square of the rate, (rad/s)^2
+  float turning, changing;              // mean squares of the rate and of its change, (rad/s)^2 and (rad/s^2)^2
+  float smooth[3];                      // rate, rad/s
   float shaken;                         // mean square of the specific force's length beyond g, of g
   float elapsed;                        // s, t
   float velocity[3], sum[3], moment[3]; // v in m/s; the integrals of v dt and of t v dt
@@ -27,7 +30,7 @@ void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravi
 void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float *up);
 
 // Write the newest velocity (3,) beyond the line in m/s; returns its standard deviation on each axis.
-float gc_alignment_motion(const gc_alignment *alignment, float *velocity);
+float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity);
 
 // Return the standard deviation of the inclination about each horizontal axis, rad.
 float gc_alignment_std(const gc_alignment *alignment, float gravity);

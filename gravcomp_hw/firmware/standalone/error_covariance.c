@@ -17,7 +17,7 @@ void gc_covariance_set_bias(gc_error_covariance *covariance, float std) {
   }
 }
 
-void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float tilt, float velocity) {
+void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float tilt, float velocity, float together) {
   float(*p)[GC_ERRORS] = covariance->matrix;
   for (uint32_t i = 0; i < GC_ERRORS; ++i) {
     if (i < 2u || i >= VELOCITY) {
@@ -27,6 +27,8 @@ void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float 
       p[i][i] = i < 2u ? tilt * tilt : velocity * velocity;
     }
   }
+  p[1][VELOCITY] = p[VELOCITY][1] = together * tilt * velocity;
+  p[0][VELOCITY + 1u] = p[VELOCITY + 1u][0] = -together * tilt * velocity;
 }
 
 // Replace P by F P; called twice with a transposition between, this is F P F^T.

@@ -23,8 +23,9 @@ typedef struct {
 // Set the standard deviation of the bias in rad/s on each axis and remove its correlations.
 void gc_covariance_set_bias(gc_error_covariance *covariance, float std);
 
-// Set the standard deviations of the inclination in rad and of the velocity in m/s and remove their correlations.
-void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float tilt, float velocity);
+// Set the standard deviations of the inclination in rad and of the velocity in m/s and remove their correlations. What remains is
+// `together`: that of each horizontal velocity with the inclination by which gravity causes it.
+void gc_covariance_set_tilt_and_velocity(gc_error_covariance *covariance, float tilt, float velocity, float together);
 
 // Predict over dt s with the orientation in the middle of the step. gravity in m/s^2; with_bias: the error of the bias acts.
 void gc_covariance_predict(gc_error_covariance *covariance, float dt, gc_quaternion middle, float gravity, gc_step_noise noise,

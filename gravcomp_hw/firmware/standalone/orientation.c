@@ -97,7 +97,7 @@ static bool is_lost(const gc_filter_state *state, float dt, const float *gyro) {
 
 // Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty.
 static void set_aligned(gc_filter_state *state, const float *upward) {
-  float up[3], velocity_std = GC_START_VELOCITY_STD;
+  float up[3], velocity_std = GC_START_VELOCITY_STD, together = 0.0f;
   gc_quaternion_rotate(state->orientation, upward, up);
   const float across = gc_sqrt(up[0] * up[0] + up[1] * up[1]);
   if (across > 0.0f) {
@@ -107,10 +107,12 @@ static void set_aligned(gc_filter_state *state, const float *upward) {
   }
   gc_zero(state->velocity, sizeof state->velocity);
   if (!state->alignment.active) {
-    velocity_std = gc_alignment_motion(&state->alignment, state->velocity);
+    together = GC_TOGETHER;
+    velocity_std = gc_alignment_motion(&state->alignment, state->gravity_norm, state->velocity);
     gc_quaternion_rotate(state->orientation, state->velocity, state->velocity);
   }
-  gc_covariance_set_tilt_and_velocity(&state->errors, gc_alignment_std(&state->alignment, state->gravity_norm), velocity_std);
+  const float tilt_std = gc_alignment_std(&state->alignment, state->gravity_norm);
+  gc_covariance_set_tilt_and_velocity(&state->errors, tilt_std, velocity_std, together);
 }
 
 // Return the angle in rad between the mean specific force at rest and the vertical of the orientation.

@@ -17,8 +17,12 @@ SURE = math.radians(2.0)  # at this standard deviation, too
 START_STD = math.radians(5.0)  # of one specific force at rest
 LARGEST_STD = math.radians(90.0)  # nothing is known
 LOST = math.radians(10.0)  # of a bridged gap: more is not bridged
+TOGETHER = math.sqrt(0.75)  # correlation between the slope of a line that fits evenly spread errors and its value at the end
 _SWING = 0.3  # s; about as long goes a motion in one direction
 _MEMORY = 1.0  # s, of the motion before the gap
+_SMOOTHING = (
+    0.05  # s, of the rates before their change is measured: noise and vibration change the rate, but hardly turn the sensor
+)
 
 
 class Alignment:
@@ -30,30 +34,42 @@ class Alignment:
     def reset(self) -> None:
         """Forget everything."""
         self.active = False
-        self._turning = self._shaken = 0.0  # mean squares: rate in (rad/s)^2; length of the specific force beyond g, of g
+        self._turning = self._changing = 0.0  # mean squares of the rate and of its change, (rad/s)^2 and (rad/s^2)^2
+        self._shaken = 0.0  # mean square of the specific force's length beyond g, of g
+        self._smooth = (0.0, 0.0, 0.0)  # rate, rad/s
         self._elapsed = 0.0  # t
         self._velocity = self._sum = self._moment = (0.0, 0.0, 0.0)  # v; the integrals of v dt and of t v dt
         self._square = 0.0  # integral of v^2 dt
 
     def saved(self) -> tuple:
         """Return the state, for `restore`."""
-        moving = self.active, self._turning, self._shaken, self._elapsed
+        moving = self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed
         return *moving, self._velocity, self._sum, self._moment, self._square
 
     def restore(self, state: tuple) -> None:
         """Set a saved state."""
-        self.active, self._turning, self._shaken, self._elapsed = state[:4]
-        self._velocity, self._sum, self._moment, self._square = state[4:]
+        self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed = state[:6]
+        self._velocity, self._sum, self._moment, self._square = state[6:]
 
     def lost_in(self, gap: float, *around: float) -> bool:
-        """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s)."""
-        unseen = 0.5 * gap * min(1.0, gap / _SWING)  # in a short gap the rate changes evenly
-        return unseen * max(math.sqrt(self._turning), *around) > LOST
+        """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s).
+
+        Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
+        """
+        swings = gap * gap * self._changing
+        share = swings / (12.0 * self._turning) if swings < 6.0 * self._turning else 0.5
+        return share * gap * max(math.sqrt(self._turning), *around) > LOST
 
     def watch(self, dt: float, rate: Sequence[float], force: Sequence[float], gravity: float) -> None:
         """Follow the motion over `dt` s: rate (3,) in rad/s without bias, specific force (3,) in m/s^2."""
         gain = dt / (_MEMORY + dt)
-        self._turning += gain * (sum(w * w for w in rate) - self._turning)
+        wx, wy, wz = rate
+        sx, sy, sz = self._smooth
+        slower = 1.0 / (_SMOOTHING + dt)
+        cx, cy, cz = (wx - sx) * slower, (wy - sy) * slower, (wz - sz) * slower
+        self._smooth = sx + cx * dt, sy + cy * dt, sz + cz * dt
+        self._turning += gain * (wx * wx + wy * wy + wz * wz - self._turning)
+        self._changing += gain * (cx * cx + cy * cy + cz * cz - self._changing)
         self._shaken += gain * ((math.hypot(*force) / gravity - 1.0) ** 2 - self._shaken)
 
     def begin(self, force: Sequence[float], gravity: float) -> None:
@@ -89,12 +105,14 @@ class Alignment:
         x, y, z = (12.0 * (b - 0.5 * t * a) / t**3 for a, b in zip(self._sum, self._moment))
         return x, y, z
 
-    @property
-    def motion(self) -> tuple[quat.Vector, float]:
-        """The newest velocity (3,) beyond the line, and its standard deviation on each axis; m/s."""
+    def motion(self, gravity: float) -> tuple[quat.Vector, float]:
+        """Return the newest velocity (3,) beyond the line, and its standard deviation on each axis; m/s.
+
+        Its error is that of the line at its end, which the error of the slope explains but for the share that TOGETHER leaves.
+        """
         t = self._elapsed
         x, y, z = (v - a / t - 0.5 * t * s for v, a, s in zip(self._velocity, self._sum, self._slope()))
-        return (x, y, z), 2.0 * math.sqrt(self._scatter() / (1.0 + t / _SWING))
+        return (x, y, z), self.std(gravity) * gravity * t / math.sqrt(3.0)
 
     def _scatter(self) -> float:
         """Return the mean square of the velocity's distance from the line, (m/s)^2."""

@@ -58,12 +58,17 @@ class ErrorCovariance:
         covariance[:, 3:6] = 0.0
         covariance[3:6, 3:6] = np.eye(3) * std**2
 
-    def set_tilt_and_velocity_std(self, tilt: float, velocity: float) -> None:
-        """Set the standard deviations of the inclination (rad) and of the velocity (m/s) and remove their correlations."""
+    def set_tilt_and_velocity_std(self, tilt: float, velocity: float, together: float) -> None:
+        """Set the standard deviations of the inclination (rad) and of the velocity (m/s), and remove their correlations.
+
+        together: correlation that remains, of each horizontal velocity with the inclination by which gravity causes it.
+        """
         covariance, rows = self._kalman.P, [0, 1, 6, 7, 8]
         covariance[rows, :] = 0.0
         covariance[:, rows] = 0.0
         covariance[rows, rows] = [tilt**2] * 2 + [velocity**2] * 3
+        covariance[[1, 6], [6, 1]] = together * tilt * velocity
+        covariance[[0, 7], [7, 0]] = -together * tilt * velocity
 
     def decouple_bias(self) -> None:
         """Remove the correlation of the bias with orientation and velocity, and its effect on them in the prediction."""

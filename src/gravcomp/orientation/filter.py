@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.orientation import quaternion as quat
-from gravcomp.orientation.alignment import Alignment
+from gravcomp.orientation.alignment import TOGETHER, Alignment
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.even_steps import EvenSteps
@@ -230,11 +230,11 @@ class OrientationFilter:
         if across > 0.0:
             tilt = math.atan2(across, z) / across
             self._orientation = quat.normalised(quat.multiply(quat.exponential(tilt * y, -tilt * x, 0.0), self._orientation))
-        self._velocity, velocity_std = (0.0, 0.0, 0.0), START_VELOCITY_STD
+        self._velocity, velocity_std, together = (0.0, 0.0, 0.0), START_VELOCITY_STD, 0.0
         if not self._alignment.active:
-            motion, velocity_std = self._alignment.motion
-            self._velocity = quat.rotate(self._orientation, motion)
-        self._errors.set_tilt_and_velocity_std(self._alignment.std(self._gravity_norm), velocity_std)
+            motion, velocity_std = self._alignment.motion(self._gravity_norm)
+            self._velocity, together = quat.rotate(self._orientation, motion), TOGETHER
+        self._errors.set_tilt_and_velocity_std(self._alignment.std(self._gravity_norm), velocity_std, together)
 
     def _usable(self, verdict: Verdict) -> tuple[bool, bool]:
         """Return whether gyroscope and accelerometer can be used: repeated values can, unless they contradict each other."""
