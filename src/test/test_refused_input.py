@@ -155,7 +155,9 @@ def test_a_board_of_a_real_robot_gets_no_motors_that_nobody_described(capsys, tm
     text = Path(load_robot_file("catheter").source).read_text()
     path = tmp_path / "mine.yaml"
     path.write_text(text.split("\nhardware:")[0])
-    refused(capsys, f"firmware parameters {path} --interface socketcan --channel can9", f"{path}: key 'hardware.motors' is missing")
+    refused(
+        capsys, f"firmware parameters {path} --interface socketcan --channel can9", f"{path}: key 'hardware.motors' is missing"
+    )
 
 
 def test_a_body_that_cannot_be_meshed_is_named_with_its_file(capsys, monkeypatch, tmp_path):

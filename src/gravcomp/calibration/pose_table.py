@@ -68,7 +68,7 @@ def _column(table: CsvTable, name: str, unit: str = "") -> np.ndarray:
 def _check_scale(table: CsvTable, measured: np.ndarray, at: np.ndarray) -> None:
     """Raise MeasurementError where the markers (k, p, 3) are many times as far from each other as they are described (p, 3).
 
-    A robot that curls up brings its markers together, but not all of them in all poses; nothing draws most of them that far apart.
+    A robot that curls up brings its markers together, but not all of them in all poses; nothing draws most of them so far apart.
     """
     one, other = np.triu_indices(len(at), 1)
     described = np.linalg.norm(at[one] - at[other], axis=1)

@@ -125,9 +125,10 @@ class Hardware:
         if homing.tension_max is None or pull <= homing.tension_max:
             return ""
         return (
-            f"no homing: it would pull a cable with {pull:.3g} N before it counts as taut, and {homing.tension_max:g} N are allowed;"
-            f" hardware.homing.current_rise may be {homing.current_rise * homing.tension_max / pull:.2g} A at most. A larger capstan"
-            " lets the current show smaller tensions; or hold the robot straight with its cables just taut and start with zero: start"
+            f"no homing: it would pull a cable with {pull:.3g} N before it counts as taut, and {homing.tension_max:g} N are"
+            f" allowed; hardware.homing.current_rise may be {homing.current_rise * homing.tension_max / pull:.2g} A at most. A"
+            " larger capstan lets the current show smaller tensions; or hold the robot straight with its cables just taut and"
+            " start with zero: start"
         )
 
     @property
