@@ -1,5 +1,6 @@
 """States of the bridge: every cause leads in time to the state in the table of gravcomp_hw/README.md, without a restart."""
 
+import dataclasses
 import math
 import random
 
@@ -295,6 +296,14 @@ def test_homing_finds_where_the_cables_become_taut():
     assert [m.displacement for m in bench.motors] == pytest.approx([0.004] * 6, abs=1e-4)
     assert bench.bridge.report.count("of slack removed") == 6 and "c1: +4.0" in bench.bridge.report
     assert bench.bridge.snapshot().displacement == pytest.approx([0.0] * 6, abs=2e-5)
+
+
+def test_homing_that_would_pull_more_than_is_allowed_is_refused():
+    homing = dataclasses.replace(HARDWARE.homing, tension_max=2.0)
+    bench = Bench(dataclasses.replace(HARDWARE, homing=homing), zero="home_at_start").start()
+    assert bench.bridge.state is State.STOPPED and "2.16 N before it counts as taut" in bench.bridge.message
+    accepted, why = bench.bridge.home(bench.now)
+    assert not accepted and "2 N are allowed" in why and bench.largest_current == 0.0
 
 
 def test_homing_a_broken_cable_fails_and_keeps_the_old_zero():

@@ -16,7 +16,7 @@ STANDARD = Drive()
 def robot(tmp_path):
     """Make a robot file without motors: a tube with cables at 0.7 of its radius."""
 
-    def make(length, diameter, modulus, drive=None, **limits):
+    def make(length, diameter, modulus, drive=None, hardware=None, **limits):
         material = {"youngs_modulus_mpa": modulus, "poissons_ratio": 0.49, "density": 1000}
         body = {
             "name": "tube",
@@ -28,7 +28,7 @@ def robot(tmp_path):
             "limits": limits,
         }
         path = tmp_path / "tube.yaml"
-        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}}}))
+        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}, **(hardware or {})}}))
         return load_robot_file(path)
 
     return make
@@ -75,3 +75,29 @@ def test_motors_reach_the_tension_and_the_stroke_of_a_large_robot(robot):
     assert (drive.displacement_min, drive.displacement_max) == (pytest.approx(-0.3), pytest.approx(0.3))
     assert drive.current_limit * drive.tension_per_ampere >= 1.4 * 300.0 and drive.current_limit <= 10.0
     assert math.isclose(drive.torque_constant, 0.225)
+
+
+def test_joints_that_are_real_motors_keep_the_standard_capstan(robot):
+    motors = [{"cable": name, "joint": f"motor_{name}"} for name in "abc"]
+    drive = robot(9, 4, 50.0, hardware={"joints": {"controller": "winches", "motors": motors}}).hardware.drive
+    assert (drive.capstan_radius, drive.velocity_gain) == (STANDARD.capstan_radius, STANDARD.velocity_gain)
+
+
+@pytest.mark.parametrize("tension", [0.05, 3.0, 5.0, 20.0, 300.0])
+@pytest.mark.parametrize(("length", "diameter", "modulus"), [(9, 4, 50.0), (40, 8, 0.3), (1000, 80, 0.6)])
+def test_homing_pulls_no_more_than_the_robot_stands_or_is_refused(robot, length, diameter, modulus, tension):
+    hardware = robot(length, diameter, modulus, tension_max=tension).hardware
+    pull = hardware.homing.current_rise * hardware.drive.tension_per_ampere
+    assert hardware.homing.tension_max == tension and hardware.homing.current_rise <= 0.06
+    assert pull <= tension or f"{tension:g} N are allowed" in hardware.strong_homing
+    assert bool(hardware.strong_homing) == (pull > tension)
+
+
+def test_a_small_capstan_with_the_standard_homing_is_refused(robot):
+    hardware = robot(40, 8, 0.3, drive={"capstan_radius_mm": 0.2}, hardware={"homing": {"current_rise": 0.06}}).hardware
+    assert "54 N before it counts as taut, and 5 N are allowed" in hardware.strong_homing
+    assert "may be 0.0056 A" in hardware.strong_homing
+
+
+def test_the_article_is_homed():
+    assert not load_robot_file("article").hardware.strong_homing

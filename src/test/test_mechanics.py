@@ -267,3 +267,16 @@ def test_a_bar_with_fibres_stretches_as_the_laminate_of_its_families(angle):
     # The shear modulus of the angle-ply is that of the matrix and c sin^2 cos^2.
     expected = 1.0 + ratio * (np.sin(angle) * np.cos(angle)) ** 2 * 2 * 1.45
     assert stiffer == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("c10", "c20", "c30"),
+    [
+        (17.0, -0.2, 0.023),  # kPa, Ecoflex 00-30
+        (36.0, 0.25, 0.023),  # Dragon Skin 30
+        (500.0, -100.0, 20.0),  # rubber filled with carbon black
+        (100.0, -2.5, 0.0),  # falls only where a sheet is pressed to less than half of its thickness
+    ],
+)
+def test_published_constants_are_stable_in_the_range_of_use(c10, c20, c30):
+    assert Material(law="yeoh", c20_ratio=c20 / c10, c30_ratio=c30 / c10).c30_ratio == c30 / c10

@@ -12,7 +12,7 @@ from gravcomp.calibration.mapping import Mapping, load_mapping
 from gravcomp.calibration.markers import Markers
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.pose_fit import MODULUS, PosePriors, base_unknowns, fit_poses, held_out
-from gravcomp.calibration.pose_intervals import design_effect, not_shown
+from gravcomp.calibration.pose_intervals import covariance, design_effect, not_shown
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.pose_table import read_poses
 from gravcomp.calibration.pose_unknowns import unknowns_of
@@ -115,6 +115,14 @@ def test_what_the_poses_do_not_show_is_said():
     assert "modulus and gain together only (correlation +0.98)" in together
 
 
+def test_an_unknown_that_moves_no_marker_is_not_shown():
+    jacobian = np.zeros((24, 2))
+    jacobian[:, 1] = 1.0
+    matrix = covariance(jacobian, np.random.default_rng(2).normal(size=(4, 2, 3)), np.array([False, True]))
+    (hidden,) = not_shown(["modulus", "base"], matrix, np.array([False, True]))
+    assert "hardly show modulus:" in hidden and matrix[0, 0] > 100.0
+
+
 def test_poses_under_the_robots_weight_alone_show_modulus_over_density():
     poses = known_poses(np.zeros(3))
     pulled = fit_poses(ROBOT, poses.rows([0, 1]), (MODULUS,))
@@ -172,6 +180,16 @@ def test_markers_in_another_unit_than_the_mapping_says_are_refused(tmp_path, map
     place = dataclasses.replace(marker, at=(0.0, 0.0, 0.04))
     with pytest.raises(MeasurementError, match=words):
         read(tmp_path, dataclasses.replace(mapping, markers=(place, second)), table)
+
+
+def test_markers_of_a_robot_that_curls_up_are_read(tmp_path, mapping):
+    base, tip = (
+        dataclasses.replace(mapping.markers[0], name=name, at=(0.0, 0.0, z), columns=columns, unit="mm")
+        for name, z, columns in (("m", 0.01, ("x", "y", "z")), ("n", 0.11, ("a", "b", "c")))
+    )
+    rows = ["first,0,-9.81,0,1.5,20,0,0,10,0,0,108", *(f"{k},0,-9.81,0,1.5,20,0,0,10,8,0,{12 + k}" for k in range(4))]
+    table = "\n".join(["case,gx,gy,gz,pull_n,weight_g,x,y,z,a,b,c", *rows]) + "\n"
+    assert read(tmp_path, dataclasses.replace(mapping, markers=(base, tip)), table).count == 5
 
 
 def test_a_table_is_read_in_the_frame_of_the_base(tmp_path, mapping):

@@ -9,6 +9,7 @@ from test_estimate_command import write_trial
 from gravcomp.commands import estimate, output, reproduce
 from gravcomp.commands.__main__ import main
 from gravcomp.commands.parsers import namespace
+from gravcomp.description import load_robot_file
 from gravcomp.mesh import MeshError
 
 ROBOT_TAKERS = [
@@ -148,6 +149,15 @@ def test_values_of_options_are_checked_when_they_are_read(capsys, line, said):
 
 def test_the_global_namespace_and_a_slash_at_the_end_are_allowed():
     assert [namespace(text) for text in ("", "/", "/left", "/left/", "/a/b")] == ["", "", "/left", "/left", "/a/b"]
+
+
+def test_a_board_of_a_real_robot_gets_no_motors_that_nobody_described(capsys, tmp_path):
+    text = Path(load_robot_file("catheter").source).read_text()
+    path = tmp_path / "mine.yaml"
+    path.write_text(text.split("\nhardware:")[0])
+    refused(
+        capsys, f"firmware parameters {path} --interface socketcan --channel can9", f"{path}: key 'hardware.motors' is missing"
+    )
 
 
 def test_a_body_that_cannot_be_meshed_is_named_with_its_file(capsys, monkeypatch, tmp_path):

@@ -222,6 +222,7 @@ def _test(args: argparse.Namespace) -> int:
 
 
 def _parameters(args: argparse.Namespace) -> int:
+    from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
     from gravcomp.firmware.client import BoardClient
     from gravcomp.firmware.model_settings import LoopParameters
@@ -231,6 +232,9 @@ def _parameters(args: argparse.Namespace) -> int:
     hardware = file.hardware
     if len(hardware.all_buses) == 1:
         hardware = hardware.on(args.interface, args.channel)
+    file.require_motors(hardware.board_bus.interface)
+    if args.standalone and hardware.strong_homing:  # the board homes by itself
+        raise ConfigError(f"{file.source}: {hardware.strong_homing}")
     settings = settings_of(hardware, between=not args.one_bus)
     settings |= settings_alone(LoopParameters.of(file).estimator.heater) if args.standalone else WITH_HOST
     with BoardClient(hardware.board_bus, args.number) as client:

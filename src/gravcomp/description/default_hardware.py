@@ -3,13 +3,14 @@
 What the file gives in `hardware.drive` stays. The rest follows from `robot.limits`: tension, stroke and speed of the cables, and
 motors that reach the largest tension. The capstans are so small that the backlash of the gears turns the tip little: a capstan of
 radius c behind a gear with the backlash b leaves a cable at the distance r from the axis open by b c, and the tip by b c / r. The
-gains of the position loops are those of the same rotor.
+gains of the position loops are those of the same rotor. Homing takes a cable as taut at half of the largest tension, or at what
+the current shows. Joints of a ros2_control robot are real motors: capstans that nobody has described are the standard ones there.
 """
 
 import math
 from typing import Any
 
-from gravcomp.description.hardware import MOTOR_IDS, Drive
+from gravcomp.description.hardware import MOTOR_IDS, Drive, Homing
 from gravcomp.description.own_weight import bend_by_own_weight, largest_pitch_radius
 from gravcomp.description.robot import Robot
 
@@ -17,6 +18,8 @@ _MARGIN = 1.5  # of the current limit over the largest tension's current, for th
 _LARGEST_CURRENT = 10.0  # A, of a C610
 _PLAY = 0.02  # turn of the tip by the backlash of a gear, over the turn by the robot's weight
 _SMALLEST_CAPSTAN = 0.2e-3  # m: of a lead screw with a lead of 1.26 mm
+_HOMING = 0.5  # of the largest tension, at which homing takes a cable as taut
+_LEAST_RISE = 0.01  # A, of homing, that stands well out of the noise of a C610's current
 _SPEED = 28.0  # rad/s of a small capstan: half of what an M2006 does without load
 _BASE_PORT = 43113
 _RIGGING = ("cable", "ratio", "pair", "also", "preload_mm", "differential")  # keys that say which cables a motor moves
@@ -37,10 +40,12 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
     backlash = (
         0.0 if drive.get("backlash_deg") == 0 else math.radians(_number(drive, "backlash_deg", math.degrees(standard.backlash)))
     )
-    radius = 1e-3 * _number(drive, "capstan_radius_mm", 1e3 * _capstan_radius(robot, backlash, standard.capstan_radius))
+    suited = standard.capstan_radius if section.get("joints") else _capstan_radius(robot, backlash, standard.capstan_radius)
+    radius = 1e-3 * _number(drive, "capstan_radius_mm", 1e3 * suited)
     torque = _MARGIN * tension * radius
     constant = max(standard.torque_constant, math.ceil(1e3 * torque / _LARGEST_CURRENT) * 1e-3)
-    current = torque / _number(drive, "torque_constant", constant)
+    used = _number(drive, "torque_constant", constant)
+    current = torque / used
     size = standard.capstan_radius / radius
     derived = {
         "tension_limit": tension,
@@ -60,6 +65,10 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
     most = len(MOTOR_IDS)
     motors = [{**cables, "can_id": 1 + index % most} for index, cables in enumerate(_cables_of_motors(section, robot))]
     completed = {**section, "drive": {**derived, **drive}, "motors": motors}
+    homing = section.get("homing") or {}
+    if isinstance(homing, dict):
+        rise = min(_HOMING * limits.tension_max * radius / used, Homing().current_rise)
+        completed["homing"] = {"current_rise": round(max(rise, _LEAST_RISE), 4), **homing}
     if len(motors) > most and not section.get("buses"):
         count = -(-len(motors) // most)
         completed["buses"] = [{"name": f"bus{k}", "channel": f"239.74.163.{2 + k}:{_BASE_PORT + k}"} for k in range(count)]

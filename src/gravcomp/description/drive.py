@@ -81,6 +81,13 @@ class Homing:
         30.0, edge="mm", minimum=1, maximum=300, description="homing fails when the cable is wound in farther"
     )
     slack: float = parameter(5.0, edge="mm", minimum=0.5, maximum=20, description="paid out first, so that every cable is slack")
+    tension_max: float | None = parameter(
+        None,
+        unit="N",
+        minimum=0.001,
+        maximum=1000,
+        description="homing that would pull a cable more is refused; not given: robot.limits.tension_max",
+    )
 
 
 @dataclasses.dataclass(frozen=True)

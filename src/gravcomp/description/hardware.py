@@ -118,6 +118,20 @@ class Hardware:
         return next((bus for bus in self.all_buses if bus.name == self.imu_bus), self.all_buses[0])
 
     @property
+    def strong_homing(self) -> str:
+        """Why homing would pull too much, as a sentence; empty where it would not, or where no largest tension is known."""
+        homing, ratio = self.homing, min(motor.ratio for motor in self.motors)
+        pull = homing.current_rise * self.drive.tension_per_ampere / ratio
+        if homing.tension_max is None or pull <= homing.tension_max:
+            return ""
+        return (
+            f"no homing: it would pull a cable with {pull:.3g} N before it counts as taut, and {homing.tension_max:g} N are"
+            f" allowed; hardware.homing.current_rise may be {homing.current_rise * homing.tension_max / pull:.2g} A at most. A"
+            " larger capstan lets the current show smaller tensions; or hold the robot straight with its cables just taut and"
+            " start with zero: start"
+        )
+
+    @property
     def cables(self) -> tuple[str, ...]:
         """Names of the cables in their order."""
         return self.order or tuple(dict.fromkeys(cable for motor in self.motors for cable in motor.ratios))

@@ -49,7 +49,10 @@ class RobotFile:
         """The section `hardware`, checked against the robot's cables. Raises ConfigError."""
         hardware = parse_hardware(self.section("hardware"), source=self.source, cables=self.robot.cable_names)
         check_pairs(hardware, self.robot, self.source)
-        return hardware
+        if hardware.homing.tension_max is not None:
+            return hardware
+        homing = dataclasses.replace(hardware.homing, tension_max=self.robot.limits.tension_max)
+        return dataclasses.replace(hardware, homing=homing)
 
     @functools.cached_property
     def scene(self) -> "Scene":

@@ -30,21 +30,23 @@ class Play:
 
     @property
     def share(self) -> float:
-        """Of the sag; infinite for a robot that does not sag."""
+        """Of the sag; infinite where there is none."""
         return self.tip / self.sag if self.sag > 0.0 else math.inf
 
     @property
     def large(self) -> bool:
         """Whether it is more than a robot keeps that its cables hold."""
-        return self.share > _LARGE
+        return self.sag > 0.0 and self.share > _LARGE
 
     def text(self) -> str:
         """Return this as a sentence, with the capstan that would do where it is large."""
         found = (
             f"gears with {math.degrees(self.backlash):.2g} deg of backlash behind capstans of {1e3 * self.capstan:.3g} mm leave"
-            f" {1e3 * self.cable:.2g} mm of a cable open, and up to {1e3 * self.tip:.2g} mm of the tip:"
-            f" {100.0 * self.share:.2g} % of the sag"
+            f" {1e3 * self.cable:.2g} mm of a cable open, and up to {1e3 * self.tip:.2g} mm of the tip"
         )
+        if self.sag == 0.0:
+            return f"{found}; the robot does not sag"
+        found += f": {100.0 * self.share:.2g} % of the sag"
         if not self.large:
             return found
         worse = "the loop may hold the tip worse than when released" if self.share > 1.0 else "the loop keeps about as much"

@@ -89,8 +89,8 @@ class Bridge(Supervisor):
             return False, "not active: activate the bridge first"
         if self.state is State.HOMING:
             return False, "homing is already running"
-        if not self._homable:
-            return False, _SHARED
+        if self._no_homing:
+            return False, self._no_homing
         missing = self._missing(now)
         if missing:
             return False, f"cannot home: {missing}"
@@ -238,8 +238,8 @@ class Bridge(Supervisor):
             if self._zero_policy == "home":
                 self._enter(State.STOPPED, "not homed: call ~/home to find the zero of the cables")
                 return
-            if self._zero_policy == "home_at_start" and not self._homable:
-                self._enter(State.STOPPED, _SHARED)
+            if self._zero_policy == "home_at_start" and self._no_homing:
+                self._enter(State.STOPPED, self._no_homing)
                 return
             if self._zero_policy == "home_at_start":
                 self._start_homing(now)
@@ -277,9 +277,10 @@ class Bridge(Supervisor):
         self._faults.clear()
 
     @property
-    def _homable(self) -> bool:
-        """Whether each motor has a cable of its own, which becomes taut when the motor winds it in."""
-        return all(len(motor.ratios) == 1 and not motor.differential for motor in self._hardware.motors)
+    def _no_homing(self) -> str:
+        """Why not to home; empty where each motor has a cable of its own, which becomes taut without too large a tension."""
+        own = all(len(motor.ratios) == 1 and not motor.differential for motor in self._hardware.motors)
+        return self._hardware.strong_homing if own else _SHARED
 
     def _missing(self, now: float) -> str | None:
         return self._faults.missing(self._faults.silent(now, self._down))

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gravcomp.simulation import RobotModel, Shape
 
 _GRAVITY = 9.81
+_NO_SAG = 1e-6  # of the length: a weightless robot's, by rounding
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -85,6 +86,8 @@ def _play(file: "RobotFile", robot: "Robot", sag: "Shape") -> dict[str, Any] | N
     position, direction = rest_tip(robot)
     away = sag.tip_position - position
     sagged = float(np.linalg.norm(away - direction * (direction @ away)))
+    if sagged < _NO_SAG * robot.length:
+        sagged = 0.0
     along = Rotation.from_quat(sag.tip_orientation).apply((0.0, 0.0, 1.0))
     play = play_of(file.hardware, sag.response, along, sagged)
     return {
