@@ -190,6 +190,8 @@ class InverseController(ManagedNode):
         verdict = self._question.poll()
         self._question = None
         if verdict is None:
+            self._hold_message = "not known: the process that finds it out has failed"
+            self.get_logger().warning(f"whether the cables can hold the target is {self._hold_message}")
             return
         self._holdable, self._hold_message = (Holdable.YES if verdict.held else Holdable.NO), verdict.sentence
         log = self.get_logger()

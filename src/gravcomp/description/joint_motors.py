@@ -45,7 +45,7 @@ class JointMotor(CableMotor):
 
     joint: str = parameter(description="name of the joint in joint_states and in the controller")
     capstan_radius: float | None = parameter(
-        None, edge="mm", minimum=0.5, maximum=200, description="of this motor; not given: hardware.drive.capstan_radius_mm"
+        None, edge="mm", minimum=0.1, maximum=200, description="of this motor; not given: hardware.drive.capstan_radius_mm"
     )
     lookup: Lookup | None = parameter(None, description="displacement over angle, in place of a radius")
     zero: float | None = parameter(
