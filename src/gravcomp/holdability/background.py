@@ -23,7 +23,7 @@ from gravcomp.environment.give_way import give_way
 from gravcomp.environment.process_title import set_title
 from gravcomp.inverse.target import Target
 
-_LONGEST = 600  # s until a process without an answer is ended: it takes seconds, but has the lowest priority
+_LONGEST = 1800  # s until a process without an answer is ended: it computes for seconds, but has the lowest priority
 
 
 class Verdict(NamedTuple):
