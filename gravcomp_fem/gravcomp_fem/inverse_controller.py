@@ -183,7 +183,7 @@ class InverseController(ManagedNode):
         """Ask once whether the target can be held against the gravity of a deformation, and take the answer when it is there."""
         if not self._asked and self._target is not None and self._target.tip_position_weight > 0.0:
             self._asked = True
-            if np.linalg.norm(gravity) > 0.0:
+            if np.linalg.norm(gravity) > 0.0 and self.robot_file.robot.cables:
                 self._question = HoldProcess(self.robot_file.robot, gravity, self._target)
         if self._question is None or self._question.running:
             return
