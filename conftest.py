@@ -46,6 +46,7 @@ FIRST = (
     "test_reduction",
     "test_calibrate_command",
 )
+_OF_A_TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE")  # they wrap and colour output
 _LOCK = "GRAVCOMP_TEST_LOCK"  # environment variable with the file that the processes of a run lock
 
 
@@ -63,6 +64,8 @@ def pytest_configure(config: pytest.Config) -> None:
     from gravcomp.launcher.domain import private_domain
 
     os.environ.update(private_domain())
+    for name in _OF_A_TERMINAL:
+        os.environ.pop(name, None)
 
 
 @pytest.fixture(autouse=True)

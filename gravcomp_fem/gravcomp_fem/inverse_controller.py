@@ -183,13 +183,15 @@ class InverseController(ManagedNode):
         """Ask once whether the target can be held against the gravity of a deformation, and take the answer when it is there."""
         if not self._asked and self._target is not None and self._target.tip_position_weight > 0.0:
             self._asked = True
-            if np.linalg.norm(gravity) > 0.0:
+            if np.linalg.norm(gravity) > 0.0 and self.robot_file.robot.cables:
                 self._question = HoldProcess(self.robot_file.robot, gravity, self._target)
         if self._question is None or self._question.running:
             return
         verdict = self._question.poll()
         self._question = None
         if verdict is None:
+            self._hold_message = "not known: the process that finds it out has failed"
+            self.get_logger().warning(f"whether the cables can hold the target is {self._hold_message}")
             return
         self._holdable, self._hold_message = (Holdable.YES if verdict.held else Holdable.NO), verdict.sentence
         log = self.get_logger()

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import os
+import threading
 import time
 
 import numpy as np
@@ -11,7 +13,7 @@ import yaml
 from gravcomp.commands.__main__ import main
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.holdability import Binding, HoldOptions, holdability
+from gravcomp.holdability import Binding, HoldOptions, background, holdability
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.play import play_of
@@ -220,7 +222,8 @@ def test_info_leaves_it_out_on_demand(tmp_path, capsys):
     assert "allowed: 4 to 180" in capsys.readouterr().err
 
 
-def test_a_loop_asks_a_process_of_its_own():
+def test_a_loop_asks_a_process_of_its_own(monkeypatch):
+    monkeypatch.setattr(background, "give_way", lambda: None)  # the lowest priority waits minutes for the other tests
     question = HoldProcess(arm(tension_max=0.5), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH))
     while question.running:
         time.sleep(0.02)
@@ -241,3 +244,23 @@ def test_a_question_that_is_ended_or_fails_has_no_answer(cables, ended):
     while question.running:
         time.sleep(0.02)
     assert question.poll() is None
+
+
+def test_a_process_that_hangs_or_cannot_be_started_has_no_answer(monkeypatch):
+    """A lock that another thread holds at the fork stays locked: the kernel ends the process."""
+    lock, question = threading.Lock(), (arm(), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH))
+    monkeypatch.setattr(background, "_answer", lambda *_: lock.acquire())
+    monkeypatch.setattr(background, "_LONGEST", 1)
+    with lock:
+        waiting = HoldProcess(*question)
+        end = time.monotonic() + 30.0
+        while waiting.running and time.monotonic() < end:
+            time.sleep(0.02)
+    assert not waiting.running and waiting.poll() is None
+
+    def fail() -> int:
+        raise BlockingIOError("too many processes")
+
+    monkeypatch.setattr(os, "fork", fail)
+    refused = HoldProcess(*question)
+    assert not refused.running and refused.poll() is None

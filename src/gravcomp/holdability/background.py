@@ -2,6 +2,10 @@
 
 question = HoldProcess(robot, gravity, target)      # forks: the answer needs what this process has imported
 verdict = question.poll()                           # None until it is known
+
+A fork copies the locks of the process, but not its other threads: those of ROS and of the late reduction. A lock that one of them
+holds at that moment, for instance that of Numba's compiler, stays locked in the forked process. So the kernel ends a process that
+has not answered in time.
 """
 
 import gc
@@ -19,6 +23,8 @@ from gravcomp.environment.give_way import give_way
 from gravcomp.environment.process_title import set_title
 from gravcomp.inverse.target import Target
 
+_LONGEST = 1800  # s until a process without an answer is ended: it computes for seconds, but has the lowest priority
+
 
 class Verdict(NamedTuple):
     """Whether the tip can be held, and the answer as a sentence."""
@@ -28,27 +34,22 @@ class Verdict(NamedTuple):
 
 
 class HoldProcess:
-    """The process that answers for a robot, one gravity (3,) in m/s^2 and a target."""
+    """The process that answers for a robot, one gravity (3,) in m/s^2 and a target. Raises nothing: a failure has no answer."""
 
     def __init__(self, robot: Robot, gravity: np.ndarray, target: Target):
         """target: of its tip, without weights on the backbone."""
-        parent = os.getpid()
-        self._answer, writing = os.pipe()
+        self._answer, self._pid = -1, 0
         self._status: int | None = None
-        with warnings.catch_warnings():
-            # Other threads are of ROS, which the forked process does not use.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            self._pid = os.fork()
-        if not self._pid:
-            _answer_and_end(robot, gravity, target, writing, parent)
-        os.close(writing)
+        try:
+            self._start(robot, gravity, target)
+        except OSError:  # no memory, or too many processes or files
+            self._status = 1
 
     @property
     def running(self) -> bool:
         """Whether an answer may still come."""
         if self._status is None:
-            ended, status = os.waitpid(self._pid, os.WNOHANG)
-            self._status = status if ended else None
+            self._wait(os.WNOHANG)
         return self._status is None
 
     def poll(self) -> Verdict | None:
@@ -62,9 +63,30 @@ class HoldProcess:
         """End the process."""
         if self.running:
             os.kill(self._pid, signal.SIGKILL)
-            self._status = os.waitpid(self._pid, 0)[1]
+            self._wait(0)
         if self._answer >= 0:
             self._closed()
+
+    def _start(self, robot: Robot, gravity: np.ndarray, target: Target) -> None:
+        """Fork. Raises OSError."""
+        parent = os.getpid()
+        self._answer, writing = os.pipe()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)  # of the other threads, see above
+                self._pid = os.fork()
+            if not self._pid:
+                _answer_and_end(robot, gravity, target, writing, parent)
+        finally:
+            os.close(writing)
+
+    def _wait(self, how: int) -> None:
+        try:
+            ended, status = os.waitpid(self._pid, how)
+        except ChildProcessError:  # other code of this process has waited for it
+            ended, status = self._pid, 1
+        if ended:
+            self._status = status
 
     def _closed(self) -> str:
         """Close the pipe; return what was in it."""
@@ -89,10 +111,12 @@ def _answer_and_end(robot: Robot, gravity: np.ndarray, target: Target, writing: 
     try:
         gc.disable()
         os.setsid()  # Ctrl-C reaches the launcher alone
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
             signal.signal(number, signal.SIG_DFL)
         signal.set_wakeup_fd(-1)
-        end_with_parent()
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
+        signal.alarm(_LONGEST)
+        end_with_parent(signal.SIGKILL)
         if os.getppid() != parent:  # it ended before
             os._exit(1)
         os.dup2(writing, 3)
