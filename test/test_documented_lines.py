@@ -110,7 +110,7 @@ def test_tests_are_found(type_in, line, core):
     """Those of the core are left out, of `--fast` most of them: the run that this test is part of has found them."""
     code, output = type_in(line, f"--collect-only -q --ignore-glob=src/test/{'test_[!i]*' if core else '*'}")
     assert code == 0 and re.search(r"\d+ tests collected", output), output[-2000:]
-    found = {folder: f"{folder}/test_" in output for folder in ("src/test", "gravcomp_fem/test")}
+    found = {folder: f"\n{folder}/test_" in output for folder in ("src/test", "gravcomp_fem/test")}  # as its first word
     assert found == {"src/test": core, "gravcomp_fem/test": not core} and ("test/test_demo.py" in output) is not core
 
 

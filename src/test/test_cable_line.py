@@ -266,6 +266,7 @@ def held(model, virtual):
         setup.truth,
         body=dataclasses.replace(setup.truth.body, youngs_modulus=2.9e6),
         tendons=dataclasses.replace(Tendons(), radius_offset=0.0, angle_offset=0.0),
+        motors=dataclasses.replace(setup.truth.motors, backlash=0.0),  # it moves the tip as much as what the lines leave
     )
     motors = tuple(Motor(cable.name, i + 1) for i, cable in enumerate(model.cables))
     setup = dataclasses.replace(setup, robot=model, nominal=virtual, truth=truth, hardware=Hardware(motors=motors))
