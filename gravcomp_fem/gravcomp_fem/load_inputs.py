@@ -27,6 +27,7 @@ from gravcomp_msgs.msg import WrenchEstimate
 from gravcomp_node import SENSOR
 
 _COMPLIANCE_EVERY = 10  # samples between two computations of the tip's compliance
+_ANCHORED_SHARE = 0.3  # of the time: the rest is for the shape that the command needs
 
 
 class LoadInputs:
@@ -69,7 +70,8 @@ class LoadInputs:
     def _begin_observer(self, parameters: FemSimulatorParameters) -> None:
         self._observer, kind = None, parameters.load.kind
         if kind != "none":
-            self._observer = LoadObserver(self._robot, parameters.load, anchored_model(self._model, kind, self._scene))
+            anchored = anchored_model(self._model, kind, self._scene)
+            self._observer = LoadObserver(self._robot, parameters.load, anchored, _ANCHORED_SHARE)
         self._samples, self._compliance = 0, np.zeros((3, 3))
 
     def begin(self) -> None:

@@ -5,11 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gravcomp.description import Elements, load_robot_file
+from gravcomp.description import Elements, Payload, load_robot_file
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.turning_loads import slopes_of
 from gravcomp.full_model.wrench import PointLoads, Wrench
-from gravcomp.load_estimation import AnchoredModel, LoadEstimationOptions, LoadObserver, anchored_model
+from gravcomp.load_estimation import AnchoredModel, LoadEstimationOptions, LoadObserver, anchored_model, observer
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -111,3 +112,139 @@ def test_the_anchored_model_takes_over_where_the_running_one_is_far_off(model, f
     across = observer.estimate(GRAVITY, 0.62).force[:2]
     assert across == pytest.approx(FORCE[:2], abs=0.15 * np.linalg.norm(FORCE))
     assert anchored_model(model, "payload") is None
+
+
+class Follower:
+    """Stands for an anchored model: answers every step with the same shape, or with None on its way, and takes its time."""
+
+    near, far = 0.04 * ROBOT.length, 0.1 * ROBOT.length
+
+    def __init__(self, answer):
+        self.answer, self.wanted, self.steps, self.clock = answer, None, 0, 0.0
+
+    def reset(self):
+        self.wanted = None
+
+    def anchor(self, place):
+        self.wanted = place
+
+    def distance_to(self, tip):
+        return self.wanted - tip
+
+    def is_off(self, tip):
+        return True
+
+    def step(self, gravity, wound, known, duration):
+        self.steps += 1
+        self.clock += 0.02
+        return self.answer
+
+
+def anchored_observer(found, follower, share=None, **options):
+    """Return an observer whose running model is straight, and has a tip measured there, and that model's shape."""
+    straight = found[0].solve(GRAVITY, WOUND)
+    looks = LoadObserver(ROBOT, LoadEstimationOptions(kind="force", **options), follower, share)
+    looks.predict(0.0, straight, np.diag([0.2, 0.2, 1e-3]), np.zeros(3), WOUND)
+    looks.follow(0.0, straight, WOUND)
+    return looks, straight
+
+
+def test_a_tip_that_moves_is_followed_while_the_anchored_model_is_on_its_way(found):
+    follower = Follower(None)
+    looks, straight = anchored_observer(found, follower)
+    for step in range(80):
+        place = straight.tip_position + np.array([-0.02 - 5e-4 * step, 0.0, 0.0])
+        looks.measure_tip(0.01 * step, place)
+        assert looks.follow(0.01 * step, straight, WOUND)
+    assert follower.wanted == pytest.approx(place)
+    looks.measure_tip(0.2, straight.tip_position)  # one that is late
+    looks.measure_tip(9.0, straight.tip_position)  # one of another clock
+    looks.measure_tip(0.8, np.full(3, np.nan))
+    assert follower.wanted == pytest.approx(place)
+
+
+def test_the_estimate_is_kept_and_not_compensated_when_the_tip_is_no_longer_measured(found):
+    _, pushed, last = found
+    looks, straight = anchored_observer(found, Follower(last))
+    for step in range(60):
+        looks.measure_tip(0.01 * step, pushed.tip_position)
+        assert looks.follow(0.01 * step, straight, WOUND)
+    before = looks.estimate(GRAVITY, 0.6)
+    assert before.force == pytest.approx(last.carried)
+    for step in range(60, 460):
+        now = 0.01 * step
+        if not looks.follow(now, straight, WOUND):
+            looks.predict(now, straight, np.diag([0.2, 0.2, 1e-3]), np.zeros(3), WOUND)
+        assert looks.wrench(GRAVITY, now).force == pytest.approx(np.zeros(3))
+    after = looks.estimate(GRAVITY, now)
+    assert "kept" in after.sentence and not after.sources
+    assert after.force == pytest.approx(before.force) and after.covariance == pytest.approx(before.covariance)
+
+
+def test_no_force_is_found_while_the_robot_is_said_to_carry_none(found):
+    _, pushed, last = found
+    looks, straight = anchored_observer(found, Follower(last))
+    looks.zero(0.0)
+    for step in range(30):
+        looks.measure_tip(0.01 * step, pushed.tip_position)
+        looks.follow(0.01 * step, straight, WOUND)
+    assert looks.estimate(GRAVITY, 0.3).force == pytest.approx(np.zeros(3))
+
+
+@pytest.mark.parametrize(("share", "most"), [(None, 100), (0.3, 16)])
+def test_the_anchored_model_takes_its_share_of_the_time(found, monkeypatch, share, most):
+    follower = Follower(None)
+    monkeypatch.setattr(observer.time, "perf_counter", lambda: follower.clock)
+    looks, straight = anchored_observer(found, follower, share)
+    for step in range(100):
+        looks.measure_tip(0.01 * step, straight.tip_position + np.array([-0.03, 0.0, 0.0]))
+        assert looks.follow(0.01 * step, straight, WOUND)
+    assert 0.8 * most <= follower.steps <= most
+
+
+def test_the_covariance_holds_the_error_of_a_robot_that_is_stiffer_than_its_model(model, found):
+    stiff = dataclasses.replace(ROBOT, segments=tuple(_stiffer(one, 1.15) for one in ROBOT.segments))
+    pushed = Simulator(RobotModel(stiff), reduced=False).solve(GRAVITY, WOUND, wrench=Wrench(FORCE))
+    looks, straight = anchored_observer(found, AnchoredModel(model))
+    for step in range(80):
+        looks.measure_tip(0.01 * step, pushed.tip_position)
+        looks.follow(0.01 * step, straight, WOUND)
+    estimate = looks.estimate(GRAVITY, 0.8)
+    error = estimate.force - FORCE
+    assert error @ np.linalg.solve(estimate.covariance, error) < 12.0
+    assert np.sqrt(np.diag(estimate.covariance)[:2]).max() < 2.0 * np.linalg.norm(FORCE)  # and says something
+
+
+def test_a_lost_tracker_that_says_zero_is_survived_without_a_search(model, found, monkeypatch):
+    _, pushed, _ = found
+    anchored = AnchoredModel(model)
+    monkeypatch.setattr(anchored._simulator.solver, "solve", lambda *_, **__: pytest.fail("a search takes a second"))
+    anchored.anchor(np.zeros(3))
+    for _ in range(20):
+        anchored.step(GRAVITY, WOUND, (), 0.01)
+    anchored.anchor(pushed.tip_position)
+    for _ in range(60):
+        again = anchored.step(GRAVITY, WOUND, (), 0.01)
+    assert again.shape.tip_position == pytest.approx(pushed.tip_position, abs=5e-3 * ROBOT.length)
+
+
+def test_what_the_loads_move_includes_a_payload_beside_the_tip():
+    robot = dataclasses.replace(ROBOT, payload=Payload(0.002, (0.0, 0.0, 0.05)))
+    model = RobotModel(robot)
+    anchored, slack = AnchoredModel(model), np.full(6, np.nan)
+    anchored.anchor(Simulator(model, reduced=False).solve(GRAVITY).tip_position)
+    for _ in range(80):
+        last = anchored.step(GRAVITY, slack, (), 0.01)
+    solver, couple = anchored._simulator.solver, with_payload(model, GRAVITY, None)
+    pulls = np.kron(model.section_rows(1.0)[0, : model.n_free, None], np.eye(3))
+    loads = model.weight(GRAVITY), couple.at(solver.state.u)
+    freed = solver.compliance(np.column_stack([pulls, *loads]), couple)  # without cables the robot is stable without springs
+    by_weight, by_couple = freed[:3, 3], freed[:3, 4]
+    assert abs(by_couple[0]) > 0.1 * abs(by_weight[0])
+    moved = by_weight + by_couple + freed[:3, :3] @ last.carried
+    assert last.by_loads[0] == pytest.approx(moved, abs=0.02 * np.linalg.norm(moved))
+
+
+def _stiffer(segment, factor):
+    material = dataclasses.replace(segment.material, youngs_modulus=factor * segment.material.youngs_modulus)
+    return dataclasses.replace(segment, material=material)

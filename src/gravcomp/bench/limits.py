@@ -146,7 +146,12 @@ ROWS = {
         Row("payload_residual_mm", "the same: lateral tip error once it is found, RMS, worst", "mm", 1.0),
         Row("payload_outside", "payloads outside the interval that is reported, all sensors", "", 0.0),
         Row("payload_imu_frames", "IMU frames that a payload changes while an arm turns the base", ""),
-        Row("force_error_pct", "force across the tip, 0.05 to 0.5 N, tensions and tracker: error, worst", "%", 20.0),
+        Row(
+            "force_error_pct",
+            "force across the tip, 0.05 to 0.5 N, not compensated, both sensors: error, worst",
+            "%",
+            20.0,
+        ),
         Row("force_error_deg", "the same: error of its direction across the robot, worst", "deg", 15.0),
     ),
     "estimator": (

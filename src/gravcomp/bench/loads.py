@@ -1,9 +1,9 @@
 """External loads: wrenches against SoRoSim, and loads that the virtual robot carries and the loop has to find.
 
 The payload is a share of the robot's own mass. The tip forces act across the robot, as a wall does, and, listed apart,
-along it, where the body is so stiff that neither sensor sees much. Trackers and load cells are those of the options' defaults.
-The base's IMU cannot contribute on an arm that moves the base by itself: `payload_imu_frames` counts the IMU frames of the
-virtual robot that a payload changes.
+along it, where the body is so stiff that neither sensor sees much. The robot is compensated for the payload, not for the
+forces. Trackers and load cells are those of the options' defaults. The base's IMU cannot contribute on an arm that moves the
+base by itself: `payload_imu_frames` counts the IMU frames of the virtual robot that a payload changes.
 """
 
 from collections.abc import Callable, Sequence
@@ -124,7 +124,10 @@ def _payload(mass: float, outcomes: list[LoadedOutcome]) -> dict[str, Any]:
 
 
 def _forces(pairs: list[tuple[LoadedCase, LoadedOutcome]]) -> dict[str, Any]:
-    """Return the errors of estimated tip forces: of the part that the sensors can see, across the robot, and of the whole."""
+    """Return the errors of estimated tip forces: of the part that the sensors can see, across the robot, and of the whole.
+
+    `errors_pct` and `errors_deg`: one for each pair; `pushed_mm`: lateral tip error of the robot, which is not compensated.
+    """
     across, angles, whole, deviations = [], [], [], []
     for case, outcome in pairs:
         true, found = np.array(case.force), outcome.estimate.force
@@ -137,9 +140,11 @@ def _forces(pairs: list[tuple[LoadedCase, LoadedOutcome]]) -> dict[str, Any]:
     return {
         "error_pct": max(across),
         "error_deg": max(angles),
+        "errors_pct": across,
+        "errors_deg": angles,
         "whole_error_pct": max(whole),
         "along_std_n": max(deviations),
-        "residual_mm": 1e3 * max(outcome.after for _, outcome in pairs),
+        "pushed_mm": 1e3 * max(outcome.after for _, outcome in pairs),
     }
 
 

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Response, Shape
 from gravcomp.full_model.spring import Spring
@@ -40,6 +41,7 @@ _TURN = 0.25  # of the length: lever that makes a spring of the tip as stiff as 
 _STIFF = 30.0  # stiffness of a spring over that of the tip at rest across its axis
 _STRIDE = 0.04  # of the length: by how much the spring's end moves at once; a step that fails is halved
 _SHARES = 0.2, 0.03  # of the way to the measured tip that it moves at once, and near it, where the way is mostly noise
+_LEAST_STRIDE = 1e-3  # of a stride: where steps fail as short as this, the model begins again at rest
 _NEAR = 1.0  # strides: a shape that is farther from the measured tip says too little of the robot
 _FAR = 0.1  # of the length: a model whose tip is farther from the measured one is no measure of the load
 _TAKEN_OVER = 0.1  # of the spring's force that f_c takes over in a step
@@ -76,7 +78,8 @@ class AnchoredModel:
 
     def __init__(self, model: RobotModel, scene: Scene | None = None):
         """scene: what the robot touches. Raises MeshError for a body without cross-sections."""
-        self._model, self._simulator = model, Simulator(model, reduced=False, scene=scene)
+        # A search from rest takes long, and finds no shape that the springs hold.
+        self._model, self._simulator = model, Simulator(model, reduced=False, scene=scene, searches=False)
         rows = np.concatenate([model.section_rows(station) for station in _STATIONS])
         self._rows, self._pulls = rows, np.kron(rows[:, : model.n_free].T, np.eye(3))
         # With less the robot may snap through, with more the tracker's noise presses on the axis.
@@ -87,8 +90,12 @@ class AnchoredModel:
 
     def reset(self) -> None:
         """Forget where the tip is."""
-        self._simulator.reset()
         self._wanted: np.ndarray | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Return to rest, without a load."""
+        self._simulator.reset()
         self._load = np.zeros(3)  # f_c
         self._end = rest_tip(self._model.robot)[0]  # of the tip's spring, on its way to where the tip was measured
         self._stride = _STRIDE * self._model.length
@@ -105,9 +112,13 @@ class AnchoredModel:
         """Distance in m of a tip beyond which the response of another model's shape does not lead to the robot."""
         return _FAR * self._model.length
 
+    def distance_to(self, tip: np.ndarray) -> np.ndarray:
+        """Return the way (3,) in m from a tip (3,) to the measured one; zeros where none was measured."""
+        return np.zeros(3) if self._wanted is None else self._wanted - tip
+
     def is_off(self, tip: np.ndarray) -> bool:
         """Return whether the tip (3,) m of another model is far from the measured one."""
-        return self._wanted is not None and bool(np.linalg.norm(self._wanted - tip) > self.far)
+        return bool(np.linalg.norm(self.distance_to(tip)) > self.far)
 
     def anchor(self, place: np.ndarray) -> None:
         """Hold the tip at a place (3,) in m from now on."""
@@ -130,6 +141,8 @@ class AnchoredModel:
         shape = self._simulator.step(gravity, wound, duration=duration, wrench=wrenches)
         if not shape.is_equilibrium:
             self._stride *= 0.5
+            if self._stride < _LEAST_STRIDE * longest:
+                self._begin()
             return None
         self._end, self._stride = end, min(1.5 * self._stride, longest)
         pull = self._stiffness * (end - shape.tip_position)
@@ -150,13 +163,14 @@ class AnchoredModel:
         """Return a shape under its wrenches with the response of the robot without springs."""
         solver, model = self._simulator.solver, self._model
         load = model.weight(shape.gravity)
-        if known:
-            load = load + PointLoads(model, known).at(solver.state.u)
+        lasting = with_payload(model, shape.gravity, PointLoads.of(model, known))
+        if lasting is not None:
+            load = load + lasting.at(solver.state.u)
         moved = float(np.linalg.norm(shape.tip_position - self._compliant_at))
         if self._sprung is None or self._steps % _COMPLIANCE_EVERY == 0 or moved > _COMPLIANCE_MOVED * model.length:
             pulls = np.column_stack([self._pulls, load])
             try:
-                compliance = solver.compliance(pulls, PointLoads.of(model, wrenches))
+                compliance = solver.compliance(pulls, with_payload(model, shape.gravity, PointLoads.of(model, wrenches)))
             except NotPositiveDefinite:
                 return None
             self._sprung, self._compliant_at = 0.5 * (compliance + compliance.T), shape.tip_position
@@ -183,6 +197,9 @@ def _along_arc(start: np.ndarray, goal: np.ndarray, share: float, stride: float)
     """
     sizes = np.linalg.norm(start), np.linalg.norm(goal)
     share = min(share, stride / max(float(np.linalg.norm(goal - start)), 1e-30))
+    if min(sizes) < stride:  # at the base no arc leads around it
+        straight: np.ndarray = start + share * (goal - start)
+        return straight
     direction = (1.0 - share) * start / sizes[0] + share * goal / sizes[1]
     place: np.ndarray = direction / np.linalg.norm(direction) * ((1.0 - share) * sizes[0] + share * sizes[1])
     return place

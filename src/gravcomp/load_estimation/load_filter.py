@@ -49,12 +49,26 @@ class LoadFilter:
         """Covariance (k, k) of the load."""
         return self.covariance[: self._k, : self._k]
 
-    def free_load(self, deviation: float) -> None:
-        """Let the load be anything of this standard deviation; what is known of the errors stays."""
-        self.state[: self._k] = 0.0
+    def set_load(self, load: np.ndarray, covariance: np.ndarray) -> None:
+        """Let the load be `load` (k,) with this covariance (k, k); what is known of the errors stays."""
+        self.state[: self._k] = load
         self.covariance[: self._k] = 0.0
         self.covariance[:, : self._k] = 0.0
-        self.covariance[: self._k, : self._k] = deviation**2 * np.eye(self._k)
+        self.covariance[: self._k, : self._k] = covariance
+
+    def covariance_by_tip(self, robot: HeldRobot, carried: np.ndarray, off: np.ndarray, deviation: float) -> np.ndarray:
+        """Return the covariance (3, 3) N^2 of the force `carried` (3,) N that a model needs at a measured tip.
+
+        off (3,) m: of the model's tip from the measured one; deviation in N: of the force before. The errors that were learnt are
+        not taken out of this force, and count as if they were not known.
+        """
+        alone = self.copy()
+        alone.learning = False
+        alone.covariance += np.outer(self.state, self.state)
+        alone.state[:] = 0.0
+        alone.set_load(carried, deviation**2 * np.eye(3))
+        alone.take_tip(np.zeros(3), robot, np.eye(3), carried, off)
+        return alone.load_covariance
 
     def open_load(self, deviation: float) -> None:
         """Let the load be farther from what it was, by this standard deviation."""

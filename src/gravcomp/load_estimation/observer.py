@@ -15,6 +15,7 @@ errors are part of it, and either sensor alone is enough.
 """
 
 import collections
+import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -50,14 +51,25 @@ class _Prediction(NamedTuple):
     carried: np.ndarray
     gravity: np.ndarray
     anchored: bool
+    covariance: np.ndarray | None  # (3, 3) of the force that an anchored model carries
 
 
 class LoadObserver:
     """Estimates the load of one robot."""
 
-    def __init__(self, robot: Robot, options: LoadEstimationOptions, anchored: AnchoredModel | None = None):
-        """anchored: predicts for a force while the tip is measured; None: shapes are given to `predict` only."""
-        self._robot, self.options = robot, options
+    def __init__(
+        self,
+        robot: Robot,
+        options: LoadEstimationOptions,
+        anchored: AnchoredModel | None = None,
+        share: float | None = None,
+    ):
+        """anchored: predicts for a force while the tip is measured; None: shapes are given to `predict` only.
+
+        share: of the time between the stamps that the anchored model may take, by the clock; None: any, for results that do not
+        depend on the machine.
+        """
+        self._robot, self.options, self._share = robot, options, share
         self._anchored = anchored if options.kind == "force" else None
         self._rest_tip = rest_tip(robot)[0]
         self.reset()
@@ -75,7 +87,8 @@ class LoadObserver:
         self._outliers: dict[str, int] = {}
         self._sentence = ""
         self._last_wrench: Wrench | None = None
-        self._anchored_at, self._followed_at = -np.inf, -np.inf
+        self._anchored_at, self._followed_at, self._newest, self._rest_until = -np.inf, -np.inf, -np.inf, -np.inf
+        self._far = False  # from the running model when the tip was measured last
         if self._anchored is not None:
             self._anchored.reset()
 
@@ -88,18 +101,24 @@ class LoadObserver:
 
         False: that shape predicts, if it is an equilibrium. wound (m,) in m as in `predict`; known wrenches act in addition.
         """
-        if self._anchored is None or self._filter is None or wound is None:
+        if self._anchored is None:
             return False
-        if stamp - self._anchored_at > self.options.stale_after:
+        if stamp < self._newest:  # a replay has restarted
+            self._anchored_at, self._followed_at, self._rest_until = -np.inf, -np.inf, -np.inf
+        self._newest = stamp
+        if self._filter is None or wound is None or stamp - self._anchored_at > self.options.stale_after:
             return False
         if shape.is_equilibrium and not self._anchored.is_off(shape.tip_position):
             return False
-        elapsed = stamp - self._followed_at
+        if stamp < self._rest_until:
+            return True
+        elapsed, started = stamp - self._followed_at, time.perf_counter()
         found = self._anchored.step(shape.gravity, wound, known, elapsed if 0.0 < elapsed <= _KEPT else None)
         self._followed_at = stamp
-        if found is None:  # it is on its way to the tip
-            return True
-        self.predict(stamp, found.shape, found.tip_compliance, found.carried, wound, found.by_loads)
+        if found is not None:  # else it is on its way to the tip
+            self.predict(stamp, found.shape, found.tip_compliance, found.carried, wound, found.by_loads)
+        if self._share is not None:
+            self._rest_until = stamp + (time.perf_counter() - started) / self._share
         return True
 
     def predict(
@@ -118,40 +137,55 @@ class LoadObserver:
         """
         robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip, by_loads)
         tip, tension = shape.tip_position, shape.cable_tension
-        self._history.append(_Prediction(stamp, tip, tension, robot, carried, shape.gravity, by_loads is not None))
-        while self._history[0].stamp < stamp - _KEPT:
-            self._history.popleft()
         if self._filter is None:
             sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
             self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
-        if not self._scale and (shape.cable_tension > 0.0).any():
+        if not self._scale and (tension > 0.0).any():
             strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
             self._scale = self._robot.limits.tension_max / strongest
             if self.options.kind == "payload":
                 self._scale /= STANDARD_GRAVITY
+        covariance = None
+        if by_loads is not None and self._anchored is not None:
+            off = self._anchored.distance_to(tip)
+            covariance = self._filter.covariance_by_tip(robot, carried, off, self._scale)
+        elif self._is_anchored:  # what was published last is kept until more is measured
+            self._filter.set_load(*self._needed())
+        if self._history and stamp < self._history[-1].stamp:  # a replay has restarted
+            self._history.clear()
+            self._seen.clear()
+        self._history.append(_Prediction(stamp, tip, tension, robot, carried, shape.gravity, by_loads is not None, covariance))
+        while self._history[0].stamp < stamp - _KEPT:
+            self._history.popleft()
         if self._scale and not self._released and stamp >= self._zero_until:
-            self._filter.free_load(self._scale)
+            self._filter.set_load(np.zeros(self._numbers), self._scale**2 * np.eye(self._numbers))
             self._filter.learning, self._released = False, True
 
     def zero(self, now: float) -> None:
         """Begin to learn the model's errors and the sensors' zeros: the robot carries no load for `zero_time` s."""
         self._zero_until = now + self.options.zero_time
         if self._filter is not None:
-            self._filter.free_load(0.0)
+            self._filter.set_load(np.zeros(self._numbers), np.zeros((self._numbers, self._numbers)))
             self._filter.learning = True
         self._released, self.zeroed = False, True
         self._applied[:] = 0.0
 
     def measure_tip(self, stamp: float, position: np.ndarray) -> None:
         """Take a measured tip (3,) m in soft_base at its stamp (s)."""
-        then = self._at(stamp)
-        if then is None or self._filter is None or not np.isfinite(position).all():
+        if not np.isfinite(position).all():
             return
-        if self._anchored is not None and np.linalg.norm(position) < _REACH * self._robot.length:
-            self._anchored.anchor(position)
+        anchored = self._anchored if np.linalg.norm(position) < _REACH * self._robot.length else None
+        # A model that is on its way to the tip predicts nothing, and has to know where the tip is now.
+        if anchored is not None and self._anchored_at <= stamp and abs(self._newest - stamp) <= self.options.stale_after:
+            anchored.anchor(position)
             self._anchored_at = stamp
-            reach = self._anchored.near if then.anchored else self._anchored.far
-            if np.linalg.norm(position - then.tip) > reach:  # the anchored model comes to it first
+        then = self._at(stamp)
+        if then is None or self._filter is None:
+            return
+        if anchored is not None:
+            away = bool(np.linalg.norm(position - then.tip) > (anchored.near if then.anchored else anchored.far))
+            self._far = away or then.anchored
+            if away:  # the anchored model comes to it first
                 return
         self._diffuse(then)
         moved, _ = self._moved(then)
@@ -183,7 +217,7 @@ class LoadObserver:
         if self._filter is None or not self.options.compensate or not self._released:
             return None
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
-        if self._history[-1].anchored:  # the running model would lose its equilibrium under what has pushed the robot so far
+        if self._far:  # the running model would lose its equilibrium under what has pushed the robot so far
             wanted = np.zeros(self._numbers)
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
@@ -210,6 +244,8 @@ class LoadObserver:
         if not sources and not sentence:
             if not self._seen:
                 sentence = "neither tips nor tensions are measured: the load is not known"
+            elif self._far and now - self._anchored_at <= self.options.stale_after:
+                sentence = "the model has not come to the measured tip, which is far from it: the last estimate is kept"
             elif now - self._history[-1].stamp > self.options.stale_after:
                 sentence = (
                     "the model finds no equilibrium under the load, which may be more than the cables hold:"
@@ -220,13 +256,12 @@ class LoadObserver:
         if self._filter is None:
             return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
         load, covariance = self._filter.load, self._filter.load_covariance
-        payload, force = self.options.kind == "payload", direction @ load
-        if self._history and self._history[-1].anchored and sources:
-            # Far bent, friction and stretch of the cables are not those that were learnt: the force is what the tip needs.
-            force = np.mean([entry.carried for entry in self._history if entry.anchored], axis=0)
+        payload, force, spread = self.options.kind == "payload", direction @ load, direction @ covariance @ direction.T
+        if self._is_anchored:
+            force, spread = self._needed()
         return LoadEstimate(
             force=force,
-            covariance=direction @ covariance @ direction.T,
+            covariance=spread,
             mass=float(load[0]) if payload else np.nan,
             mass_std=float(np.sqrt(covariance[0, 0])) if payload else np.nan,
             zeroed=self.zeroed,
@@ -259,6 +294,21 @@ class LoadObserver:
         if not self._history[0].stamp - _APART <= stamp <= self._history[-1].stamp + _APART:
             return None
         return min(self._history, key=lambda entry: abs(entry.stamp - stamp))
+
+    @property
+    def _is_anchored(self) -> bool:
+        """Whether the load is what the anchored model carries."""
+        return self._released and bool(self._history) and self._history[-1].anchored
+
+    def _needed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the force (3,) N that the anchored model has carried lately, on average, and its covariance (3, 3).
+
+        Far bent, friction and stretch of the cables are not those that were learnt: the force is what the measured tip needs.
+        """
+        covariance = self._history[-1].covariance
+        assert covariance is not None
+        force: np.ndarray = np.mean([entry.carried for entry in self._history if entry.anchored], axis=0)
+        return force, covariance
 
     def _behind(self, then: _Prediction) -> _Prediction:
         """Return the prediction at which the robot may still be."""

@@ -43,8 +43,8 @@ class Simulator:
     (True, -27.9)
     """
 
-    def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None):
-        """reduced: use the reduced model if one is built; scene: what the robot touches.
+    def __init__(self, robot: Robot | RobotModel, reduced: bool = True, scene: "Scene | None" = None, searches: bool = True):
+        """reduced: use the reduced model if one is built; scene: what the robot touches; searches: `step` may search.
 
         Raises MeshError for a body that cannot be meshed or computed, ValueError for one that has no contact, ConfigError for a
         scene in which the robot cannot be.
@@ -56,7 +56,7 @@ class Simulator:
         if scene:
             refuse_start(scene, self.robot)
             self.solver.contact = FullContact(self.model, scene)
-        self._creep = Creep(self.model)
+        self._creep, self._searches = Creep(self.model), searches
         self._pace = SearchPace(self.model.length)
         self._serving = self.load_reduced() if reduced else None
 
@@ -132,7 +132,7 @@ class Simulator:
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
             state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True, loads=loads)
-        if not state.converged and self._pace.may_search(gravity, cables):
+        if not state.converged and self._searches and self._pace.may_search(gravity, cables):
             last, self.solver.state = self._pace.last_gravity, before
             if last is not None and loads is None:
                 state = self.solver.approach(last, gravity, cables)
