@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -42,7 +41,8 @@ def cache_of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 def of_the_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder that all processes of a run share."""
     own = tmp_path_factory.getbasetemp()
-    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    # Not by the environment of pytest-xdist, which a run that a test starts inherits.
+    return own.parent if own.name.startswith("popen-") else own
 
 
 def keep_compiled(folder: Path, *kinds: str) -> None:

@@ -118,6 +118,19 @@ def test_a_node_ends_as_the_interpreter_ends(shared_host, executable, text, code
     assert words in output and words in apart.stdout + apart.stderr
 
 
+def test_a_node_that_is_interrupted_before_it_begins_ends_without_a_traceback():
+    """Until it has its own output, the terminal of the command would show it."""
+    interrupted = """
+import os, signal
+from gravcomp.launcher.node_host import _become
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+os.kill(os.getpid(), signal.SIGINT)
+_become(["/node"], os.open(os.devnull, os.O_WRONLY), {}, os.getppid(), os.pipe()[1])
+"""
+    done = subprocess.run([sys.executable, "-c", interrupted], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
+
+
 def test_the_command_line_and_the_mark_of_a_node_are_visible(shared_host, executable, tmp_path):
     path = executable(WAIT, "long_wait")
     pid = shared_host.start([str(path), "-p", "a:=1"], tmp_path / "log", {})

@@ -154,6 +154,8 @@ def _become(command: list[str], output: int, environment: dict[str, str], host: 
         sys.argv = list(command)
         sys.path.insert(0, os.path.dirname(command[0]))  # as for a file that the interpreter runs
         code = _run(command[0])
+    except KeyboardInterrupt:  # before the node began
+        code = -signal.SIGINT
     except BaseException:
         traceback.print_exc()
     finally:
