@@ -19,15 +19,15 @@ import math
 import numpy as np
 
 from gravcomp.cables.friction import Sliding
+from gravcomp.full_model.applied_load import AppliedLoad
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.payload import with_payload
-from gravcomp.full_model.spring import Spring
-from gravcomp.full_model.turning_loads import TurningFactor, add_symmetric_part, slopes_of
+from gravcomp.full_model.turning_loads import TurningFactor
 from gravcomp.full_model.wrench import PointLoads
-from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix, NotPositiveDefinite
+from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 
 # Smallest det F that a step may leave in an element.
@@ -75,7 +75,7 @@ class StaticTracker:
     def reset(self) -> None:
         """Return to the straight robot without tension."""
         self._contained: list[np.ndarray] = []  # of the loads that turn, in the last factor
-        self._springs: tuple[tuple[float, ...], ...] = ()  # that the kept factor holds, see `_Load.springs`
+        self._springs: tuple[tuple[float, ...], ...] = ()  # that the kept factor holds, see `AppliedLoad.springs`
         self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
         self._before: np.ndarray | None = None  # displacements (n, 3) of the equilibrium before the current one
         count = self.model.tendons.count
@@ -114,7 +114,7 @@ class StaticTracker:
             self.contact.begin(previous.u, gravity)
             iterations *= _MORE_IN_CONTACT
         loads = with_payload(self.model, gravity / fraction, loads)
-        load = _Load(self.model.weight(gravity), loads, fraction)
+        load = AppliedLoad(self.model.weight(gravity), loads, fraction)
         if load.turns or load.springs != self._springs:
             self._kept = None  # it may be of other loads
         self._springs = load.springs
@@ -150,7 +150,7 @@ class StaticTracker:
 
         loads: those that turn or come from springs change A. Raises NotPositiveDefinite where the state is not stable.
         """
-        model, state, load = self.model, self.state, _Load(np.zeros(0), loads, 1.0)
+        model, state, load = self.model, self.state, AppliedLoad(np.zeros(0), loads, 1.0)
         self._kept = None
         self._matrix.values[:] = 0.0
         model.elements.assemble(state.u, self._matrix, self.viscous)
@@ -163,7 +163,7 @@ class StaticTracker:
     def _newton_step(
         self,
         state: Equilibrium,
-        load: "_Load",
+        load: AppliedLoad,
         cables: CableInput,
         origin: np.ndarray | None,
         tolerance: float,
@@ -240,7 +240,7 @@ class StaticTracker:
         self,
         state: Equilibrium,
         factor: "BlockCholesky | TurningFactor",
-        load: "_Load",
+        load: AppliedLoad,
         cables: CableInput,
         jacobian: np.ndarray,
         start: np.ndarray,
@@ -282,7 +282,7 @@ class StaticTracker:
         self,
         state: Equilibrium,
         factor: "BlockCholesky | TurningFactor",
-        load: "_Load",
+        load: AppliedLoad,
         cables: CableInput,
         jacobian: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -309,7 +309,7 @@ class StaticTracker:
         return factor if np.abs(state.u - u).max() < _FACTOR_REACH * self.model.length else None
 
     def _new_factor(
-        self, state: Equilibrium, load: "_Load", origin: np.ndarray | None, stable: bool
+        self, state: Equilibrium, load: AppliedLoad, origin: np.ndarray | None, stable: bool
     ) -> tuple[BlockCholesky, np.ndarray, bool]:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
@@ -335,7 +335,7 @@ class StaticTracker:
                 continue
         raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
 
-    def _assemble(self, state: Equilibrium, load: "_Load", origin: np.ndarray | None) -> np.ndarray:
+    def _assemble(self, state: Equilibrium, load: AppliedLoad, origin: np.ndarray | None) -> np.ndarray:
         """Assemble the tangent at `state` and return the internal forces (n, 3)."""
         self._matrix.values[:] = 0.0
         force = self.model.elements.assemble(state.u, self._matrix, self.viscous, origin)
@@ -344,7 +344,7 @@ class StaticTracker:
         self._contained = load.add_to_tangent(self._matrix, state.u)
         return force
 
-    def _allowed_residual(self, state: Equilibrium, load: "_Load") -> float:
+    def _allowed_residual(self, state: Equilibrium, load: AppliedLoad) -> float:
         """Return the force out of balance in N below which a state counts as balanced.
 
         Short steps alone prove nothing: the corrections of a factor that is too stiff are short as well.
@@ -358,49 +358,8 @@ class StaticTracker:
         pull = state.tension @ state.tendons.force_jacobian
         return pull if self.contact is None else pull + self.contact.pull
 
-    def _measure(self, state: Equilibrium, load: "_Load") -> None:
+    def _measure(self, state: Equilibrium, load: AppliedLoad) -> None:
         """Set the residual of `state`."""
         force = self.model.free(self.model.elements.internal_force(state.u, self.viscous))
         out = load.at(state.u) - force + self._pull(state)
         state.residual = float(np.abs(out).max())
-
-
-class _Load:
-    """The weight of a model and, in addition, loads that may turn with their sections."""
-
-    def __init__(self, weight: np.ndarray, loads: PointLoads | None, fraction: float):
-        """weight (3 n_free,) in N; loads: act by `fraction` of their value."""
-        self._loads, self._fraction = loads, fraction
-        self._weight = weight
-
-    def at(self, u: np.ndarray) -> np.ndarray:
-        """Return the forces (3 n_free,) at the displacements u (n, 3)."""
-        return self._weight if self._loads is None else self._weight + self._loads.at(u, self._fraction)
-
-    @property
-    def turns(self) -> bool:
-        """Whether a part of the load turns with its section."""
-        return self._loads is not None and any(not isinstance(one, Spring) for one, _ in self._loads.turning)
-
-    @property
-    def springs(self) -> tuple[tuple[float, ...], ...]:
-        """Fraction of the load, station and stiffness of each spring."""
-        if self._loads is None:
-            return ()
-        springs = (one for one, _ in self._loads.turning if isinstance(one, Spring))
-        return tuple((self._fraction, one.station, *one.stiffness) for one in springs)
-
-    def add_to_tangent(self, matrix: BlockMatrix, u: np.ndarray) -> list[np.ndarray]:
-        """Add to the stiffness what is symmetric of the loads that turn, at u (n, 3), and return it."""
-        if self._loads is None or not self._loads.turning:
-            return []
-        return add_symmetric_part(matrix, self._loads, slopes_of(self._loads, u, self._fraction))
-
-    def turned(self, factor: BlockCholesky, u: np.ndarray, contained: list[np.ndarray]) -> BlockCholesky | TurningFactor:
-        """Return the factor with the rest of what loads that turn add to the tangent at u (n, 3); contained: in the factor."""
-        if self._loads is None or not self._loads.turning:
-            return factor
-        slopes = slopes_of(self._loads, u, self._fraction)
-        if len(contained) == len(slopes) and all(np.array_equal(h, j) for h, j in zip(contained, slopes)):
-            return factor
-        return TurningFactor(factor, self._loads, slopes, contained)

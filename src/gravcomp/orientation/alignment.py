@@ -18,11 +18,9 @@ START_STD = math.radians(5.0)  # of one specific force at rest
 LARGEST_STD = math.radians(90.0)  # nothing is known
 LOST = math.radians(10.0)  # of a bridged gap: more is not bridged
 TOGETHER = math.sqrt(0.75)  # correlation between the slope of a line that fits evenly spread errors and its value at the end
-_SWING = 0.3  # s; about as long goes a motion in one direction
+_SWING = 0.3  # s, about the time that a motion goes in one direction
 _MEMORY = 1.0  # s, of the motion before the gap
-_SMOOTHING = (
-    0.05  # s, of the rates before their change is measured: noise and vibration change the rate, but hardly turn the sensor
-)
+_SMOOTHING = 0.05  # s, of the rates whose change is measured: noise and vibration change rates, but hardly turn the sensor
 
 
 class Alignment:
