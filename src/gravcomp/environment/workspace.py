@@ -16,7 +16,8 @@ PACKAGES = ("src", "gravcomp_msgs", "gravcomp_node", "gravcomp_hw", "gravcomp_es
 
 def build(root: Path, python: Interpreter, inner: Path) -> "dict[str, str]":
     """Build all packages; returns the search paths that a shell would have after sourcing the workspace. Raises SetupError."""
-    environment = dict(os.environ)
+    # colcon's own default also has make's limit of load, which leaves one job where anything else runs.
+    environment = {"MAKEFLAGS": f"-j{os.cpu_count() or 1}", **os.environ}
     if python.ros:
         # The system's colcon writes scripts for the system's Python, which finds our packages by this.
         environment["PYTHONPATH"] = ":".join(filter(None, [str(_site_packages(inner)), os.environ.get("PYTHONPATH")]))
