@@ -64,9 +64,9 @@ class FemSimulator(ManagedNode):
         self._simulator = DynamicSimulator(robot) if self._dynamic else Simulator(robot, scene=scene)
         self._cables: np.ndarray | None = None  # m, of the model
         self._wanted: np.ndarray | None = None  # m, commanded or measured
-        # The first step compiles functions that are not cached yet; do it before the first sample arrives.
-        for cables in (None, np.zeros(len(self.robot_file.robot.cables))):
-            self._simulator.step(np.zeros(3), cables)
+        # Functions that are not cached yet are compiled here rather than when the first sample, or the first pull, arrives.
+        self._simulator.warm_up()
+        cables = np.zeros(len(self.robot_file.robot.cables))
         within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
         around = scene or self.robot_file.zones or not self.parameters.turn.enabled

@@ -31,8 +31,8 @@ from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp.inverse import Holdable
 from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.whole_file import write_whole
-from gravcomp_msgs.msg import CableCommand, ControllerStatus
-from gravcomp_node import LATCHED, ManagedNode, run
+from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation
+from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 
 # Messages that the middleware keeps between two reads, which are 0.1 s apart.
 _KEPT = 100
@@ -48,7 +48,7 @@ class Judge(ManagedNode):
         """Prepare the tracks and, if the delay is measured, the CAN listener."""
         self._truth_tip, self._model_tip = Track(3), Track(3)
         self._truth_gravity, self._gravity = Track(3), Track(3)
-        self._imu, self._commands = Track(0), Track(0)
+        self._imu, self._commands, self._by_full_model = Track(0), Track(0), Track(1)
         self._states: dict[str, str] = {}
         self._phase, self._begin, self._compensated_at = "waiting for the ground truth", None, None
         self._pending = None
@@ -71,6 +71,7 @@ class Judge(ManagedNode):
             )
         ]
         self._status = Polled(self, ControllerStatus, "controller/status", LATCHED)
+        self._deformation = Polled(self, Deformation, "robot/deformation", SENSOR)
         self._unholdable: str | None = None
         self._relax = self.create_client(Trigger, "inverse_controller/relax")
         self._enable = self.create_client(SetBool, "inverse_controller/enable")
@@ -145,6 +146,9 @@ class Judge(ManagedNode):
         for polled, track, values in self._sources:
             for received in polled.take_all():
                 track.add(_seconds(received.message), *values(received.message))
+        shape = self._deformation.take()  # the last one is enough for a share of the time
+        if shape is not None:
+            self._by_full_model.add(_seconds(shape.message), float(shape.message.model == "full"))
         status = self._status.take()
         if status is not None and status.message.holdable:
             self._unholdable = status.message.hold_message if status.message.holdable == Holdable.NO else None
@@ -192,6 +196,7 @@ class Judge(ManagedNode):
             "delay_ms": None
             if delays is None
             else {"median": _rounded(float(np.median(delays)), 2), "p99": _rounded(float(np.percentile(delays, 99)), 2)},
+            "full_model_pct": _rounded(figures.share(self._by_full_model, counted_from, end), 1),
             "gravity_error_deg": _rounded(None if error is None else float(np.degrees(error)), 3),
         }
 

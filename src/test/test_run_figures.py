@@ -58,3 +58,11 @@ def test_gravity_error_is_the_angle_whatever_the_lengths():
 def test_rate_counts_intervals():
     assert run_figures.rate(0.01 * np.arange(101)) == pytest.approx(100.0)
     assert run_figures.rate(np.array([1.0])) is None
+
+
+def test_a_share_counts_the_samples_of_its_time_alone():
+    flags = Track(1)
+    for stamp, flag in ((0.0, 1.0), (1.0, 1.0), (2.0, 0.0), (3.0, 1.0), (4.0, 0.0), (5.0, 0.0)):
+        flags.add(stamp, flag)
+    assert run_figures.share(flags, 1.0, 5.0) == pytest.approx(50.0)
+    assert run_figures.share(flags, 6.0, 9.0) is None

@@ -101,3 +101,9 @@ def rate(stamps: np.ndarray) -> float | None:
     if len(stamps) < 2 or stamps[-1] <= stamps[0]:
         return None
     return float((len(stamps) - 1) / (stamps[-1] - stamps[0]))
+
+
+def share(flags: Track, begin: float, end: float) -> float | None:
+    """Return the percentage of the samples from `begin` to `end` (s) that are 1 rather than 0; None without samples."""
+    _, values = flags.between(begin, end)
+    return 100.0 * float(values.mean()) if len(values) else None

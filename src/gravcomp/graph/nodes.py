@@ -169,6 +169,7 @@ NODES = (
             Port("truth/tip", "geometry_msgs/msg/PoseStamped", "ground truth of the tip, m"),
             Port("truth/gravity", "geometry_msgs/msg/Vector3Stamped", "ground truth of gravity, m/s^2"),
             Port("robot/tip", "geometry_msgs/msg/PoseStamped", "the model's tip, m"),
+            Port("robot/deformation", "gravcomp_msgs/msg/Deformation", "which model serves"),
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "estimated gravity, m/s^2"),
             Port("imu/data_raw", "sensor_msgs/msg/Imu", "its rate is measured"),
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its rate is measured"),

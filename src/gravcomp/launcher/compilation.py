@@ -80,10 +80,9 @@ def _model() -> None:
     from gravcomp.description import load_robot_file
     from gravcomp.simulation import Simulator
 
-    robot = load_robot_file("article").robot
-    simulator, released = Simulator(robot, reduced=False), np.zeros(len(robot.cables))
-    for gravity, cables in ((np.zeros(3), None), (np.zeros(3), released), (np.array([0.0, 0.0, -9.81]), released)):
-        simulator.step(gravity, cables)
+    simulator = Simulator(load_robot_file("article").robot, reduced=False)
+    simulator.warm_up()
+    simulator.step(np.array([0.0, 0.0, -9.81]))
 
 
 def _contact() -> None:

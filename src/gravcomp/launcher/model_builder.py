@@ -46,6 +46,11 @@ class ModelBuilder:
         if not is_stored(self._note):
             self._process = start_builder(self._robot, subprocess.PIPE)
 
+    @property
+    def builds(self) -> bool:
+        """Whether the reduced model is being built."""
+        return self._process is not None and self._process.poll() is None
+
     def __exit__(self, *_: object) -> None:
         if self._process is None:
             return

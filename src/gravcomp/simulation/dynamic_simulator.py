@@ -96,6 +96,13 @@ class DynamicSimulator:
         """As `Simulator.tip_compliance`, of the equilibrium toward which the robot moves."""
         return self.statics.tip_compliance()
 
+    def warm_up(self) -> None:
+        """As `Simulator.warm_up`, with the motion; afterwards the robot is straight and at rest."""
+        self.statics.warm_up()
+        for displacement in (None, np.zeros(self.model.tendons.count)):
+            self.step(np.zeros(3), displacement)
+        self.reset()
+
     def reset(self) -> None:
         """Return to the straight robot at rest, without gravity."""
         self.statics.reset()

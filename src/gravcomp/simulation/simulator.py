@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from gravcomp.scene.scene import Scene
 
 _MORE_ITERATIONS = 12
+_SMALL_PULL = 1e-4  # of the length: taut cables that hardly deform the robot
+_SHORT_STEP = 0.01  # s
 _LIMIT_POINT = "the robot has no equilibrium beyond it, or only at a distant shape"
 
 
@@ -96,6 +98,18 @@ class Simulator:
         self._pace.reset()
         if self._serving:
             self._serving.reset()
+
+    def warm_up(self) -> None:
+        """Compile the functions of a step, or load them from the cache; afterwards the robot is straight.
+
+        Cables that are released, slack, pulled in and paid out again use different functions; so does a body that creeps.
+        """
+        slack = np.zeros(self.model.tendons.count)
+        for displacement in (None, slack, slack + _SMALL_PULL * self.model.length, slack):
+            shape = self.step(np.zeros(3), displacement, duration=_SHORT_STEP)
+            if shape.cable_tension.any():
+                self.solver.tip_compliance()  # a step keeps its tangent while the shape hardly changes; this one assembles it
+        self.reset()
 
     def step(
         self,

@@ -7,6 +7,8 @@ from gravcomp.virtual.robot import VirtualRobot
 
 
 def warm_up() -> None:
-    """Compile all kernels that the article's robot needs."""
+    """Compile all kernels that the article's robot and the reading of its ground truth need."""
     file = load_robot_file("article")
-    VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, file.hardware).step(0.02)
+    robot = VirtualRobot(from_mapping(VirtualRobotParameters, {}, source="defaults"), file.robot, file.hardware)
+    robot.step(0.02)
+    _ = robot.truth
