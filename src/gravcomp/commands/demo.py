@@ -135,8 +135,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     output.result(figures, _summary(figures))
     if unfinished and figures["full_model_pct"]:
         output.note(
-            f"The full model served {figures['full_model_pct']:g} % of the evaluated time, more slowly, because the reduced model is"
-            f" not built yet. Next time: ./gravcomp model build {args.robot}, which goes on from here, then the demo again"
+            f"The full model served {figures['full_model_pct']:g} % of the evaluated time, more slowly, because the reduced model"
+            f" is not built yet. Next time: ./gravcomp model build {args.robot}, which goes on from here, then the demo again"
         )
     if problem:
         raise ConfigError(problem)
