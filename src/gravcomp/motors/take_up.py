@@ -49,7 +49,7 @@ class TakeUp:
 
     @property
     def moves(self) -> bool:
-        """Whether the motor is on its way out and in again."""
+        """Whether the motor takes up the backlash now."""
         return self._phase is not _Phase.NONE
 
     def step(self, target: float, displacement: float, dt: float) -> tuple[float, float | None]:
