@@ -22,6 +22,13 @@ class Drive:
         description="from the axis to the middle of the cable; of a lead screw its lead over 2 pi",
     )
     backlash: float = parameter(0.6, edge="deg", minimum=0, maximum=90, description="of the gear, at its output")
+    take_up_time: float = parameter(
+        0.3,
+        unit="s",
+        minimum=0.0,
+        maximum=60.0,
+        description="rest of a cable's target after which the motor takes up the backlash: out by it and in again; 0: never",
+    )
     torque_constant: float = parameter(0.18, unit="N m/A", minimum=1e-3, maximum=10, description="at the gear's output")
     current_limit: float = parameter(1.0, unit="A", minimum=0.05, maximum=10, description="largest current in a frame")
     tension_limit: float = parameter(5.0, unit="N", minimum=0, maximum=1000, description="largest feed-forward of tension")

@@ -4,8 +4,9 @@ from collections.abc import Collection, Sequence
 
 from gravcomp.description.hardware import Hardware
 from gravcomp.motors.fault_watch import FaultWatch
-from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.rotors import Rotors
+from gravcomp.motors.take_up import TakeUp
 
 
 class CableLoops:
@@ -19,6 +20,9 @@ class CableLoops:
         n = len(hardware.motors)
         self._pays_out = hardware.transmission.pays_out
         self._loops = [PositionLoop(hardware.drive, two_way=not alone) for alone in self._pays_out]
+        rest_error = REST_COUNTS * hardware.drive.travel_per_count  # m
+        # A motor that pulls antagonists has them on both flanks of its gear.
+        self._take_up = [TakeUp(hardware.drive, rest_error) if alone else None for alone in self._pays_out]
         self._tension = [0.0] * n
         self.target, self.currents = [0.0] * n, [0.0] * n
 
@@ -31,6 +35,9 @@ class CableLoops:
         """Start at rest at the measured displacements."""
         for loop, displacement in zip(self._loops, self._rotors.displacement()):
             loop.reset(displacement)
+        for take_up in self._take_up:
+            if take_up is not None:
+                take_up.reset()
         self._faults.reset_monitors()
 
     def follow(self, displacement: Sequence[float], tension: Sequence[float]) -> None:
@@ -41,7 +48,10 @@ class CableLoops:
 
     def hold(self) -> None:
         """Keep the cables where their setpoints are now; the expected tensions stay."""
-        self.target = [loop.setpoint for loop in self._loops]
+        self.target = [
+            target if take_up is not None and take_up.moves else loop.setpoint
+            for target, take_up, loop in zip(self.target, self._take_up, self._loops)
+        ]
 
     def pay_out(self) -> None:
         """Move all cables to `displacement_min`; motors with antagonists go to zero, where no cable is pulled in."""
@@ -68,13 +78,17 @@ class CableLoops:
         `targets` (m) and `velocity_limit` (m/s) replace the attribute and the drive's limit, for homing. Motors `without` a bus
         get zero current.
         """
+        homing = targets is not None
         targets = self.target if targets is None else targets
         displacement, velocity = self._rotors.displacement(), self._rotors.velocity()
         for i, loop in enumerate(self._loops):
             if i in without:
                 self.currents[i] = 0.0
                 continue
-            current = loop.step(targets[i], self._tension[i], displacement[i], velocity[i], dt, velocity_limit)
+            target, limit, take_up = targets[i], velocity_limit, self._take_up[i]
+            if take_up is not None and not homing:
+                target, limit = take_up.step(target, displacement[i], dt)
+            current = loop.step(target, self._tension[i], displacement[i], velocity[i], dt, limit)
             fault = self._faults.motor_fault(i, current, velocity[i], loop.setpoint - displacement[i])
             if fault:
                 return fault

@@ -1,0 +1,79 @@
+"""Taking up the backlash of a gear: a motor at rest ends on the flank that winds in.
+
+A motor that pays out turns back inside the backlash of its gear. Where the cable pulls less than what holds the capstan there,
+the capstan stays behind, and the cable is shorter than its winch says, by up to the backlash. The rotor does not show it. But a
+rotor that pays out by the whole backlash more and winds in again has the capstan on the flank that winds in, wherever it was:
+the approach from one side, as of machine tools.
+
+How loose the gear may be follows from the rotor as in a play operator of the largest backlash w:
+
+    x = min(w, max(0, x_last - (d - d_last))),   d: displacement of the rotor; 0: on the flank that winds in
+
+A target that stays is taken up once, so that nothing moves at rest.
+"""
+
+import enum
+
+from gravcomp.description.hardware import Drive
+
+_SPREAD = 1.0 / 3.0  # of the described backlash, by which that of a gear is larger at most
+_LEAST = 0.2  # of the backlash: what is left loose, and by how much a target moves that stays
+_WAY = 1.0 / 3.0  # of the rest before: time in which the motor winds in again
+
+
+class _Phase(enum.Enum):
+    NONE = 0
+    OUT = 1
+    IN = 2
+
+
+class TakeUp:
+    """Takes up the backlash of one motor that only pulls."""
+
+    def __init__(self, drive: Drive, rest_error: float):
+        """rest_error: distance in m from its target at which the position loop is at rest."""
+        play = drive.backlash * drive.capstan_radius
+        self._width, self._least = (1.0 + _SPREAD) * play, _LEAST * play
+        self._over = self._width + 2.0 * rest_error
+        self._rest_error, self._farthest, self._time = rest_error, drive.displacement_min, drive.take_up_time
+        self._acts = self._time > 0.0 and self._least > rest_error
+        self._speed = min(drive.velocity_limit, self._over / (_WAY * self._time)) if self._acts else drive.velocity_limit
+        self.reset()
+
+    def reset(self) -> None:
+        """Start with the gear on the flank that winds in, as homing leaves it."""
+        self._loose = 0.0
+        self._last: float | None = None  # displacement
+        self._kept: float | None = None  # target that stays, for `_since` s
+        self._phase, self._since, self._done = _Phase.NONE, 0.0, False
+
+    @property
+    def moves(self) -> bool:
+        """Whether the motor takes up the backlash now."""
+        return self._phase is not _Phase.NONE
+
+    def step(self, target: float, displacement: float, dt: float) -> tuple[float, float | None]:
+        """Return where the motor goes now on its way to `target`, in m, and how fast at most in m/s; None: as fast as it may.
+
+        displacement (m) is that of the rotor, `dt` (s) the time since the last step.
+        """
+        if not self._acts:
+            return target, None
+        moved = 0.0 if self._last is None else displacement - self._last
+        self._loose, self._last = min(self._width, max(0.0, self._loose - moved)), displacement
+        if self._kept is None or abs(target - self._kept) > self._least:
+            self._phase, self._kept, self._since, self._done = _Phase.NONE, target, 0.0, False
+        self._since += dt
+        if self._phase is _Phase.NONE and self._is_due(target):
+            self._phase, self._done = _Phase.OUT, True
+        if self._phase is _Phase.OUT and displacement <= target - self._over + self._rest_error:
+            self._phase = _Phase.IN
+        if self._phase is _Phase.IN and displacement >= target - self._rest_error:
+            self._phase = _Phase.NONE
+        if self._phase is _Phase.OUT:
+            return target - self._over, None
+        return target, self._speed if self._phase is _Phase.IN else None
+
+    def _is_due(self, target: float) -> bool:
+        rests = not self._done and self._since >= self._time
+        return rests and self._loose > self._least and target - self._over >= self._farthest

@@ -1,0 +1,119 @@
+"""Taking up the backlash: bridge and position loops against the virtual robot's motors, gears and capstans."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from virtual_article import article, given
+
+from gravcomp.canbus import c610, codec
+from gravcomp.description.hardware import Hardware
+from gravcomp.motors.bridge import Bridge
+from gravcomp.motors.take_up import TakeUp
+from gravcomp.virtual.draw import draw
+from gravcomp.virtual.motors import TICK, MotorBank
+
+SPRING = np.full(6, 100.0)  # N/m: a cable pulls less than what holds its capstan inside the backlash
+RESTS = 4e-6  # m, within which a position loop is at rest: 37.5 counts
+
+
+class Rig:
+    """Bridge and virtual motors whose cables pull `SPRING` from the displacement 0 on."""
+
+    def __init__(self, backlash_deg: float = 0.6, **drive: float):
+        robot, hardware = article()
+        self.hardware: Hardware = dataclasses.replace(hardware, drive=dataclasses.replace(hardware.drive, **drive))
+        parameters = given()
+        motors = dataclasses.replace(parameters.motors, backlash=math.radians(backlash_deg), capstan_radius=0.005)
+        true = draw(dataclasses.replace(parameters, motors=motors), robot, hardware).motors
+        self.motors = MotorBank(true, hardware, np.zeros(6), np.random.default_rng(1))
+        self.bridge = Bridge(self.hardware, require_imu=False)
+        self.now, self._step, self.frames = 0.0, 0, []
+        self.bridge.configure()
+        self.bridge.activate(0.0)
+        self.run(0.4, np.zeros(6))
+
+    def run(self, duration: float, command) -> np.ndarray:
+        """Command the displacement (6,) in m, or that of a time (s), for a while; return those of the rotors (t, 6) in m."""
+        rotors, begin = [], self.now
+        for _ in range(round(duration / 0.002)):
+            self._step, self.now = self._step + 1, self.now + 0.002
+            self.motors.step(round(0.002 / TICK), np.zeros(6), SPRING)
+            for motor, values in zip(self.hardware.motors, self.motors.feedback()):
+                self.bridge.on_frame(c610.feedback(motor.can_id, **values), self.now)
+            if self._step % 5 == 0:
+                wanted = command(self.now - begin) if callable(command) else command
+                self.bridge.command(list(wanted), [0.0] * 6, self.now)
+            if self._step % 2 == 0:
+                self._deliver(self.bridge.tick(self.now))
+            rotors.append(self.bridge.snapshot().displacement)
+        return np.array(rotors)
+
+    def _deliver(self, frames) -> None:
+        for frame in frames:
+            currents = c610.currents_of(*codec.decode(frame))
+            for index, motor in enumerate(self.hardware.motors):
+                if motor.can_id in currents:
+                    self.motors.commanded[index] = currents[motor.can_id]
+
+    def move(self, start: float, end: float, rest: float) -> np.ndarray:
+        """Command all cables from `start` to `end` (m) and let them rest (s); return the rotors (t, 6) meanwhile."""
+        self.run(0.3, lambda time: np.full(6, start + (end - start) * min(1.0, time / 0.3)))
+        return self.run(rest, np.full(6, end))
+
+
+@pytest.mark.parametrize("backlash_deg", [0.4, 0.6, 0.8])
+def test_a_cable_that_was_paid_out_has_the_commanded_length_whatever_the_backlash_is(backlash_deg):
+    rig = Rig(backlash_deg)
+    rig.move(0.0, 6e-4, 0.0)
+    rig.move(6e-4, 3e-4, 1.0)
+    assert np.abs(rig.motors.wound - 3e-4).max() < 2 * RESTS
+
+
+def test_without_it_the_cable_stays_too_short_by_the_backlash():
+    rig = Rig(take_up_time=0.0)
+    rig.move(0.0, 6e-4, 0.0)
+    rig.move(6e-4, 3e-4, 1.0)
+    assert (rig.motors.wound - 3e-4).min() > 0.7 * math.radians(0.6) * 0.005
+
+
+def test_nothing_moves_afterwards_while_the_command_trembles_and_a_hold_or_a_new_command_ends_it():
+    rig = Rig()
+    rig.move(0.0, 6e-4, 0.0)
+    rig.move(6e-4, 3e-4, 1.0)
+    taken_up = np.array(rig.bridge.snapshot().displacement)
+    rotors = rig.run(0.8, lambda time: np.full(6, 3e-4 + 3e-6 * math.sin(40.0 * time)))
+    assert np.abs(rotors - taken_up).max() < 3 * RESTS
+
+    rig.move(3e-4, 2e-4, 0.0)
+    while rig.run(0.01, np.full(6, 2e-4))[-1].max() > 1.6e-4:
+        assert rig.now < 4.0, "the motors do not take up the backlash"
+    rig.bridge._hold("test")
+    assert rig.bridge.snapshot().command == [2e-4] * 6
+    rotors = rig.run(0.3, np.full(6, 4e-4))
+    assert np.abs(rotors[-1] - 4e-4).max() < 0.1e-3, "a new command is followed at once"
+
+
+def farthest_beyond(targets: list[float], **drive) -> float:
+    """How far a rotor that follows at once goes out beyond the last of its targets (m), which rests for a second."""
+    take_up = TakeUp(dataclasses.replace(article()[1].drive, **drive), RESTS)
+    rotor, outward = targets[0], 0.0
+    for target in targets:
+        rotor, _ = take_up.step(target, rotor, 0.004)
+    for _ in range(250):
+        rotor, _ = take_up.step(targets[-1], rotor, 0.004)
+        outward = max(outward, targets[-1] - rotor)
+    return outward
+
+
+def test_only_a_motor_that_has_turned_back_goes_out_and_none_beyond_the_limit_of_its_displacement():
+    play = math.radians(0.6) * 0.005
+    assert farthest_beyond([1e-3, 5e-4]) > play
+    assert farthest_beyond([5e-4, 1e-3]) == 0.0
+    assert farthest_beyond([1e-3, 5e-4], displacement_min=5e-4 - play) == 0.0
+
+
+def test_a_gear_finer_than_the_position_loop_and_a_take_up_that_is_switched_off_move_nothing():
+    assert farthest_beyond([1e-3, 5e-4], backlash=math.radians(0.05)) == 0.0
+    assert farthest_beyond([1e-3, 5e-4], take_up_time=0.0) == 0.0
