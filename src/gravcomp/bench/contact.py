@@ -1,6 +1,6 @@
 """Contact of the model with a scene: accuracy against closed forms and CalculiX, penetration, energy, and the time of a step.
 
-What a scene that is wrong does to the loop is in `wrong_scene`.
+What a scene that is wrong does to the loop is in `wrong_scene`, the virtual robot's own contact in `contact_rods`.
 """
 
 import dataclasses
@@ -34,10 +34,14 @@ _SMALL = 0.01  # deflection of the closed forms, of the length
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """Return all figures, with every `every`-th of the scenes; see the functions below, and `wrong_scene`."""
-    from gravcomp.bench.wrong_scene import wrong_scene  # the closed loop, which tests of `scene_of` do not need
+    """Return all figures, with every `every`-th of the scenes; see the functions below, `contact_rods` and `wrong_scene`."""
+    from gravcomp.bench.contact_rods import rods  # the virtual robot, which tests of `scene_of` do not need
+    from gravcomp.bench.wrong_scene import wrong_scene
 
-    return {**accuracy(progress), **motion(progress, every), **step_time(progress, every), **wrong_scene(progress)}
+    return {
+        **accuracy(progress), **motion(progress, every), **rods(progress, every), **step_time(progress, every),
+        **wrong_scene(progress),
+    }  # fmt: skip
 
 
 def scene_of(**kinds: Any) -> Scene:
@@ -183,12 +187,12 @@ def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
     return SceneMotion(deepest, gained, bool(len(shape.contacts)), lost, len(angles))
 
 
-def random_scene(seed: int, robot: Robot) -> Scene:
-    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some with friction."""
+def random_scene(seed: int, robot: Robot, rough: bool = True) -> Scene:
+    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some of them `rough`."""
     rng = np.random.default_rng(seed)
     length, radius = 1e3 * robot.length, 0.5e3 * robot.segments[0].outer_diameter
     place, deep = rng.uniform(0.5, 1.0) * length, rng.uniform(0.03, 0.15) * length
-    friction = float(rng.choice([0.0, 0.3]))
+    friction = float(rng.choice([0.0, 0.3])) * rough
     angle = rng.uniform(-0.3, 0.3)
     down = np.array([-np.cos(angle), np.sin(angle), 0.0])
     common = {"friction": friction}
