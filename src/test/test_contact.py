@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.contact import scene_of, slender_rod
 from gravcomp.config import ConfigError
@@ -180,6 +181,9 @@ def test_a_rod_that_an_end_load_buckles_in_a_tube_follows_the_closed_form():
     force, tip = buckled_in_tube(weight, load, length, stiffness, clearance)
     assert shape.contacts.force[:, 0].sum() == pytest.approx(force, rel=1e-2)
     assert -shape.tip_position[0] == pytest.approx(tip, rel=1e-3)
+    turned = Rotation.from_rotvec([0.0, 0.0, 0.02]).apply(gravity)
+    shape = simulator.step(turned, wrench=Wrench(force=np.array([0.0, 0.0, -load])))
+    assert shape.is_equilibrium and shape.tip_position[:2] == pytest.approx(tip * turned[:2] / np.linalg.norm(turned), abs=2e-5)
 
 
 def test_the_motions_that_walls_allow_are_counted_where_they_would_grow():

@@ -318,20 +318,23 @@ class StaticTracker:
 
         If the tangent is not positive definite, it is supported where walls press. If it is not even then, a multiple of the
         identity is added: the step still goes downhill, but its length no longer measures the distance to the equilibrium.
-        Raises NotPositiveDefinite if that does not help, or immediately if `stable`.
+        Raises NotPositiveDefinite if that does not help, or before that if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
         force = self._assemble(state, load, origin)
+        sections = [] if self.contact is None else self.contact.pressed_sections()
         try:
             return self._matrix.factor(), force, True
         except NotPositiveDefinite:
-            if stable:
+            if stable and not sections:
                 raise
         self._assemble(state, load, origin)  # again, as the factorisation writes over it
         tangent = self._matrix.values.copy()
-        supported = self._supported_factor()
+        supported = self._supported_factor(sections)
         if supported is not None:
             return supported, force, True
+        if stable:
+            raise NotPositiveDefinite("the tangent stiffness is not positive definite, with supports where walls press")
         for power in range(-6, 1):
             self._matrix.values[:] = tangent
             self._matrix.add_diagonal(self._stiffness * 10.0**power)
@@ -341,9 +344,8 @@ class StaticTracker:
                 continue
         raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
 
-    def _supported_factor(self) -> SupportedFactor | None:
-        """Return the factor of the assembled tangent with supports where walls press; None where that does not help."""
-        sections = [] if self.contact is None else self.contact.pressed_sections()
+    def _supported_factor(self, sections: list[np.ndarray]) -> SupportedFactor | None:
+        """Return the factor of the assembled tangent with supports of `sections`, rows (n,); None where that does not help."""
         rows = add_springs(self._matrix, self.model, sections, self._stiffness)
         if not len(rows):
             return None
