@@ -4,16 +4,20 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
+from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.contact import scene_of, slender_rod
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file
+from gravcomp.full_model.supports import SupportedFactor, unstable_motions
+from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target, direction_weight, straight_target
 from gravcomp.mesh import tube_mesh
 from gravcomp.references import calculix_contact
 from gravcomp.references.calculix_contact import cylinder, stored_rests
-from gravcomp.references.contact_beams import over_peg
+from gravcomp.references.contact_beams import buckled_in_tube, over_peg
 from gravcomp.simulation import RobotModel, Simulator
 
 G = np.array([-9.81, 0.0, 0.0])
@@ -163,6 +167,74 @@ def test_a_rod_over_a_peg_follows_the_closed_form():
     assert -shape.tip_position[0] == pytest.approx(tip, rel=2e-2)
 
 
+def test_a_rod_that_an_end_load_buckles_in_a_tube_follows_the_closed_form():
+    """Without the tube this load has no equilibrium: only the wall makes the tangent positive definite."""
+    rod = slender_rod()
+    stiffness, length, clearance = 2e6 * np.pi * 4e-3**4 / 64, rod.length, 1e-3
+    weight = 8 * stiffness * 0.02 / length**3
+    model = RobotModel(dataclasses.replace(rod, elements=Elements(around=4, along=12)))
+    tube = {"points_mm": [[0, 0, -10], [0, 0, 250]], "radius_mm": [1e3 * (2e-3 + clearance)]}
+    simulator, load = in_scene(model, tubes=[tube]), 2.0 * np.pi**2 * stiffness / (4.0 * length**2)
+    gravity = np.array([-weight * length / model.body_weight.sum(), 0.0, 0.0])
+    shape = simulator.solve(gravity, wrench=Wrench(force=np.array([0.0, 0.0, -load])))
+    assert shape.is_equilibrium and simulator.solver.contact.depth(simulator.displacements) < 2e-5
+    force, tip = buckled_in_tube(weight, load, length, stiffness, clearance)
+    assert shape.contacts.force[:, 0].sum() == pytest.approx(force, rel=1e-2)
+    assert -shape.tip_position[0] == pytest.approx(tip, rel=1e-3)
+    turned = Rotation.from_rotvec([0.0, 0.0, 0.02]).apply(gravity)
+    shape = simulator.step(turned, wrench=Wrench(force=np.array([0.0, 0.0, -load])))
+    assert shape.is_equilibrium and shape.tip_position[:2] == pytest.approx(tip * turned[:2] / np.linalg.norm(turned), abs=2e-5)
+
+
+def test_the_motions_that_walls_allow_are_counted_where_they_would_grow():
+    """Against the eigenvalues of the stiffness on these motions, for random bodies, walls and forces that turn."""
+    rng, counts = np.random.default_rng(3), []
+    for _ in range(60):
+        a = rng.standard_normal((8, 8))
+        a = a + a.T + 4.0 * np.eye(8)
+        rows, turning = rng.standard_normal((4, 8)), 3.0 * rng.standard_normal(2)
+        negative = int((np.linalg.eigvalsh(a) < 0.0).sum())
+        found = unstable_motions(negative, rows @ np.linalg.solve(a, rows.T), turning)
+        allowed = null_space(rows[:2])
+        on_walls = allowed.T @ (a - rows[2:].T @ (turning[:, None] * rows[2:])) @ allowed
+        assert found == (np.linalg.eigvalsh(on_walls) < 0.0).sum()
+        counts.append(found)
+    assert {0, 1} <= set(counts)
+
+
+def test_a_buckled_body_is_solved_as_if_nothing_supported_it():
+    rng = np.random.default_rng(4)
+    a, rows = np.diag([-0.3, 1.0, 2.0, 3.0]), rng.standard_normal((2, 4))
+    held = SupportedFactor(Dense(a + 50.0 * rows.T @ rows), rows, 50.0)
+    right = rng.standard_normal((4, 3))
+    assert held.negative == 1
+    assert held.solve(right) == pytest.approx(np.linalg.solve(a, right), abs=1e-9)
+
+
+@dataclasses.dataclass
+class Dense:
+    """A factor of a small matrix."""
+
+    matrix: np.ndarray
+
+    def solve(self, right):
+        return np.linalg.solve(self.matrix, right)
+
+
+def test_walls_that_squeeze_the_robot_to_nothing_are_named(model):
+    """Balls all around the robot: it cannot leave them sideways, and no pair of planes tells it before."""
+    angle, far = np.arange(6) * np.pi / 3, [12.5, 13, 13, 13, 13, 13]
+    ring = [
+        {"name": f"ball {k}", "centre_mm": [far[k] * np.cos(angle[k]), far[k] * np.sin(angle[k]), 60], "radius_mm": 10}
+        for k in range(6)
+    ]
+    contact = in_scene(model, spheres=ring).solver.contact
+    sentence = contact.squeezed(np.zeros_like(model.mesh.nodes))
+    assert "between the walls of 'ball 0' and 'ball 3' there are 5.5 mm" in sentence
+    assert "60 mm from the base, where the robot needs 9 mm" in sentence
+    assert in_scene(model, spheres=ring[:1]).solver.contact.squeezed(np.zeros_like(model.mesh.nodes)) == ""
+
+
 def test_the_face_of_the_tip_lies_flat_on_a_wall_ahead(model):
     """Gravity pulls the robot onto the wall; as it turns, what presses moves over the face, and nothing is lost."""
     simulator = in_scene(model, planes=[{"normal": [0, 0, -1], "point_mm": [0, 0, 1e3 * model.length + 0.05], "friction": 0.3}])
@@ -206,6 +278,7 @@ def test_the_deck_of_calculix_has_a_gap_under_each_node_of_the_lowest_line():
             {"planes": [{"frame": "world", "normal": [0, 0, z], "point_mm": [0, 0, -3 * z]} for z in (1, -1)]},
             "between the walls of 'plane 1' and 'plane 2' there are 6 mm; the robot needs more than its diameter, 9 mm",
         ),
+        ({"spheres": [{"frame": "world", "centre_mm": [0, 0, -5], "radius_mm": 7}]}, "starts 2 mm inside 'sphere 1'"),
         ({"boxes": [{"centre_mm": [0, 0, 60], "size_mm": [40, 8, 300], "side": "inside"}]}, "walls of 'box 1' there are 8 mm"),
     ],
 )

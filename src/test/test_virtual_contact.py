@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from virtual_article import given, reference_robot, true_robot, with_body
 
+from gravcomp.bench.contact_rods import rods
 from gravcomp.scene import BoxWall, PlaneWall, SceneSection, TubeWall
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.body import build_friction, build_material, build_rod
@@ -127,3 +128,11 @@ def test_no_wall_is_entered_in_motion(seed):
         rod.carry(np.eye(3), np.array([0.0, 0.0, -0.06]))
     gravity = -9.81 * base_orientation(0.3, random.uniform(-3, 3))[2]
     last(run(rod, 1.0, gravity, pose))
+
+
+def test_the_rod_rests_where_the_finite_element_model_does():
+    """Two codes, each with its own contact, in a scene of `bench contact`."""
+    figures = rods(lambda _: None, every=30)
+    assert list(figures["rod_by_scene"]) == ["0"]
+    assert figures["rod_tip_pct"]["worst"] < 0.1
+    assert figures["rod_force_pct"]["worst"] < 2.0

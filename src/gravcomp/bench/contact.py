@@ -1,6 +1,6 @@
 """Contact of the model with a scene: accuracy against closed forms and CalculiX, penetration, energy, and the time of a step.
 
-What a scene that is wrong does to the loop is in `wrong_scene`.
+What a scene that is wrong does to the loop is in `wrong_scene`, the virtual robot's own contact in `contact_rods`.
 """
 
 import dataclasses
@@ -34,10 +34,14 @@ _SMALL = 0.01  # deflection of the closed forms, of the length
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """Return all figures, with every `every`-th of the scenes; see the functions below, and `wrong_scene`."""
-    from gravcomp.bench.wrong_scene import wrong_scene  # the closed loop, which tests of `scene_of` do not need
+    """Return all figures, with every `every`-th of the scenes; see the functions below, `contact_rods` and `wrong_scene`."""
+    from gravcomp.bench.contact_rods import rods  # the virtual robot, which tests of `scene_of` do not need
+    from gravcomp.bench.wrong_scene import wrong_scene
 
-    return {**accuracy(progress), **motion(progress, every), **step_time(progress, every), **wrong_scene(progress)}
+    return {
+        **accuracy(progress), **motion(progress, every), **rods(progress, every), **step_time(progress, every),
+        **wrong_scene(progress),
+    }  # fmt: skip
 
 
 def scene_of(**kinds: Any) -> Scene:
@@ -118,54 +122,77 @@ def _from_calculix(shape: Shape, rest: Rest, length: float) -> dict[str, float]:
 
 
 def motion(progress: Progress, every: int = 1) -> dict:
-    """Return figures of seeded scenes in which gravity turns, there and back.
+    """Return figures of seeded scenes in which gravity turns, there and back: the worst or the sum of those of `scene_motion`.
 
     `penetration_mm`: deepest place of the surface in a rigid wall; `contact_energy`: work that contact gives to the robot over
     the closed path, as a share of the work of the weight on it, taken without sign; `contact_scenes`: scenes that touched;
     `lost_steps`: share of the steps without an equilibrium; `unsolved_scenes`: scenes that `solve` does not enter from the
     straight robot, left out.
     """
-    robot = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=6, along=10))
-    model = RobotModel(robot)
-    deepest, gained, touched, lost, steps, unsolved = 0.0, 0.0, 0, 0, 0, 0
+    model = RobotModel(moved_robot())
+    found = []
     for seed in range(0, _SCENES, every):
         progress(f"scene {seed + 1} of {_SCENES}")
-        simulator, start = Simulator(model, reduced=False, scene=random_scene(seed, robot)), seeded_gravity(seed)
-        axis = np.random.default_rng(seed).standard_normal(3)
-        axis /= np.linalg.norm(axis)
-        angles = _TURN * np.concatenate([np.arange(_STEPS // 2), np.arange(_STEPS // 2 - 2, -1, -1)])
-        shape, last = simulator.solve(start), start
-        if not shape.is_equilibrium:
-            unsolved += 1
-            continue
-        moved, net, whole = simulator.displacements.copy(), model.elements.energy(simulator.displacements), 0.0
-        for angle in angles:
-            gravity = Rotation.from_rotvec(angle * axis).apply(start)
-            shape = simulator.step(gravity)
-            steps += 1
-            lost += not shape.is_equilibrium
-            if shape.is_equilibrium and len(shape.contacts):
-                touched_at = simulator.solver.contact
-                assert touched_at is not None
-                deepest = max(deepest, touched_at.depth(simulator.displacements))
-            # What the elastic energy gains beyond the work of the weight comes from contact.
-            work = float(model.nodal_weight @ (simulator.displacements - moved) @ (0.5 * (last + gravity)))
-            net, whole = net + work, whole + abs(work)
-            moved, last = simulator.displacements.copy(), gravity
-        touched += bool(len(shape.contacts))
-        gained = max(gained, (model.elements.energy(moved) - net) / whole) if whole else gained
+        found.append(scene_motion(model, seed))
+    moved = [scene for scene in found if scene is not None]
     return {
-        "penetration_mm": 1e3 * deepest, "contact_energy": gained, "contact_scenes": touched, "lost_steps": lost / max(steps, 1),
-        "unsolved_scenes": unsolved,
-    }  # fmt: skip
+        "penetration_mm": 1e3 * max((scene.deepest for scene in moved), default=0.0),
+        "contact_energy": max((scene.gained for scene in moved), default=0.0),
+        "contact_scenes": sum(scene.touches for scene in moved),
+        "lost_steps": sum(scene.lost for scene in moved) / max(sum(scene.steps for scene in moved), 1),
+        "unsolved_scenes": len(found) - len(moved),
+    }
 
 
-def random_scene(seed: int, robot: Robot) -> Scene:
-    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some with friction."""
+@dataclasses.dataclass(frozen=True)
+class SceneMotion:
+    """A seeded scene: deepest place in m, energy gained as a share of the work, whether the robot touches, lost steps of all."""
+
+    deepest: float
+    gained: float
+    touches: bool
+    lost: int
+    steps: int
+
+
+def moved_robot() -> Robot:
+    """Return the robot of the seeded scenes: the article's, with fewer elements."""
+    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=6, along=10))
+
+
+def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
+    """Turn gravity in the scene of a seed, there and back. None where `solve` does not enter it from the straight robot."""
+    simulator, start = Simulator(model, reduced=False, scene=random_scene(seed, model.robot)), seeded_gravity(seed)
+    axis = np.random.default_rng(seed).standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    angles = _TURN * np.concatenate([np.arange(_STEPS // 2), np.arange(_STEPS // 2 - 2, -1, -1)])
+    shape, last = simulator.solve(start), start
+    if not shape.is_equilibrium:
+        return None
+    moved, net, whole = simulator.displacements.copy(), model.elements.energy(simulator.displacements), 0.0
+    deepest, lost = 0.0, 0
+    for angle in angles:
+        gravity = Rotation.from_rotvec(angle * axis).apply(start)
+        shape = simulator.step(gravity)
+        lost += not shape.is_equilibrium
+        if shape.is_equilibrium and len(shape.contacts):
+            touched_at = simulator.solver.contact
+            assert touched_at is not None
+            deepest = max(deepest, touched_at.depth(simulator.displacements))
+        # What the elastic energy gains beyond the work of the weight comes from contact.
+        work = float(model.nodal_weight @ (simulator.displacements - moved) @ (0.5 * (last + gravity)))
+        net, whole = net + work, whole + abs(work)
+        moved, last = simulator.displacements.copy(), gravity
+    gained = (model.elements.energy(moved) - net) / whole if whole else 0.0
+    return SceneMotion(deepest, gained, bool(len(shape.contacts)), lost, len(angles))
+
+
+def random_scene(seed: int, robot: Robot, rough: bool = True) -> Scene:
+    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some of them `rough`."""
     rng = np.random.default_rng(seed)
     length, radius = 1e3 * robot.length, 0.5e3 * robot.segments[0].outer_diameter
     place, deep = rng.uniform(0.5, 1.0) * length, rng.uniform(0.03, 0.15) * length
-    friction = float(rng.choice([0.0, 0.3]))
+    friction = float(rng.choice([0.0, 0.3])) * rough
     angle = rng.uniform(-0.3, 0.3)
     down = np.array([-np.cos(angle), np.sin(angle), 0.0])
     common = {"friction": friction}

@@ -45,11 +45,11 @@ def refuse_start(scene: Scene, robot: Robot) -> None:
                     f"{scene.source}: scene: the radius of '{name}' is {1e3 * narrowest:.3g} mm at its narrowest place;"
                     f" the robot needs more than its own, {1e3 * thinnest:g} mm"
                 )
-        if scene.in_world[row]:
-            continue  # it turns with the base
-        depth, middle = -deepest(arrays, row, surface, 0, base, own, normal), np.zeros(3)
+        middle = np.zeros(3)
         inside = -gap_to(arrays, row, base[0], middle)
-        if inside > depth:  # the obstacle is smaller than the robot
+        # What is in the world turns about the middle of the base, which alone is at the same place in it then.
+        depth = inside if scene.in_world[row] else -deepest(arrays, row, surface, 0, base, own, normal)
+        if scene.in_world[row] or inside > depth:  # the obstacle is smaller than the robot
             depth, normal = inside, middle
         if depth > _TOUCHING * surface.radius[0]:
             way = ", ".join(f"{1e3 * depth * x:+.3g}" for x in normal)

@@ -5,7 +5,7 @@ import numpy as np
 from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.turning_loads import TurningFactor, add_symmetric_part, slopes_of
 from gravcomp.full_model.wrench import PointLoads
-from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix
+from gravcomp.mechanics.block_matrix import BlockMatrix, Factor
 
 
 class AppliedLoad:
@@ -39,7 +39,7 @@ class AppliedLoad:
             return []
         return add_symmetric_part(matrix, self._loads, slopes_of(self._loads, u, self._fraction))
 
-    def turned(self, factor: BlockCholesky, u: np.ndarray, contained: list[np.ndarray]) -> BlockCholesky | TurningFactor:
+    def turned(self, factor: Factor, u: np.ndarray, contained: list[np.ndarray]) -> Factor:
         """Return the factor with the rest of what loads that turn add to the tangent at u (n, 3); contained: in the factor."""
         if self._loads is None or not self._loads.turning:
             return factor

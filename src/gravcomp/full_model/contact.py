@@ -7,7 +7,7 @@ dense: the compliance S of cables and places, from which forces and states follo
 
 import numpy as np
 
-from gravcomp.contact.condensed import SLIDING, contact_forces
+from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.place_forces import (
     Pressed,
@@ -20,12 +20,13 @@ from gravcomp.contact.place_forces import (
     yielding,
 )
 from gravcomp.contact.places import Places, all_gaps, find_places
+from gravcomp.contact.squeezed import squeezed
 from gravcomp.contact.surface import contact_surface
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.turning_loads import TurningFactor
-from gravcomp.mechanics.block_matrix import BlockCholesky
+from gravcomp.full_model.supports import SupportedFactor, unstable_motions
+from gravcomp.mechanics.block_matrix import Factor
 from gravcomp.mesh.sections import section_functionals
 from gravcomp.scene.distance import SceneArrays
 from gravcomp.scene.scene import Scene
@@ -86,6 +87,10 @@ class FullContact:
         """Return changes (s, 3, 3, r) of the stations' p, f_1, f_2 by fields (r, n, 3) of displacements."""
         return np.stack([(self._rows @ field).reshape(-1, 3, 3) for field in fields], axis=-1)
 
+    def squeezed(self, u: np.ndarray) -> str:
+        """Return a sentence on where walls leave less room than the robot needs at u (n, 3), empty without any."""
+        return squeezed(self.arrays, self.scene.names, self.surface, self.sections(u))
+
     def depth(self, u: np.ndarray) -> float:
         """Return in m how deep the robot is in an obstacle at the displacements u (n, 3); 0 outside."""
         shape = len(self.arrays.kind), len(self.surface.place)
@@ -95,16 +100,19 @@ class FullContact:
         return max(0.0, -float(gaps.min(initial=0.0)))
 
     def respond(
-        self, state: Equilibrium, factor: BlockCholesky | TurningFactor, out: np.ndarray, cables: CableInput
+        self, state: Equilibrium, factor: Factor, out: np.ndarray, cables: CableInput, supported: SupportedFactor | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the step (3 n_free,) and the tensions (m,) for the forces `out` (3 n_free,) without cables and contact.
 
-        Sets compliance and answer of `state`, which hold what touches in contact.
+        supported: in `factor`, where only the walls keep the robot from buckling. Sets compliance and answer of `state`, which
+        hold what touches in contact.
         """
         model, m = self._model, len(state.tension)
         wound, given = cables.arrays(m)
         solved = factor.solve(np.column_stack([out, out + self.pull, state.tendons.force_jacobian.T]))
         y, foreseen, answer = solved[:, 0], solved[:, 1], solved[:, 2:]
+        if supported is not None:  # without the walls it would move the wrong way
+            foreseen = supported.held(out + self.pull)
         jacobian, stretch = state.tendons.jacobian, np.diag(model.tendons.stretch(state.tendons))
         compliance, free = jacobian @ answer + stretch, state.tendons.displacement + jacobian @ y
         tension = cables.tensions(compliance, free, state.tension > 0.0)
@@ -128,15 +136,40 @@ class FullContact:
         free = rows @ y
         free[:m] += state.tendons.displacement
         free[m + count : m + count + len(slid)] += slid
+        softness = yielding(arrays, self.surface, places)
         force, change, held, self.settled = contact_forces(
             whole, free, wound, given, state.tension, places.gap + self.allowed,
-            yielding(arrays, self.surface, places), friction, bend, pressed, rub,
+            softness, friction, bend, pressed, rub,
         )  # fmt: skip
+        if supported is not None:
+            soft = np.concatenate([np.zeros(m), softness, np.zeros(len(whole) - m - count)])
+            self.settled &= not self._buckles(supported, whole + np.diag(soft), force, held, bend, wound, given)
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
         remember(places, forces, self.force)
         self._keep(places, forces, held, change[m : m + count], force[m:] @ directions)
         return y + columns @ force, force[:m]
+
+    def pressed_sections(self) -> list[np.ndarray]:
+        """Return the rows (n,) of the middles of the sections that walls pressed in the last solution."""
+        pressed = np.flatnonzero(self.force.any(axis=(0, 2)))
+        stations = np.unique(np.minimum(pressed, len(self.surface.place) - 1))
+        return [self._rows[[3 * station]].toarray()[0] for station in stations]
+
+    def _buckles(
+        self, supported: SupportedFactor, compliance: np.ndarray, force: np.ndarray, held: np.ndarray, bend: np.ndarray,
+        wound: np.ndarray, given: np.ndarray,
+    ) -> bool:  # fmt: skip
+        """Whether the robot would leave this equilibrium.
+
+        compliance (k, k): with those of the walls; the others are arguments and results of `contact.condensed`.
+        """
+        m, count, turning = len(wound), len(held), len(force) - len(bend)
+        rows = [a for a in range(m) if not len(given) and np.isfinite(wound[a]) and force[a] > 0.0]
+        rows += [m + i for i in range(count) if held[i] != OPEN]
+        rows += [m + count + 2 * i + v for i in range(count) if held[i] == STICKING for v in range(2)]
+        rows += range(turning, len(force))
+        return unstable_motions(supported.negative, compliance[np.ix_(rows, rows)], bend) > 0
 
     def contacts(self, u: np.ndarray) -> Contacts:
         """Return what touched in the last solution, with the gaps at the displacements u (n, 3)."""

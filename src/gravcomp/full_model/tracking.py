@@ -25,9 +25,9 @@ from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.payload import with_payload
-from gravcomp.full_model.turning_loads import TurningFactor
+from gravcomp.full_model.supports import SupportedFactor, add_springs
 from gravcomp.full_model.wrench import PointLoads
-from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
+from gravcomp.mechanics.block_matrix import BlockCholesky, Factor, NotPositiveDefinite
 from gravcomp.mechanics.viscous_strain import ViscousStrain
 
 # Smallest det F that a step may leave in an element.
@@ -176,8 +176,8 @@ class StaticTracker:
         """
         model = self.model
         state.iterations += 1
-        factor, exact = self._reusable_factor(state), True
-        reused = factor is not None
+        factor: BlockCholesky | SupportedFactor | None = self._reusable_factor(state)
+        exact, reused = True, factor is not None
         if factor is not None:
             force = model.elements.internal_force(state.u, self.viscous)
         else:
@@ -185,13 +185,14 @@ class StaticTracker:
                 factor, force, exact = self._new_factor(state, load, origin, stable)
             except NotPositiveDefinite:
                 return None
-            if exact and origin is None:
+            if exact and origin is None and isinstance(factor, BlockCholesky):
                 self._kept = factor, state.u.copy()
         jacobian = state.tendons.jacobian
         out = load.at(state.u) - model.free(force)
         solver = load.turned(factor, state.u, self._contained)
+        supported = factor if isinstance(factor, SupportedFactor) else None
         if self.contact is not None:
-            step, tension = self.contact.respond(state, solver, out, cables)
+            step, tension = self.contact.respond(state, solver, out, cables, supported)
         else:
             solved = solver.solve(np.column_stack([out, state.tendons.force_jacobian.T]))
             y, state.answer = solved[:, 0], solved[:, 1:]
@@ -207,7 +208,7 @@ class StaticTracker:
             return None
         start, undamped = moved
         if exact and undamped:
-            start, size = self._correct(state, solver, load, cables, jacobian, start, size, tolerance, reused)
+            start, size = self._correct(state, solver, load, cables, jacobian, start, size, tolerance, reused, supported)
             # The tangent of corotational elements is not exact: steps shrink slowly. This one is short enough.
             state.converged |= size < _SHORT * tolerance
         return start
@@ -239,7 +240,7 @@ class StaticTracker:
     def _correct(
         self,
         state: Equilibrium,
-        factor: "BlockCholesky | TurningFactor",
+        factor: Factor,
         load: AppliedLoad,
         cables: CableInput,
         jacobian: np.ndarray,
@@ -247,6 +248,7 @@ class StaticTracker:
         size: float,
         tolerance: float,
         reused: bool,
+        supported: SupportedFactor | None,
     ) -> tuple[np.ndarray, float]:
         """Correct `state` with the factor of the step just taken, as long as the corrections shrink.
 
@@ -258,7 +260,7 @@ class StaticTracker:
         model = self.model
         corrected = False
         while size < self.near:
-            correction, tension = self._correction(state, factor, load, cables, jacobian)
+            correction, tension = self._correction(state, factor, load, cables, jacobian, supported)
             length = float(np.abs(correction).max())
             if max(length, size) < _ROUNDING * tolerance:  # already at rest
                 state.converged = True
@@ -281,16 +283,17 @@ class StaticTracker:
     def _correction(
         self,
         state: Equilibrium,
-        factor: "BlockCholesky | TurningFactor",
+        factor: Factor,
         load: AppliedLoad,
         cables: CableInput,
         jacobian: np.ndarray,
+        supported: SupportedFactor | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the change (3 n_free,) of the unknowns and the tensions (m,) from the factor of a nearby shape."""
         model = self.model
         force = model.elements.internal_force(state.u, self.viscous)
         if self.contact is not None:
-            return self.contact.respond(state, factor, load.at(state.u) - model.free(force), cables)
+            return self.contact.respond(state, factor, load.at(state.u) - model.free(force), cables, supported)
         out = load.at(state.u) - model.free(force) + state.tension @ state.tendons.force_jacobian
         y = factor.solve(out)
         free = state.tendons.displacement + jacobian @ y
@@ -310,22 +313,28 @@ class StaticTracker:
 
     def _new_factor(
         self, state: Equilibrium, load: AppliedLoad, origin: np.ndarray | None, stable: bool
-    ) -> tuple[BlockCholesky, np.ndarray, bool]:
+    ) -> tuple[BlockCholesky | SupportedFactor, np.ndarray, bool]:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
-        If the tangent is not positive definite, a multiple of the identity is added: the step still goes downhill, but its
-        length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does not help, or
-        immediately if `stable`.
+        If the tangent is not positive definite, it is supported where walls press. If it is not even then, a multiple of the
+        identity is added: the step still goes downhill, but its length no longer measures the distance to the equilibrium.
+        Raises NotPositiveDefinite if that does not help, or before that if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
         force = self._assemble(state, load, origin)
+        sections = [] if self.contact is None else self.contact.pressed_sections()
         try:
             return self._matrix.factor(), force, True
         except NotPositiveDefinite:
-            if stable:
+            if stable and not sections:
                 raise
         self._assemble(state, load, origin)  # again, as the factorisation writes over it
         tangent = self._matrix.values.copy()
+        supported = self._supported_factor(sections)
+        if supported is not None:
+            return supported, force, True
+        if stable:
+            raise NotPositiveDefinite("the tangent stiffness is not positive definite, with supports where walls press")
         for power in range(-6, 1):
             self._matrix.values[:] = tangent
             self._matrix.add_diagonal(self._stiffness * 10.0**power)
@@ -334,6 +343,16 @@ class StaticTracker:
             except NotPositiveDefinite:
                 continue
         raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
+
+    def _supported_factor(self, sections: list[np.ndarray]) -> SupportedFactor | None:
+        """Return the factor of the assembled tangent with supports of `sections`, rows (n,); None where that does not help."""
+        rows = add_springs(self._matrix, self.model, sections, self._stiffness)
+        if not len(rows):
+            return None
+        try:
+            return SupportedFactor(self._matrix.factor(), rows, self._stiffness)
+        except NotPositiveDefinite:
+            return None
 
     def _assemble(self, state: Equilibrium, load: AppliedLoad, origin: np.ndarray | None) -> np.ndarray:
         """Assemble the tangent at `state` and return the internal forces (n, 3)."""

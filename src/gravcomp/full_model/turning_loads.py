@@ -14,7 +14,7 @@ import numpy as np
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.wrench import PointLoads, Wrench
-from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix
+from gravcomp.mechanics.block_matrix import BlockMatrix, Factor
 
 _SMALL = 1e-6  # of |f_1|: the steps of the central differences
 
@@ -22,7 +22,7 @@ _SMALL = 1e-6  # of |f_1|: the steps of the central differences
 class TurningFactor:
     """A factor that solves with K - S^T J S."""
 
-    def __init__(self, factor: BlockCholesky, loads: PointLoads, slopes: list[np.ndarray], contained: list[np.ndarray]):
+    def __init__(self, factor: Factor, loads: PointLoads, slopes: list[np.ndarray], contained: list[np.ndarray]):
         """slopes: J (9, 9) of each turning load; contained: the part H of it that the factor contains."""
         self._factor = factor
         self._rows = [rows[:, : loads.model.n_free] for _, rows in loads.turning]
@@ -59,22 +59,26 @@ def slopes_of(loads: PointLoads, u: np.ndarray, fraction: float) -> list[np.ndar
 
 def add_symmetric_part(matrix: BlockMatrix, loads: PointLoads, slopes: list[np.ndarray]) -> list[np.ndarray]:
     """Add -S^T H S to the stiffness; return H (9, 9) of each load, zeros where the matrix has no entries for its section."""
-    return [_add(matrix, loads.model, rows, 0.5 * (slope + slope.T)) for (_, rows), slope in zip(loads.turning, slopes)]
+    parts = [0.5 * (slope + slope.T) for slope in slopes]
+    return [
+        part if add_part(matrix, loads.model, rows, part) else np.zeros((9, 9)) for (_, rows), part in zip(loads.turning, parts)
+    ]
 
 
-def _add(matrix: BlockMatrix, model: MeshedModel, rows: np.ndarray, part: np.ndarray) -> np.ndarray:
-    rows = rows[:, : model.n_free]
+def add_part(matrix: BlockMatrix, model: MeshedModel, rows: np.ndarray, part: np.ndarray) -> bool:
+    """Add -S^T H S to the stiffness, with `part` H (3 v, 3 v) and the rows (v, n) of S; False where it has no entries there."""
+    rows, v = rows[:, : model.n_free], len(rows)
     nodes = np.flatnonzero(rows.any(axis=0))
-    by_node = np.einsum("vn,viwj,wm->nimj", rows[:, nodes], part.reshape(3, 3, 3, 3), rows[:, nodes], optimize=True)
+    by_node = np.einsum("vn,viwj,wm->nimj", rows[:, nodes], part.reshape(v, 3, v, 3), rows[:, nodes], optimize=True)
     values = by_node.reshape(3 * len(nodes), -1)
     unknowns = (3 * nodes[:, None] + np.arange(3)).ravel()
     row, column = np.tril_indices(len(unknowns))
     try:
         position = matrix.pattern.position(unknowns[row], unknowns[column])
     except ValueError:
-        return np.zeros((9, 9))
+        return False
     np.add.at(matrix.values, position, -values[row, column])
-    return part
+    return True
 
 
 def _slopes(wrench: Wrench, place: np.ndarray, one: np.ndarray, two: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ storage here, above all for several right-hand sides.
 """
 
 import dataclasses
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -24,6 +24,13 @@ if TYPE_CHECKING:
 
 class NotPositiveDefinite(ArithmeticError):
     """The matrix has no Cholesky factor: the state is unstable or far from equilibrium."""
+
+
+class Factor(Protocol):
+    """Solves with a matrix A."""
+
+    def solve(self, right: np.ndarray, /) -> np.ndarray:
+        """Return A^-1 b for the right-hand sides b (n,) or (n, k)."""
 
 
 @dataclasses.dataclass(frozen=True)

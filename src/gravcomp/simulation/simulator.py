@@ -250,7 +250,8 @@ class Simulator:
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        return f"{message}: {beyond_range(self.model, state.u) or _LIMIT_POINT}"
+        narrow = "" if self.solver.contact is None else self.solver.contact.squeezed(state.u)
+        return f"{message}: {narrow or beyond_range(self.model, state.u) or _LIMIT_POINT}"
 
 
 def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) -> np.ndarray:
