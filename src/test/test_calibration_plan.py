@@ -15,7 +15,7 @@ from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of, make_plan
 from gravcomp.calibration.plan_file import load_plan, save_plan
-from gravcomp.calibration.plan_table import is_plan_table, read_plan_table, write_plan_table
+from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.inverse import InverseOptions
@@ -50,6 +50,17 @@ def test_a_plan_keeps_to_its_time_and_to_the_limits(robot, plan):
         assert pose.displacement.max() <= robot.limits.displacement_max
         assert pose.displacement.min() >= robot.limits.displacement_min
         assert pose.tension.max() <= robot.limits.tension_max
+
+
+@pytest.mark.parametrize(("largest_mm", "shown"), [(25.0, "+25.0 mm"), (0.0312, "+0.0312 mm")])
+def test_pulls_of_small_robots_are_not_rounded_away(robot, tmp_path, largest_mm, shown):
+    pose = PlannedPose(0.0, 0.0, np.array([1e-3 * largest_mm, np.nan, np.nan]), ("c0",), np.full(3, 0.1), np.zeros(3))
+    assert shown in pulls(robot, pose)
+    write_plan_table(Plan((pose,) * 3, (1.0,) * 3, 1.0, 1.0), robot, tmp_path / "plan.csv")
+    text = (tmp_path / "plan.csv").read_text().replace(",,,\n", ",0,0,80\n")
+    (tmp_path / "plan.csv").write_text(text)
+    read = read_plan_table(tmp_path / "plan.csv", robot.cable_names)
+    assert read.displacement[0, 0] == pytest.approx(1e-3 * largest_mm, rel=1e-3)
 
 
 def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, plan):

@@ -1,10 +1,13 @@
-"""Motors of a robot whose file has none: they follow from the robot."""
+"""Motors, capstans and channels of a robot whose file has none: they follow from the robot."""
 
+import dataclasses
 import math
 
 import pytest
 import yaml
 
+from gravcomp.calibration.apply import write_calibrated
+from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
 from gravcomp.description.drive import Drive
 from gravcomp.description.own_weight import bend_by_own_weight
@@ -101,3 +104,59 @@ def test_a_small_capstan_with_the_standard_homing_is_refused(robot):
 
 def test_the_article_is_homed():
     assert not load_robot_file("article").hardware.strong_homing
+
+
+MOTORS = [{"cable": name, "can_id": k} for k, name in enumerate("abc", start=1)]
+
+
+def test_described_motors_without_capstans_get_ones_that_suit_the_virtual_robot_only(robot):
+    file = robot(50, 4, 2.0, hardware={"motors": MOTORS})
+    drive = file.hardware.drive
+    assert drive.capstan_radius == robot(50, 4, 2.0).hardware.drive.capstan_radius < STANDARD.capstan_radius
+    assert drive.velocity_gain * drive.capstan_radius == pytest.approx(STANDARD.velocity_gain * STANDARD.capstan_radius)
+    assert drive.current_limit == STANDARD.current_limit
+    assert file.hardware.homing.current_rise * drive.tension_per_ampere <= 5.0 or file.hardware.strong_homing
+    file.require_motors("virtual")
+    with pytest.raises(ConfigError, match=r"capstan_radius_mm has not been measured.*Give the radius"):
+        file.require_motors("socketcan")
+
+
+def test_described_capstans_are_those_of_real_motors(robot):
+    file = robot(50, 4, 2.0, drive={"capstan_radius_mm": 2.0}, hardware={"motors": MOTORS})
+    file.require_motors("socketcan")
+    drive = file.hardware.drive
+    assert (drive.capstan_radius, drive.velocity_gain) == (pytest.approx(2e-3), pytest.approx(2.5 * STANDARD.velocity_gain))
+    standard = robot(200, 12, 0.5, hardware={"motors": MOTORS})
+    standard.require_motors("socketcan")
+    assert standard.hardware.drive == STANDARD
+
+
+def test_motors_that_move_cables_farther_get_smaller_capstans(robot):
+    geared = [{**motor, "ratio": 2.0} for motor in MOTORS]
+    one, two = (robot(80, 5, 1.5, hardware={"motors": motors}).hardware.drive for motors in (MOTORS, geared))
+    assert two.capstan_radius == pytest.approx(one.capstan_radius / 2.0, abs=1e-5)
+
+
+def test_assumed_capstans_reach_the_largest_tension_with_the_described_current(robot):
+    drive = robot(300, 12, 0.3, drive={"current_limit": 0.5}, hardware={"motors": MOTORS}, tension_max=40.0).hardware.drive
+    assert drive.current_limit * drive.tension_per_ampere >= 1.4 * 40.0
+
+
+def test_buses_without_a_channel_get_one_each(robot):
+    buses = [{"name": "left"}, {"name": "right"}]
+    hardware = robot(50, 4, 2.0, hardware={"buses": buses, "motors": [{**m, "bus": "left"} for m in MOTORS]}).hardware
+    assert len({bus.channel for bus in hardware.all_buses}) == 2
+
+
+@pytest.mark.parametrize("hardware", [None, {"motors": MOTORS}])
+def test_a_calibrated_file_keeps_the_capstans_that_were_assumed_for_its_data(robot, tmp_path, hardware):
+    file = robot(80, 5, 1.5, hardware=hardware)
+    segment = file.robot.segments[0]
+    softer = dataclasses.replace(segment, material=dataclasses.replace(segment.material, youngs_modulus=1.2e6))
+    target = tmp_path / "calibrated.yaml"
+    write_calibrated(file.source, target, file.robot, dataclasses.replace(file.robot, segments=(softer,)), file.hardware)
+    calibrated = load_robot_file(target)
+    assert calibrated.robot.segments[0].material.youngs_modulus == pytest.approx(1.2e6)
+    assert dataclasses.astuple(calibrated.hardware.drive) == pytest.approx(dataclasses.astuple(file.hardware.drive))
+    with pytest.raises(ConfigError, match="socketcan"):
+        calibrated.require_motors("socketcan")

@@ -16,6 +16,7 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability import Binding, HoldOptions, background, holdability
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.holdability.directions import angles, sphere
+from gravcomp.holdability.motor_tension import weak_motors
 from gravcomp.holdability.play import play_of
 from gravcomp.holdability.search import HoldSearch
 from gravcomp.inverse import InverseController, straight_target
@@ -215,11 +216,23 @@ def test_info_leaves_it_out_on_demand(tmp_path, capsys):
     file = tmp_path / "rod.yaml"
     file.write_text(FILE.replace("LIMIT", "0.5"))
     assert main(["model", "info", str(file), "--no-hold", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["hold"] is None
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["hold"] is None and figures["motors"]["tension_n"] > 0.5 and figures["motors"]["advice"] == ""
     assert main(["model", "info", str(file), "--no-hold", "--picture", "x.png"]) == 2
     assert "--no-hold" in capsys.readouterr().err
     assert main(["model", "info", str(file), "--directions", "3"]) == 2
     assert "allowed: 4 to 180" in capsys.readouterr().err
+
+
+def test_motors_that_are_weaker_than_the_limit_of_tension_are_named(tmp_path):
+    motors = [{"cable": "a", "can_id": 1, "also": {"b": -2.0}}, {"cable": "c", "can_id": 2}]
+    drive = {"capstan_radius_mm": 3.0, "current_limit": 0.05}
+    path = tmp_path / "weak.yaml"
+    path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive, "motors": motors}}))
+    hardware = load_robot_file(path).hardware
+    assert hardware.weakest_tension == pytest.approx(0.05 * 0.18 / 3e-3 / 2.0)
+    assert weak_motors(hardware, Limits(tension_max=1.4)) == ""
+    assert "pull 1.5 N at most, at their current limit of 0.05 A" in weak_motors(hardware, Limits(tension_max=1.6))
 
 
 def test_a_loop_asks_a_process_of_its_own(monkeypatch):

@@ -14,9 +14,9 @@ from gravcomp.calibration.pose_prediction import with_moved_cables
 from gravcomp.calibration.poses import PoseParameters
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, PronyTerm, Robot, load_robot_file, shipped_robots
-from gravcomp.description.default_hardware import has_motors
 from gravcomp.description.hardware import Hardware
 from gravcomp.description.overlay import make_paths_whole
+from gravcomp.description.suited_capstan import has_motors
 from gravcomp.orientation.calibration import RestCalibration
 
 if TYPE_CHECKING:
@@ -130,18 +130,29 @@ def write_calibrated(
     if origin is not None:
         document["calibration"] = origin
     document["robot"] = _changed_robot(before, robot)
-    if hardware is not None and has_motors(dict(load_robot_file(source).sections.get("hardware") or {})):
-        document["hardware"] = {
-            "drive": {"capstan_radius_mm": round(hardware.drive.capstan_radius * 1e3, 5)},
-            "motors": [
-                {"cable": motor.cable, "can_id": motor.can_id, "offset_mm": round(motor.offset * 1e3, 4)}
-                for motor in hardware.motors
-            ],
-        }
+    with_motors = has_motors(dict(load_robot_file(source).sections.get("hardware") or {}))
+    if hardware is not None and (with_motors or hardware.drive.capstan_assumed):
+        document["hardware"] = _changed_hardware(hardware, with_motors)
     if virtual_seed is not None:
         document["virtual_robot"] = {"description": base, "seed": virtual_seed}
     about = f"Calibrated on {datetime.date.today().isoformat()}. What is not given here is in the file that `base` names."
     _write(document, target, about)
+
+
+def _changed_hardware(hardware: Hardware, with_motors: bool) -> dict[str, Any]:
+    """Return the fitted keys of the section `hardware`; with_motors: of a file that describes them.
+
+    Assumed capstans follow from the robot, and so from the values that are calibrated: those that the data belong to are written.
+    """
+    drive: dict[str, Any] = {"capstan_radius_mm": round(hardware.drive.capstan_radius * 1e3, 5)}
+    if hardware.drive.capstan_assumed:
+        drive["capstan_assumed"] = True
+    if not with_motors:
+        return {"drive": drive}
+    motors = [
+        {"cable": motor.cable, "can_id": motor.can_id, "offset_mm": round(motor.offset * 1e3, 4)} for motor in hardware.motors
+    ]
+    return {"drive": drive, "motors": motors}
 
 
 def _changed_robot(before: Robot, robot: Robot) -> dict[str, Any]:

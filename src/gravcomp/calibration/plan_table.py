@@ -13,11 +13,14 @@ import csv
 import math
 from pathlib import Path
 
+import numpy as np
+
 from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import Plan, PlannedPose
 from gravcomp.description import Robot
 
+_SHOWN, _WRITTEN = 2e-2, 1e-3  # of the largest pull: steps of pulls that are read and of those that are computed with
 _FEWEST = 3  # rows with a tip
 _TIP = ("tip_x_mm", "tip_y_mm", "tip_z_mm")
 _GRAVITY = ("gravity_x", "gravity_y", "gravity_z")
@@ -35,8 +38,9 @@ def instruction(pose: PlannedPose) -> str:
 
 def pulls(robot: Robot, pose: PlannedPose) -> str:
     """Return the pulls of a pose in mm, as words."""
+    decimals = _decimals(pose.displacement, _SHOWN)
     found = [
-        f"{name} {1e3 * value:+.1f} mm ({force:.2g} N)"
+        f"{name} {1e3 * value:+.{decimals}f} mm ({force:.2g} N)"
         for name, value, force in zip(robot.cable_names, pose.displacement, pose.tension)
         if name in pose.pulled
     ]
@@ -45,13 +49,15 @@ def pulls(robot: Robot, pose: PlannedPose) -> str:
 
 def write_plan_table(plan: Plan, robot: Robot, path: Path) -> None:
     """Write the table to fill in."""
+    decimals = max(_decimals(np.concatenate([pose.displacement for pose in plan.poses]), _WRITTEN), 2)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         wound = [f"{name}_mm" for name in robot.cable_names]
         writer.writerow(["pose", "inclination_deg", "roll_deg", *_GRAVITY, *wound, *_TIP])
         for number, pose in enumerate(plan.poses, start=1):
             pulled = [
-                f"{1e3 * value:.2f}" if name in pose.pulled else "" for name, value in zip(robot.cable_names, pose.displacement)
+                f"{1e3 * value:.{decimals}f}" if name in pose.pulled else ""
+                for name, value in zip(robot.cable_names, pose.displacement)
             ]
             angles = [f"{math.degrees(pose.inclination):.1f}", f"{math.degrees(pose.roll):.1f}"]
             writer.writerow([number, *angles, *(f"{x:.4f}" for x in pose.gravity), *pulled, "", "", ""])
@@ -76,3 +82,9 @@ def read_plan_table(path: Path, cables: tuple[str, ...]) -> StillWindows:
     if len(filled.rows) < _FEWEST:
         raise MeasurementError(f"{path}: {len(filled.rows)} rows have a tip; at least {_FEWEST} are needed")
     return StillWindows(filled.vectors(_GRAVITY), filled.vectors(wound, 1e-3, empty=math.nan), filled.vectors(_TIP, 1e-3))
+
+
+def _decimals(displacement: np.ndarray, step: float) -> int:
+    """Return the decimals of mm, at least one, that are as fine as `step` of the largest displacement in m; NaN: released."""
+    largest = float(np.nanmax(np.abs(displacement), initial=0.0))
+    return 1 if largest == 0.0 else max(1, math.ceil(-math.log10(1e3 * largest * step)))

@@ -21,6 +21,10 @@ class Drive:
         maximum=50,
         description="from the axis to the middle of the cable; of a lead screw its lead over 2 pi",
     )
+    capstan_assumed: bool = parameter(
+        False,
+        description="nobody has measured capstan_radius_mm, which suits the virtual robot: real motors are refused",
+    )
     backlash: float = parameter(0.6, edge="deg", minimum=0, maximum=90, description="of the gear, at its output")
     take_up_time: float = parameter(
         0.3,

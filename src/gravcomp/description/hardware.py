@@ -118,6 +118,12 @@ class Hardware:
         return next((bus for bus in self.all_buses if bus.name == self.imu_bus), self.all_buses[0])
 
     @property
+    def weakest_tension(self) -> float:
+        """Tension (N) that every motor gives each of its cables at the current limit, without friction."""
+        ratio = max(abs(value) for motor in self.motors for value in motor.ratios.values())
+        return self.drive.current_limit * self.drive.tension_per_ampere / ratio
+
+    @property
     def strong_homing(self) -> str:
         """Why homing would pull too much, as a sentence; empty where it would not, or where no largest tension is known."""
         homing, ratio = self.homing, min(motor.ratio for motor in self.motors)

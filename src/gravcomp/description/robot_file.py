@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gravcomp.config import ConfigError, from_mapping, load_yaml
-from gravcomp.description.default_hardware import has_motors, with_motors
+from gravcomp.description.default_hardware import completed
 from gravcomp.description.hardware import Hardware, parse_hardware
 from gravcomp.description.overlay import on_base, with_whole_path
 from gravcomp.description.pairs import check_pairs
 from gravcomp.description.robot import Robot
+from gravcomp.description.suited_capstan import has_motors
 from gravcomp.scene import SceneSection
 
 if TYPE_CHECKING:
@@ -36,13 +37,13 @@ class RobotFile:
     def section(self, name: str) -> dict:
         """Return a top-level section as a plain mapping of edge keys; empty when the file does not have it.
 
-        Without `hardware.motors`, the section `hardware` has motors that follow from the robot, for the virtual robot (see
-        `require_motors`). Raises ConfigError when no section has this name.
+        The section `hardware` has motors and capstans that follow from the robot where the file has none, for the virtual robot
+        (see `require_motors`). Raises ConfigError when no section has this name.
         """
         if name not in SECTIONS:
             raise ConfigError(f"{self.source}: there is no section '{name}'; allowed: {', '.join(SECTIONS)}")
         section = dict(self.sections.get(name) or {})
-        return section if name != "hardware" or has_motors(section) else with_motors(section, self.robot)
+        return section if name != "hardware" else completed(section, self.robot)
 
     @functools.cached_property
     def hardware(self) -> Hardware:
@@ -77,11 +78,20 @@ class RobotFile:
         return (self.sections.get("hardware") or {}).get("joints") is not None
 
     def require_motors(self, interface: str) -> None:
-        """Raise ConfigError for a file without motors on a bus (python-can's `interface`) that can carry real ones."""
-        if interface not in IN_SOFTWARE and not has_motors(dict(self.sections.get("hardware") or {})):
+        """Raise ConfigError for a file without motors, or with assumed capstans, on a bus that can carry real motors.
+
+        interface: python-can's name of the bus. Capstans that are not given are the standard ones where those suit the robot.
+        """
+        if interface in IN_SOFTWARE:
+            return
+        only = f"the robot can only be the virtual one ({', '.join(IN_SOFTWARE)})"
+        if not has_motors(dict(self.sections.get("hardware") or {})):
+            raise ConfigError(f"{self.source}: key 'hardware.motors' is missing, which {interface} needs; without it, {only}")
+        drive = self.hardware.drive
+        if drive.capstan_assumed:
             raise ConfigError(
-                f"{self.source}: key 'hardware.motors' is missing, which {interface} needs;"
-                f" without it, the robot can only be the virtual one ({', '.join(IN_SOFTWARE)})"
+                f"{self.source}: hardware.drive.capstan_radius_mm has not been measured, which {interface} needs; with the"
+                f" assumed {1e3 * drive.capstan_radius:.3g} mm, {only}. Give the radius of your capstans, without capstan_assumed"
             )
 
 

@@ -63,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         "horizontal_tip_mm": (1e3 * sag.tip_position).tolist() if sag.is_equilibrium else None,
         "horizontal_message": sag.message,
         "play": _play(file, robot, sag),
+        "motors": _motors(file),
         "hold": None if answer is None else hold.figures(answer, model),
         "reach": reach(simulator),
         "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
@@ -71,6 +72,15 @@ def run(args: argparse.Namespace) -> int:
         figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
     output.result(figures, _text(figures, [] if answer is None else lines(robot, answer)))
     return 0
+
+
+def _motors(file: "RobotFile") -> dict[str, Any] | None:
+    """Return the tension that the motors reach, and what is wrong with it; None without cables, and for joints."""
+    from gravcomp.holdability.motor_tension import weak_motors
+
+    if not file.robot.cables or file.has_joints:
+        return None
+    return {"tension_n": file.hardware.weakest_tension, "advice": weak_motors(file.hardware, file.robot.limits)}
 
 
 def _play(file: "RobotFile", robot: "Robot", sag: "Shape") -> dict[str, Any] | None:
@@ -186,6 +196,8 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
         + (figures["horizontal_message"] if tip is None else ", ".join(f"{x:.2f}" for x in tip) + " mm"),
     ]
     lines += [f"  {line}" for line in hold_lines]
+    if figures["motors"] and figures["motors"]["advice"]:
+        lines.append(f"  advice: {figures['motors']['advice']}")
     if figures["play"]:
         lines.append(f"  {'advice: ' if figures['play']['large'] else ''}{figures['play']['sentence']}")
     if figures["reach"]:
