@@ -88,7 +88,7 @@ def test_a_payload_that_breaks_the_robot_is_refused_and_another_one_is_ramped():
     ],
 )
 def test_tension_sensors_that_cannot_be_right_are_named(reading, expected, reason):
-    check, random = TensionCheck(ROBOT.cable_names, 5.0), np.random.default_rng(1)
+    check, random = TensionCheck(ROBOT.cable_names, 5.0, 0.05), np.random.default_rng(1)
     said = {check.observe(reading(np.full(6, expected), 0.01 * random.normal(size=6)), np.full(6, expected)) for _ in range(120)}
     if reason:
         assert any(reason in sentence for sentence in said)
