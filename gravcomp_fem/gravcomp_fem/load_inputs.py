@@ -41,11 +41,12 @@ class LoadInputs:
         parameters: FemSimulatorParameters,
         model: RobotModel,
         scene: Scene | None,
+        holdable: float,
     ):
-        """model: of the robot, as the simulator has it; scene: what it touches."""
+        """model: of the robot, as the simulator has it; scene: what it touches; holdable: payload in kg that the cables hold."""
         self._node, self._robot, self._model, self._scene = node, robot, model, scene
         self._frames = parameters.base_frame, parameters.tip_frame
-        self.payload = LivePayload(robot, parameters.external.ramp_time)
+        self.payload = LivePayload(robot, parameters.external.ramp_time, holdable)
         self._publisher = node.create_publisher(WrenchEstimate, "estimated/wrench", SENSOR)
         self._service = node.create_service(Trigger, "~/zero_load", self._on_zero)
         self._begin_wrenches(parameters)

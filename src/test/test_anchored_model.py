@@ -159,7 +159,7 @@ def test_a_tip_that_moves_is_followed_while_the_anchored_model_is_on_its_way(fou
 
 def test_the_estimate_is_kept_and_not_compensated_when_the_tip_is_no_longer_measured(found):
     _, pushed, last = found
-    looks, straight = anchored_observer(found, Follower(last))
+    looks, straight = anchored_observer(found, Follower(last), compensate_force=True)
     for step in range(60):
         looks.measure_tip(0.01 * step, pushed.tip_position)
         assert looks.follow(0.01 * step, straight, WOUND)

@@ -201,7 +201,9 @@ class LoadObserver:
 
     def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
         """Return the load that the model has to carry from `now` (s) on under gravity (3,) m/s^2; None: none."""
-        if self._filter is None or not self.options.compensate or not self._released:
+        options = self.options
+        compensates = options.compensate if options.kind == "payload" else options.compensate_force
+        if self._filter is None or not compensates or not self._released:
             return None
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
         if self._far:  # the running model would lose its equilibrium under what has pushed the robot so far
@@ -209,7 +211,7 @@ class LoadObserver:
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
-        share = lag_share(self._applied_at, now, self.options.response)
+        share = lag_share(self._applied_at, now, options.response)
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
         self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
