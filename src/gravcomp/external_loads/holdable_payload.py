@@ -1,6 +1,6 @@
 """The heaviest payload that the cables can hold at the tip of a straight robot, whichever of its sides is below.
 
-A straight robot under tensions lambda and a force f at its tip moves the tip across its axis by W lambda + C f (compliances of the
+Tensions lambda and a force f at the tip move the tip of a straight robot across its axis by W lambda + C f (compliances of the
 shape). The tensions up to T reach all moves whose part along any direction n is at most T sum_i max(0, n . W_i): so they hold the
 weight m g d, for every direction d across the robot, if
 

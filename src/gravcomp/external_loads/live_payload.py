@@ -42,8 +42,8 @@ class LivePayload:
             )
         if 0.0 < self._most < mass and mass > self._robot.payload.mass:
             raise ConfigError(
-                f"{found}with limits.tension_max = {limits.tension_max:g} N the cables hold at most {1e3 * self._most:.4g} g at the"
-                " tip of the horizontal robot. A robot that only hangs has its payload in its file (robot.payload)"
+                f"{found}with limits.tension_max = {limits.tension_max:g} N the cables hold at most {1e3 * self._most:.4g} g at"
+                " the tip of the horizontal robot. A robot that only hangs has its payload in its file (robot.payload)"
             )
 
     def set(self, mass: float) -> None:

@@ -18,7 +18,7 @@ class LoadEstimationOptions:
     compensate: bool = parameter(True, description="let the model carry the payload that is found, so that the cables hold it")
     compensate_force: bool = parameter(
         False,
-        description="the same for a force, which must not depend on where the tip is: against a wall the cables would press harder",
+        description="the same for a force, which must not depend on where the tip is: at a wall the cables would press harder",
     )
     tip_std: float = parameter(
         0.5, edge="mm", minimum=0.001, maximum=100.0, description="standard deviation of a measured tip along each axis"
