@@ -42,7 +42,7 @@ def test_a_process_answers_as_one_that_computes_at_once_and_is_replaced_when_it_
     assert answer.question.stamp == QUESTION.stamp
     assert answer.found.carried == pytest.approx(same.found.carried, rel=1e-9) and answer.found.carried.any()
     first = psutil.Process(worker.pid)
-    assert first.nice() == 19  # it gives way to the nodes
+    assert first.nice() == 19  # the nodes come first
     until(lambda: worker.exchange(QUESTION))
     worker.reset()
     worker.exchange(QUESTION)
