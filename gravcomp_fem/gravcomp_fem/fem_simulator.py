@@ -23,7 +23,7 @@ from visualization_msgs.msg import MarkerArray
 
 from gravcomp.arm.shape_chain import joint_names, joint_positions
 from gravcomp.config import ConfigError
-from gravcomp.external_loads import LivePayload
+from gravcomp.external_loads import LivePayload, holdable_payload
 from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
@@ -53,6 +53,7 @@ class FemSimulator(ManagedNode):
 
     name = "fem_simulator"
     parameters_class = FemSimulatorParameters
+    _holdable = 0.0  # kg, payload at the tip; 0: not known before the model is there
 
     def configure(self) -> None:
         """Create the simulator and compile its functions."""
@@ -67,7 +68,9 @@ class FemSimulator(ManagedNode):
         # Functions that are not cached yet are compiled here rather than when the first sample, or the first pull, arrives.
         self._simulator.warm_up()
         cables = np.zeros(len(self.robot_file.robot.cables))
-        within_limits(cables, cables, self.robot_file.robot.limits, 0.0)
+        straight = self._simulator.step(np.zeros(3), cables)
+        within_limits(cables, cables, robot.limits, 0.0)
+        self._holdable = holdable_payload(straight, self._simulator.tip_compliance(), robot.limits.tension_max)  # kg
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
         around = scene or self.robot_file.zones or not self.parameters.turn.enabled
         self._turn = None if around else BaseTurn(self._simulator.model, self.parameters.turn)
@@ -84,7 +87,7 @@ class FemSimulator(ManagedNode):
         points = len(self.robot_file.robot.effectors.backbone_station)
         self._chain_names = joint_names(self.parameters.joint_prefix, points)
         self._chain = self.create_publisher(JointState, "joint_states", 10) if self.parameters.shape_joints else None
-        self._loads = LoadInputs(self, self.robot_file.robot, self.parameters, self._simulator.model, scene)
+        self._loads = LoadInputs(self, self.robot_file.robot, self.parameters, self._simulator.model, scene, self._holdable)
 
     def activate(self) -> None:
         """Reset the simulator and subscribe."""
@@ -128,7 +131,7 @@ class FemSimulator(ManagedNode):
     def check_parameters(self, new: FemSimulatorParameters) -> None:
         """Refuse a payload that the robot cannot carry."""
         if new.payload_mass >= 0.0:
-            LivePayload(self.robot_file.robot, 0.0).check(new.payload_mass)
+            LivePayload(self.robot_file.robot, 0.0, self._holdable).check(new.payload_mass)
 
     def parameters_changed(self, old: FemSimulatorParameters, new: FemSimulatorParameters) -> None:
         """Apply a new payload and new options of the loads."""

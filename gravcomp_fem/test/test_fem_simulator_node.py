@@ -1,4 +1,4 @@
-"""The simulator adds the forces of the base's turn to gravity, from the rate in imu/data, and only while that arrives."""
+"""The simulator as a node: forces of the base's turn, from the rate in imu/data; loads and measurements that cannot be right."""
 
 import os
 import time
@@ -8,13 +8,16 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 import numpy as np
 import pytest
 import rclpy
-from geometry_msgs.msg import Vector3Stamped
+import yaml
+from geometry_msgs.msg import PoseStamped, Vector3Stamped, WrenchStamped
 from gravcomp_fem.conversion import vector_of
 from gravcomp_fem.fem_simulator import FemSimulator
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rclpy.time import Time
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, JointState
 
+from gravcomp.description.robot_file import robot_path
 from gravcomp.launcher.model_builder import MARK
 from gravcomp_msgs.msg import Deformation
 from gravcomp_node import SENSOR
@@ -27,8 +30,8 @@ PERIOD_NS = 10_000_000
 class Stand:
     """The simulator, and what it receives. shapes: gravity of each deformation, and what the turn adds to it."""
 
-    def __init__(self):
-        rclpy.init(args=["test"])
+    def __init__(self, *arguments):
+        rclpy.init(args=["test", *arguments])
         self.executor, self.simulator = SingleThreadedExecutor(), FemSimulator()
         self.other = rclpy.create_node("other", use_global_arguments=False)
         self.gravity = self.other.create_publisher(Vector3Stamped, "gravity", SENSOR)
@@ -97,3 +100,67 @@ def test_a_turn_that_becomes_faster_pulls_across_and_along_the_robot(stand):
     for _ in range(12):
         _, added = stand.sample()
     assert added == pytest.approx(np.zeros(3))
+
+
+@pytest.fixture
+def loaded(monkeypatch, tmp_path):
+    """A stand whose robot may be loaded, looks for a payload, and has a coarse mesh."""
+    monkeypatch.setenv(MARK, "1")
+    described = yaml.safe_load(robot_path("article").read_text())
+    described["robot"] |= {"max_wrench": {"force": 0.2, "moment": 0.002}, "elements": {"around": 4, "along": 4}}
+    described["nodes"]["fem_simulator"] = {"load": {"kind": "payload"}}
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(described))
+    stand = Stand("--ros-args", "-p", f"robot:={tmp_path / 'robot.yaml'}")
+    yield stand
+    stand.close()
+
+
+def test_loads_and_measurements_that_cannot_be_right_are_named_and_change_nothing(loaded):
+    names, now = loaded.simulator.robot_file.robot.cable_names, loaded.other.get_clock().now
+
+    def wrench(frame="soft_tip", force=0.1, late=0.0):
+        message = WrenchStamped()
+        message.header.frame_id, message.header.stamp = frame, Time(nanoseconds=now().nanoseconds - int(1e9 * late)).to_msg()
+        message.wrench.force.x = force
+        return message
+
+    def tip(frame="soft_base", z=0.1, late=0.0):
+        message = PoseStamped()
+        message.header.frame_id, message.header.stamp = frame, Time(nanoseconds=loaded.now - int(1e9 * late)).to_msg()
+        message.pose.position.z = z
+        return message
+
+    def cells(named=names, tension=0.5, late=0.0):
+        message = JointState(name=named, effort=[tension] * len(named))
+        message.header.stamp = Time(nanoseconds=loaded.now - int(1e9 * late)).to_msg()
+        return message
+
+    cases = [
+        ("external/wrench", WrenchStamped, lambda: wrench(frame="elbow"), "in the frame 'elbow'"),
+        ("external/wrench", WrenchStamped, lambda: wrench(force=1e4), "1e+04 N"),
+        ("external/wrench", WrenchStamped, lambda: wrench(force=np.nan), "finite numbers are needed"),
+        ("external/wrench", WrenchStamped, lambda: wrench(late=9.0), "s old"),
+        ("measured/tip", PoseStamped, lambda: tip(frame="camera"), "its frame is 'camera'"),
+        ("measured/tip", PoseStamped, lambda: tip(z=np.nan), "measured/tip is not used: it is not finite"),
+        ("measured/tip", PoseStamped, lambda: tip(z=100.0), "its unit or frame?"),
+        ("measured/tip", PoseStamped, lambda: tip(late=30.0), "30 s before that of gravity"),
+        ("measured/tension", JointState, lambda: cells(named=names[:3]), "one of each is needed"),
+        ("measured/tension", JointState, lambda: cells(tension=np.nan), "is not a finite number"),
+        ("measured/tension", JointState, lambda: cells(tension=1e3), "its unit?"),
+        ("measured/tension", JointState, lambda: cells(late=30.0), "30 s before that of gravity"),
+        ("measured/tension", JointState, lambda: cells(), "is stuck at 0.5 N"),
+    ]
+    publishers = {topic: loaded.other.create_publisher(kind, topic, SENSOR) for topic, kind, *_ in cases}
+    end = time.monotonic() + 120.0
+    while not all(one.get_subscription_count() for one in (loaded.gravity, *publishers.values())):
+        assert time.monotonic() < end, "the simulator subscribes to nothing"
+        loaded.executor.spin_once(timeout_sec=0.01)
+    for topic, _, message, reason in cases:
+        while reason not in loaded.simulator._sentence:
+            assert time.monotonic() < end, f"{reason} is not named; {loaded.simulator._sentence}"
+            publishers[topic].publish(message())
+            loaded.sample()
+    (heavy,) = loaded.simulator.set_parameters([Parameter("payload_mass_g", value=200.0)])
+    assert not heavy.successful and "the cables hold at most" in heavy.reason
+    carried = loaded.simulator._loads.carried(GRAVITY, 1e-9 * loaded.now)
+    assert np.abs([one.force for one in carried]).max(initial=0.0) < 1e-6

@@ -10,7 +10,8 @@ from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.turning_loads import slopes_of
 from gravcomp.full_model.wrench import PointLoads, Wrench
-from gravcomp.load_estimation import AnchoredModel, LoadEstimationOptions, LoadObserver, anchored_model, observer
+from gravcomp.load_estimation import AnchoredModel, AtOnce, LoadEstimationOptions, LoadObserver, at_once
+from gravcomp.load_estimation.anchored_follower import Answer
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.simulation import RobotModel, Simulator
 
@@ -98,7 +99,7 @@ def test_the_tangent_of_a_spring_is_its_derivative(model):
 def test_the_anchored_model_takes_over_where_the_running_one_is_far_off(model, found):
     simulator, pushed, _ = found
     straight = simulator.solve(GRAVITY, WOUND)
-    observer = LoadObserver(ROBOT, LoadEstimationOptions(kind="force"), anchored_model(model, "force"))
+    observer = LoadObserver(ROBOT, LoadEstimationOptions(kind="force"), at_once(model, "force"))
     observer.predict(0.0, straight, np.diag([0.2, 0.2, 1e-3]), np.zeros(3), WOUND)
     observer.measure_tip(0.0, straight.tip_position)
     assert not observer.follow(0.01, straight, WOUND)
@@ -111,39 +112,32 @@ def test_the_anchored_model_takes_over_where_the_running_one_is_far_off(model, f
         observer.measure_tip(0.02 + 0.01 * step, pushed.tip_position)
     across = observer.estimate(GRAVITY, 0.62).force[:2]
     assert across == pytest.approx(FORCE[:2], abs=0.15 * np.linalg.norm(FORCE))
-    assert anchored_model(model, "payload") is None
+    assert at_once(model, "payload") is None
 
 
 class Follower:
-    """Stands for an anchored model: answers every step with the same shape, or with None on its way, and takes its time."""
+    """A worker that answers every question with the same shape, or with None: on its way."""
 
-    near, far = 0.04 * ROBOT.length, 0.1 * ROBOT.length
+    sentence = ""
 
-    def __init__(self, answer):
-        self.answer, self.wanted, self.steps, self.clock = answer, None, 0, 0.0
+    def __init__(self, found):
+        self.found, self.wanted = found, None
+
+    def exchange(self, question):
+        self.wanted = question.place
+        return [Answer(question, self.found)]
 
     def reset(self):
         self.wanted = None
 
-    def anchor(self, place):
-        self.wanted = place
-
-    def distance_to(self, tip):
-        return self.wanted - tip
-
-    def is_off(self, tip):
-        return True
-
-    def step(self, gravity, wound, known, duration):
-        self.steps += 1
-        self.clock += 0.02
-        return self.answer
+    def close(self):
+        pass
 
 
-def anchored_observer(found, follower, share=None, **options):
+def anchored_observer(found, follower, **options):
     """Return an observer whose running model is straight, and has a tip measured there, and that model's shape."""
     straight = found[0].solve(GRAVITY, WOUND)
-    looks = LoadObserver(ROBOT, LoadEstimationOptions(kind="force", **options), follower, share)
+    looks = LoadObserver(ROBOT, LoadEstimationOptions(kind="force", **options), follower)
     looks.predict(0.0, straight, np.diag([0.2, 0.2, 1e-3]), np.zeros(3), WOUND)
     looks.follow(0.0, straight, WOUND)
     return looks, straight
@@ -165,7 +159,7 @@ def test_a_tip_that_moves_is_followed_while_the_anchored_model_is_on_its_way(fou
 
 def test_the_estimate_is_kept_and_not_compensated_when_the_tip_is_no_longer_measured(found):
     _, pushed, last = found
-    looks, straight = anchored_observer(found, Follower(last))
+    looks, straight = anchored_observer(found, Follower(last), compensate_force=True)
     for step in range(60):
         looks.measure_tip(0.01 * step, pushed.tip_position)
         assert looks.follow(0.01 * step, straight, WOUND)
@@ -191,21 +185,10 @@ def test_no_force_is_found_while_the_robot_is_said_to_carry_none(found):
     assert looks.estimate(GRAVITY, 0.3).force == pytest.approx(np.zeros(3))
 
 
-@pytest.mark.parametrize(("share", "most"), [(None, 100), (0.3, 16)])
-def test_the_anchored_model_takes_its_share_of_the_time(found, monkeypatch, share, most):
-    follower = Follower(None)
-    monkeypatch.setattr(observer.time, "perf_counter", lambda: follower.clock)
-    looks, straight = anchored_observer(found, follower, share)
-    for step in range(100):
-        looks.measure_tip(0.01 * step, straight.tip_position + np.array([-0.03, 0.0, 0.0]))
-        assert looks.follow(0.01 * step, straight, WOUND)
-    assert 0.8 * most <= follower.steps <= most
-
-
 def test_the_covariance_holds_the_error_of_a_robot_that_is_stiffer_than_its_model(model, found):
     stiff = dataclasses.replace(ROBOT, segments=tuple(_stiffer(one, 1.15) for one in ROBOT.segments))
     pushed = Simulator(RobotModel(stiff), reduced=False).solve(GRAVITY, WOUND, wrench=Wrench(FORCE))
-    looks, straight = anchored_observer(found, AnchoredModel(model))
+    looks, straight = anchored_observer(found, AtOnce(AnchoredModel(model)))
     for step in range(80):
         looks.measure_tip(0.01 * step, pushed.tip_position)
         looks.follow(0.01 * step, straight, WOUND)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from gravcomp.config import ConfigError
-from gravcomp.description import MaxWrench, load_robot_file
-from gravcomp.external_loads import ExternalLoadOptions, LivePayload, WrenchInput
+from gravcomp.description import Elements, MaxWrench, Payload, load_robot_file
+from gravcomp.external_loads import ExternalLoadOptions, LivePayload, WrenchInput, holdable_payload
 from gravcomp.full_model.shape import Response, Shape
 from gravcomp.load_estimation import LoadEstimationOptions, LoadObserver
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.load_estimation.tension_check import TensionCheck
+from gravcomp.simulation import Simulator
 
 ROBOT = dataclasses.replace(load_robot_file("article").robot, max_wrench=MaxWrench(0.5, 0.01))
 GRAVITY = np.array([-9.81, 0.0, 0.0])
@@ -74,6 +75,21 @@ def test_a_payload_that_breaks_the_robot_is_refused_and_another_one_is_ramped():
     assert np.all(np.diff(weights) < 0.0) and weights[-1] == pytest.approx(-9.81 * 0.004, rel=1e-3)
 
 
+def test_a_payload_that_the_cables_cannot_hold_is_refused():
+    simulator = Simulator(dataclasses.replace(ROBOT, elements=Elements(around=4, along=4)), reduced=False)
+    straight = simulator.step(np.zeros(3), np.zeros(6))
+    most = holdable_payload(straight, simulator.tip_compliance(), ROBOT.limits.tension_max)
+    # A beam: F l^3 / 3 EI = M_distal l^2 / 2 EI + M_proximal 3 l^2 / 8 EI; against the worst direction, M = T r cos 30 deg.
+    moment = 5.0 * 3.15e-3 * np.cos(np.radians(30.0))
+    assert 9.81 * most == pytest.approx(3.0 * moment * (1 / 2 + 3 / 8) / ROBOT.length, rel=0.05)
+    payload = LivePayload(ROBOT, 0.0, most)
+    payload.set(0.95 * most)
+    with pytest.raises(ConfigError, match="the cables hold at most"):
+        payload.set(1.05 * most)
+    heavy = dataclasses.replace(ROBOT, payload=Payload(2.0 * most))
+    LivePayload(heavy, 0.0, most).set(2.0 * most)
+
+
 @pytest.mark.parametrize(
     ("reading", "expected", "reason"),
     [
@@ -88,12 +104,26 @@ def test_a_payload_that_breaks_the_robot_is_refused_and_another_one_is_ramped():
     ],
 )
 def test_tension_sensors_that_cannot_be_right_are_named(reading, expected, reason):
-    check, random = TensionCheck(ROBOT.cable_names, 5.0), np.random.default_rng(1)
+    check, random = TensionCheck(ROBOT.cable_names, 5.0, 0.05), np.random.default_rng(1)
     said = {check.observe(reading(np.full(6, expected), 0.01 * random.normal(size=6)), np.full(6, expected)) for _ in range(120)}
     if reason:
         assert any(reason in sentence for sentence in said)
     else:
         assert said == {""}
+
+
+def test_a_sensor_of_a_taut_cable_that_is_not_zeroed_is_named_where_the_robot_carries_nothing():
+    check, random = TensionCheck(ROBOT.cable_names, 5.0, 0.05), np.random.default_rng(1)
+    expected = np.full(6, 0.5)
+
+    def said(unloaded, offset=0.8):
+        zeros = np.array([offset, 0, 0, 0, 0, 0])
+        return [check.observe(expected + zeros + 0.01 * random.normal(size=6), expected, unloaded) for _ in range(120)][-1]
+
+    assert said(False) == ""  # it may be a load
+    assert "not zeroed" in said(True) and "s1c1" in said(True)
+    assert "not zeroed" in said(False)
+    assert said(True, 0.0) == "" and said(False, 0.0) == ""
 
 
 @pytest.fixture
@@ -186,6 +216,56 @@ def test_a_payload_is_found_after_zeroing_whatever_the_models_errors(shape, sour
     assert low <= mass <= high
     assert abs(found.mass - mass) < 0.2 * mass
     assert found.force == pytest.approx(found.mass * GRAVITY)
+
+
+def test_what_a_sensor_has_said_before_it_was_found_to_be_wrong_is_forgotten(shape):
+    tip, shape = shape
+    robot = dataclasses.replace(ROBOT, cables=ROBOT.cables[:3])
+    observer = LoadObserver(robot, LoadEstimationOptions(kind="payload", compensate=False))
+    random, carried = np.random.default_rng(3), 0.004 * GRAVITY
+    tension = shape.cable_tension + HeldRobot(shape, tip, shape.cable_displacement, np.array([0, 0, 0.1])).under(carried).tension
+
+    def measure(k, signs):
+        observer.predict(0.01 * k, shape, tip, ZERO, shape.cable_displacement)
+        observer.measure_tensions(0.01 * k, signs * tension * (1 + 0.01 * random.normal(size=3)))
+        return observer.estimate(GRAVITY, 0.01 * k)
+
+    for k in range(200):
+        good = measure(k, np.ones(3))
+    wrong = [measure(k, np.array([-1, 1, 1])) for k in range(200, 300)]
+    assert good.sources and not good.sentence
+    assert good.mass == pytest.approx(0.004, rel=0.1)
+    assert "wrong sign" in wrong[-1].sentence and robot.cable_names[0] in wrong[-1].sentence
+    assert wrong[-1].mass == pytest.approx(good.mass, rel=0.01)
+    # Nothing of a sensor is used before enough was read to know it.
+    observer.reset()
+    first = [measure(k, np.array([-1, 1, 1])) for k in range(60)]
+    assert "wrong sign" in first[-1].sentence and not any(one.sources for one in first)
+
+
+def test_a_sensor_that_stops_is_named_while_the_other_one_goes_on(shape):
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="payload"))
+    for k in range(500):
+        now = 0.01 * k
+        observer.predict(now, shape, tip, ZERO, shape.cable_displacement)
+        observer.measure_tip(now, shape.tip_position)
+        if k < 100:
+            observer.measure_tensions(now, shape.cable_tension + 1e-3 * np.sin([k, 2 * k, 3 * k]))
+    found = observer.estimate(GRAVITY, now)
+    assert found.sources == ("tip",) and "measured/tension has not been used for 4.0 s" in found.sentence
+
+
+def test_a_force_is_compensated_on_request_only(shape):
+    tip, shape = shape
+    robot = dataclasses.replace(ROBOT, cables=ROBOT.cables[:3])
+    for compensates in (False, True):
+        observer = LoadObserver(robot, LoadEstimationOptions(kind="force", compensate_force=compensates))
+        for k in range(100):
+            observer.predict(0.01 * k, shape, tip, ZERO, shape.cable_displacement)
+            observer.measure_tip(0.01 * k, shape.tip_position + 1e-3 * np.eye(3)[1])
+            wrench = observer.wrench(GRAVITY, 0.01 * k)
+        assert (wrench is not None and wrench.force[1] > 0.0) == compensates
 
 
 def test_without_sensors_the_load_is_said_to_be_unknown(shape):

@@ -35,7 +35,7 @@ from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParamete
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import Command, InverseController, Target
 from gravcomp.inverse.limits import within_limits
-from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver, anchored_model
+from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver, at_once
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
@@ -123,7 +123,7 @@ class ClosedLoop:
         self._load = None
         if load is not None:
             kind = load.kind if tracker is not None else "none"
-            self._load = LoadObserver(setup.robot, load, anchored_model(self._simulator.model, kind, setup.modelled_scene))
+            self._load = LoadObserver(setup.robot, load, at_once(self._simulator.model, kind, setup.modelled_scene))
         self._tip_compliance: np.ndarray | None = None
         self._target: Target | None = None
         self._weightless = False

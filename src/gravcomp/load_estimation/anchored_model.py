@@ -31,7 +31,6 @@ from gravcomp.full_model.shape import Response, Shape
 from gravcomp.full_model.spring import Spring
 from gravcomp.full_model.wrench import Load, PointLoads, Wrench
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
-from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.scene.scene import Scene
 from gravcomp.simulation import Simulator
@@ -40,10 +39,10 @@ _STATIONS = (1.0, 0.75, 0.5, 0.25)  # of the springs, the tip first
 _TURN = 0.25  # of the length: lever that makes a spring of the tip as stiff as those against turning
 _STIFF = 30.0  # stiffness of a spring over that of the tip at rest across its axis
 _STRIDE = 0.04  # of the length: by how much the spring's end moves at once; a step that fails is halved
+NEAR = _STRIDE
+"""Of the length: a shape whose tip is farther from the measured one says too little of the robot."""
 _SHARES = 0.2, 0.03  # of the way to the measured tip that it moves at once, and near it, where the way is mostly noise
 _LEAST_STRIDE = 1e-3  # of a stride: where steps fail as short as this, the model begins again at rest
-_NEAR = 1.0  # strides: a shape that is farther from the measured tip says too little of the robot
-_FAR = 0.1  # of the length: a model whose tip is farther from the measured one is no measure of the load
 _TAKEN_OVER = 0.1  # of the spring's force that f_c takes over in a step
 _COMPLIANCE_MOVED, _COMPLIANCE_EVERY = 0.01, 50  # of the length, or steps, after which the compliance is computed again
 _SINGULAR = 1e-6  # least eigenvalue of 1 - K C_s: the robot without springs is about to snap through
@@ -62,17 +61,6 @@ class AnchoredShape(NamedTuple):
     by_loads: tuple[np.ndarray, np.ndarray]
 
 
-def anchored_model(model: RobotModel, kind: str, scene: Scene | None = None) -> "AnchoredModel | None":
-    """Return the model for a load of a kind of `LoadEstimationOptions`; None where shapes of the running model do.
-
-    These do for a payload, and have to for bodies that have no cross-sections.
-    """
-    try:
-        return AnchoredModel(model, scene) if kind == "force" else None
-    except MeshError:
-        return None
-
-
 class AnchoredModel:
     """Follows one robot whose tip is measured."""
 
@@ -86,6 +74,7 @@ class AnchoredModel:
         self._stiffness = _STIFF / float(np.linalg.norm(self._simulator.solver.tip_compliance(), 2))
         turn = self._stiffness * (_TURN * model.length) ** 2
         self._springs = self._stiffness, turn, turn
+        self._near = NEAR * model.length
         self.reset()
 
     def reset(self) -> None:
@@ -102,24 +91,6 @@ class AnchoredModel:
         self._sprung: np.ndarray | None = None
         self._steps, self._compliant_at = 0, self._end
 
-    @property
-    def near(self) -> float:
-        """Distance in m of a tip within which a shape says much of the robot."""
-        return _NEAR * _STRIDE * self._model.length
-
-    @property
-    def far(self) -> float:
-        """Distance in m of a tip beyond which the response of another model's shape does not lead to the robot."""
-        return _FAR * self._model.length
-
-    def distance_to(self, tip: np.ndarray) -> np.ndarray:
-        """Return the way (3,) in m from a tip (3,) to the measured one; zeros where none was measured."""
-        return np.zeros(3) if self._wanted is None else self._wanted - tip
-
-    def is_off(self, tip: np.ndarray) -> bool:
-        """Return whether the tip (3,) m of another model is far from the measured one."""
-        return bool(np.linalg.norm(self.distance_to(tip)) > self.far)
-
     def anchor(self, place: np.ndarray) -> None:
         """Hold the tip at a place (3,) in m from now on."""
         self._wanted = np.array(place)
@@ -135,7 +106,7 @@ class AnchoredModel:
         if self._wanted is None:
             return None
         longest = _STRIDE * self._model.length
-        share = _SHARES[float(np.linalg.norm(self._wanted - self._end)) < self.near]
+        share = _SHARES[float(np.linalg.norm(self._wanted - self._end)) < self._near]
         end = _along_arc(self._end, self._wanted, share, self._stride)
         wrenches: tuple[Load, ...] = (*known, Wrench(self._load), *self._held(end))
         shape = self._simulator.step(gravity, wound, duration=duration, wrench=wrenches)
@@ -148,7 +119,7 @@ class AnchoredModel:
         pull = self._stiffness * (end - shape.tip_position)
         carried = self._load + pull
         self._load = self._load + _TAKEN_OVER * pull
-        near = np.linalg.norm(self._wanted - shape.tip_position) <= self.near
+        near = np.linalg.norm(self._wanted - shape.tip_position) <= self._near
         return self._unsprung(shape, carried, known, wrenches) if near else None
 
     def _held(self, tip: np.ndarray) -> list[Spring]:

@@ -15,9 +15,7 @@ errors are part of it, and either sensor alone is enough.
 """
 
 import collections
-import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,72 +23,52 @@ from gravcomp.description import Robot
 from gravcomp.first_order_lag import lag_share
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
-from gravcomp.load_estimation.anchored_model import AnchoredModel
+from gravcomp.load_estimation.anchored_follower import AnchoredFollower, Answer, Worker
 from gravcomp.load_estimation.estimate import LoadEstimate
 from gravcomp.load_estimation.load_filter import LoadFilter
 from gravcomp.load_estimation.options import LoadEstimationOptions
+from gravcomp.load_estimation.predictions import Prediction, Predictions
 from gravcomp.load_estimation.sensitivity import HeldRobot
-from gravcomp.load_estimation.tension_check import TensionCheck
+from gravcomp.load_estimation.tension_check import LEAST, TensionCheck
 from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
-_KEPT = 2.0  # s of predictions, for measurements that arrive late
-_APART = 0.1  # s, farthest of a measurement from the predictions: without an equilibrium the model has no new ones
 # Squared Mahalanobis distance of an outlier: 1 in 10000 good measurements is farther (chi-square, 3 and about 6 numbers).
 _GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
+_TOPICS = {"tip": "measured/tip", "tensions": "measured/tension"}
 _OUTLIERS = 6  # in a row: then it is the load that has changed
-_REACH = 1.2  # lengths of the robot from its base: a tip that is measured beyond is none
+_REACH = 1.5  # lengths of the robot from its base: a tip that is measured beyond is none, however far the body stretches
 _CONSTANT = 1e5  # s: a payload changes at once or not at all
-
-
-class _Prediction(NamedTuple):
-    stamp: float
-    tip: np.ndarray
-    tension: np.ndarray
-    robot: HeldRobot
-    carried: np.ndarray
-    gravity: np.ndarray
-    anchored: bool
-    covariance: np.ndarray | None  # (3, 3) of the force that an anchored model carries
 
 
 class LoadObserver:
     """Estimates the load of one robot."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        options: LoadEstimationOptions,
-        anchored: AnchoredModel | None = None,
-        share: float | None = None,
-    ):
-        """anchored: predicts for a force while the tip is measured; None: shapes are given to `predict` only.
-
-        share: of the time between the stamps that the anchored model may take, by the clock; None: any, for results that do not
-        depend on the machine.
-        """
-        self._robot, self.options, self._share = robot, options, share
-        self._anchored = anchored if options.kind == "force" else None
+    def __init__(self, robot: Robot, options: LoadEstimationOptions, worker: Worker | None = None):
+        """worker: of the model that predicts for a force while the tip is measured; None: shapes are given to `predict` only."""
+        self._robot, self.options = robot, options
+        self._follower = None if worker is None else AnchoredFollower(worker, robot.length, options.stale_after)
         self._rest_tip = rest_tip(robot)[0]
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
-        self._history: collections.deque[_Prediction] = collections.deque()
+        self._predictions = Predictions()
         self._filter: LoadFilter | None = None
-        self._check = TensionCheck(self._robot.cable_names, self._robot.limits.tension_max)
+        largest = self._robot.limits.tension_max
+        self._check = TensionCheck(self._robot.cable_names, largest, self.options.tension_offset * largest)
+        self._before: collections.deque[LoadFilter] = collections.deque(maxlen=LEAST)  # before each reading of tensions
         self._scale = 0.0  # of the load: N, or kg of a payload
         self._zero_until, self.zeroed, self._released = -np.inf, False, False
         self._last_change: tuple[float, np.ndarray] | None = None
         self._applied, self._applied_at = np.zeros(self._numbers), -np.inf
         self._seen: dict[str, float] = {}
         self._outliers: dict[str, int] = {}
-        self._sentence = ""
+        self._faults: dict[str, str] = {}  # of what was measured last, by its topic
         self._last_wrench: Wrench | None = None
-        self._anchored_at, self._followed_at, self._newest, self._rest_until = -np.inf, -np.inf, -np.inf, -np.inf
         self._far = False  # from the running model when the tip was measured last
-        if self._anchored is not None:
-            self._anchored.reset()
+        if self._follower is not None:
+            self._follower.reset()
 
     @property
     def _numbers(self) -> int:
@@ -101,69 +79,62 @@ class LoadObserver:
 
         False: that shape predicts, if it is an equilibrium. wound (m,) in m as in `predict`; known wrenches act in addition.
         """
-        if self._anchored is None:
+        if self._follower is None or not self._follower.takes_over(stamp, shape):
             return False
-        if stamp < self._newest:  # a replay has restarted
-            self._anchored_at, self._followed_at, self._rest_until = -np.inf, -np.inf, -np.inf
-        self._newest = stamp
-        if self._filter is None or wound is None or stamp - self._anchored_at > self.options.stale_after:
+        if self._filter is None or wound is None:
             return False
-        if shape.is_equilibrium and not self._anchored.is_off(shape.tip_position):
-            return False
-        if stamp < self._rest_until:
-            return True
-        elapsed, started = stamp - self._followed_at, time.perf_counter()
-        found = self._anchored.step(shape.gravity, wound, known, elapsed if 0.0 < elapsed <= _KEPT else None)
-        self._followed_at = stamp
-        if found is not None:  # else it is on its way to the tip
-            self.predict(stamp, found.shape, found.tip_compliance, found.carried, wound, found.by_loads)
-        if self._share is not None:
-            self._rest_until = stamp + (time.perf_counter() - started) / self._share
+        for answer in self._follower.step(shape.gravity, wound, known):
+            self._predict_anchored(answer)
         return True
 
     def predict(
-        self,
-        stamp: float,
-        shape: Shape,
-        tip_compliance: np.ndarray,
-        carried: np.ndarray,
-        wound: np.ndarray | None,
-        by_loads: tuple[np.ndarray, np.ndarray] | None = None,
+        self, stamp: float, shape: Shape, tip_compliance: np.ndarray, carried: np.ndarray, wound: np.ndarray | None
     ) -> None:
         """Remember a shape of the model: stamp in s, compliance (3, 3) m/N of the tip, and the force (3,) N that it carries.
 
-        wound (m,) m: displacements that its winches hold, None: released; by_loads: of a shape whose tip is held where it was
-        measured, see `HeldRobot`.
+        wound (m,) m: displacements that its winches hold, None: released.
         """
-        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip, by_loads)
-        tip, tension = shape.tip_position, shape.cable_tension
+        robot = HeldRobot(shape, tip_compliance, wound, self._rest_tip)
         if self._filter is None:
             sag = float(np.linalg.norm(shape.response.effector_free[:3] - self._rest_tip))
             self._filter = LoadFilter(self.options, self._robot.limits, len(shape.cable_tension), self._numbers, sag)
-        if not self._scale and (tension > 0.0).any():
+        if not self._scale and (shape.cable_tension > 0.0).any():
             strongest = float(np.linalg.norm(robot.under(np.zeros(3)).tension_force, 2))
             self._scale = self._robot.limits.tension_max / strongest
             if self.options.kind == "payload":
                 self._scale /= STANDARD_GRAVITY
-        covariance = None
-        if by_loads is not None and self._anchored is not None:
-            off = self._anchored.distance_to(tip)
-            covariance = self._filter.covariance_by_tip(robot, carried, off, self._scale)
-        elif self._is_anchored:  # what was published last is kept until more is measured
-            self._filter.set_load(*self._needed())
-        if self._history and stamp < self._history[-1].stamp:  # a replay has restarted
-            self._history.clear()
+        if self._is_anchored:  # what was published last is kept until more is measured
+            self._filter.set_load(*self._predictions.needed())
+            self._before.clear()
+        self._remember(Prediction(stamp, shape.tip_position, shape.cable_tension, robot, carried, shape.gravity, None))
+
+    def _predict_anchored(self, answer: Answer) -> None:
+        """Remember a shape whose tip is held where it was measured, unless a newer one is remembered."""
+        newest, found, asked = self._predictions.newest, answer.found, answer.question
+        assert self._filter is not None and found is not None
+        if newest is not None and newest.stamp >= asked.stamp:
+            return
+        shape = found.shape
+        robot = HeldRobot(shape, found.tip_compliance, asked.wound, self._rest_tip, found.by_loads)
+        covariance = self._filter.covariance_by_tip(robot, found.carried, answer.off, self._scale)
+        self._remember(
+            Prediction(asked.stamp, shape.tip_position, shape.cable_tension, robot, found.carried, shape.gravity, covariance)
+        )
+
+    def _remember(self, prediction: Prediction) -> None:
+        """Add a prediction, and release the load when it is known at what scale, and no zero is being learnt."""
+        assert self._filter is not None
+        if self._predictions.add(prediction):  # a replay has restarted
             self._seen.clear()
-        self._history.append(_Prediction(stamp, tip, tension, robot, carried, shape.gravity, by_loads is not None, covariance))
-        while self._history[0].stamp < stamp - _KEPT:
-            self._history.popleft()
-        if self._scale and not self._released and stamp >= self._zero_until:
+        if self._scale and not self._released and prediction.stamp >= self._zero_until:
             self._filter.set_load(np.zeros(self._numbers), self._scale**2 * np.eye(self._numbers))
             self._filter.learning, self._released = False, True
+            self._before.clear()
 
     def zero(self, now: float) -> None:
         """Begin to learn the model's errors and the sensors' zeros: the robot carries no load for `zero_time` s."""
         self._zero_until = now + self.options.zero_time
+        self._before.clear()
         if self._filter is not None:
             self._filter.set_load(np.zeros(self._numbers), np.zeros((self._numbers, self._numbers)))
             self._filter.learning = True
@@ -171,39 +142,55 @@ class LoadObserver:
         self._applied[:] = 0.0
 
     def measure_tip(self, stamp: float, position: np.ndarray) -> None:
-        """Take a measured tip (3,) m in soft_base at its stamp (s)."""
-        if not np.isfinite(position).all():
+        """Take a measured tip (3,) m in soft_base at its stamp (s). One that cannot be right is named, and not used."""
+        self._faults["measured/tip"] = self._objection(position)
+        if self._faults["measured/tip"]:
             return
-        anchored = self._anchored if np.linalg.norm(position) < _REACH * self._robot.length else None
-        # A model that is on its way to the tip predicts nothing, and has to know where the tip is now.
-        if anchored is not None and self._anchored_at <= stamp and abs(self._newest - stamp) <= self.options.stale_after:
-            anchored.anchor(position)
-            self._anchored_at = stamp
-        then = self._at(stamp)
+        if self._follower is not None:
+            self._follower.anchor(stamp, position)
+        then = self._predictions.at(stamp)
         if then is None or self._filter is None:
             return
-        if anchored is not None:
-            away = bool(np.linalg.norm(position - then.tip) > (anchored.near if then.anchored else anchored.far))
+        if self._follower is not None:
+            far = self._follower.near if then.anchored else self._follower.far
+            away = bool(np.linalg.norm(position - then.tip) > far)
             self._far = away or then.anchored
             if away:  # the anchored model comes to it first
                 return
         self._diffuse(then)
-        moved, _ = self._moved(then)
+        moved, _ = self._predictions.moved(then, self.options.lag)
         direction = self._direction(then.gravity)
         self._take(
             "tip", then, lambda one: one.take_tip(position - then.tip, then.robot, direction, then.carried, moved), _GATE_TIP
         )
 
+    def _objection(self, position: np.ndarray) -> str:
+        """Return what is wrong with a measured tip (3,) m, empty for nothing."""
+        if not np.isfinite(position).all():
+            return "it is not finite"
+        distance, length = float(np.linalg.norm(position)), self._robot.length
+        if distance > _REACH * length:
+            return (
+                f"it is {1e3 * distance:.4g} mm from soft_base, and the robot is {1e3 * length:.4g} mm long: its unit or frame?"
+            )
+        return ""
+
     def measure_tensions(self, stamp: float, tension: np.ndarray) -> None:
         """Take measured tensions (m,) N at their stamp (s). Sensors that cannot be right are named, and not used."""
-        then = self._at(stamp)
+        then = self._predictions.at(stamp)
         if then is None or self._filter is None:
             return
-        self._sentence = self._check.observe(tension, then.tension)
-        if self._sentence:
+        fault = self._check.observe(tension, then.tension, self.zeroed and not self._released)
+        self._faults["measured/tension"] = fault
+        if fault and self._before:  # what it has said before it was found is forgotten
+            self._filter = self._before[0]
+            self._before.clear()
+            self._outliers.pop("tensions", None)
+        if fault or not self._check.is_known:
             return
+        self._before.append(self._filter.copy())
         self._diffuse(then)
-        _, moved = self._moved(then)
+        _, moved = self._predictions.moved(then, self.options.lag)
         residual, direction = tension - then.tension, self._direction(then.gravity)
         self._take(
             "tensions",
@@ -214,7 +201,9 @@ class LoadObserver:
 
     def wrench(self, gravity: np.ndarray, now: float) -> Wrench | None:
         """Return the load that the model has to carry from `now` (s) on under gravity (3,) m/s^2; None: none."""
-        if self._filter is None or not self.options.compensate or not self._released:
+        options = self.options
+        compensates = options.compensate if options.kind == "payload" else options.compensate_force
+        if self._filter is None or not compensates or not self._released:
             return None
         wanted = self._filter.load if self._seen else np.zeros(self._numbers)
         if self._far:  # the running model would lose its equilibrium under what has pushed the robot so far
@@ -222,7 +211,7 @@ class LoadObserver:
         largest = 2.0 * self._scale
         size = float(np.linalg.norm(wanted))
         wanted = wanted * min(1.0, largest / size) if size > 0.0 else wanted
-        share = lag_share(self._applied_at, now, self.options.response)
+        share = lag_share(self._applied_at, now, options.response)
         self._applied = self._applied + share * (wanted - self._applied)
         self._applied_at = now
         self._last_wrench = Wrench(self._direction(gravity) @ self._applied)
@@ -240,25 +229,13 @@ class LoadObserver:
         """Return the estimate under gravity (3,) m/s^2 at `now` (s)."""
         direction = self._direction(gravity)
         sources = tuple(name for name, at in self._seen.items() if now - at <= self.options.stale_after)
-        sentence = self._sentence
-        if not sources and not sentence:
-            if not self._seen:
-                sentence = "neither tips nor tensions are measured: the load is not known"
-            elif self._far and now - self._anchored_at <= self.options.stale_after:
-                sentence = "the model has not come to the measured tip, which is far from it: the last estimate is kept"
-            elif now - self._history[-1].stamp > self.options.stale_after:
-                sentence = (
-                    "the model finds no equilibrium under the load, which may be more than the cables hold:"
-                    " the last estimate is kept"
-                )
-            else:
-                sentence = "no measurement lately: the last estimate is kept"
+        sentence = self._said(now, sources)
         if self._filter is None:
             return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
         load, covariance = self._filter.load, self._filter.load_covariance
         payload, force, spread = self.options.kind == "payload", direction @ load, direction @ covariance @ direction.T
         if self._is_anchored:
-            force, spread = self._needed()
+            force, spread = self._predictions.needed()
         return LoadEstimate(
             force=force,
             covariance=spread,
@@ -269,7 +246,35 @@ class LoadObserver:
             sentence=sentence,
         )
 
-    def _take(self, source: str, then: _Prediction, step: Callable[[LoadFilter], float], gate: float) -> None:
+    def close(self) -> None:
+        """End what computes the anchored model."""
+        if self._follower is not None:
+            self._follower.close()
+
+    def _said(self, now: float, sources: tuple[str, ...]) -> str:
+        """Return what the user has to know at `now` (s), empty while all is well. sources: what was measured lately."""
+        faulty = [f"{topic} is not used: {fault}" for topic, fault in self._faults.items() if fault]
+        if self._follower is not None and self._follower.sentence:
+            faulty.append(self._follower.sentence)
+        if sources or faulty:
+            missing = [
+                f"{_TOPICS[name]} has not been used for {now - at:.1f} s"
+                for name, at in self._seen.items()
+                if name not in sources and not self._faults.get(_TOPICS[name])
+            ]
+            return "; ".join(faulty + missing)
+        newest = self._predictions.newest
+        if not self._seen:
+            return "neither tips nor tensions are measured: the load is not known"
+        if self._far and self._follower is not None and now - self._follower.measured_at <= self.options.stale_after:
+            return "the model has not come to the measured tip, which is far from it: the last estimate is kept"
+        if newest is None or now - newest.stamp > self.options.stale_after:
+            return (
+                "the model finds no equilibrium under the load, which may be more than the cables hold: the last estimate is kept"
+            )
+        return "no measurement lately: the last estimate is kept"
+
+    def _take(self, source: str, then: Prediction, step: Callable[[LoadFilter], float], gate: float) -> None:
         """Let the filter take a measurement; an outlier is left out, and several in a row mean that the load has changed."""
         assert self._filter is not None
         taken = self._filter.copy()
@@ -287,41 +292,13 @@ class LoadObserver:
     def _direction(self, gravity: np.ndarray) -> np.ndarray:
         return gravity[:, None] if self.options.kind == "payload" else np.eye(3)
 
-    def _at(self, stamp: float) -> _Prediction | None:
-        """Return the prediction nearest to a stamp; None for a stamp before the first one or far ahead."""
-        if not self._history or not np.isfinite(stamp):
-            return None
-        if not self._history[0].stamp - _APART <= stamp <= self._history[-1].stamp + _APART:
-            return None
-        return min(self._history, key=lambda entry: abs(entry.stamp - stamp))
-
     @property
     def _is_anchored(self) -> bool:
         """Whether the load is what the anchored model carries."""
-        return self._released and bool(self._history) and self._history[-1].anchored
+        newest = self._predictions.newest
+        return self._released and newest is not None and newest.anchored
 
-    def _needed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the force (3,) N that the anchored model has carried lately, on average, and its covariance (3, 3).
-
-        Far bent, friction and stretch of the cables are not those that were learnt: the force is what the measured tip needs.
-        """
-        covariance = self._history[-1].covariance
-        assert covariance is not None
-        force: np.ndarray = np.mean([entry.carried for entry in self._history if entry.anchored], axis=0)
-        return force, covariance
-
-    def _behind(self, then: _Prediction) -> _Prediction:
-        """Return the prediction at which the robot may still be."""
-        return self._at(max(then.stamp - self.options.lag, self._history[0].stamp)) or then
-
-    def _moved(self, then: _Prediction) -> tuple[np.ndarray, np.ndarray]:
-        """Return by how much the robot may be behind the model: tip (3,) m and tensions (m,) N."""
-        behind = self._behind(then)
-        if then.anchored:
-            return then.robot.by_winding(behind.robot)
-        return then.tip - behind.tip, then.tension - behind.tension
-
-    def _diffuse(self, then: _Prediction) -> None:
+    def _diffuse(self, then: Prediction) -> None:
         """Let the filter forget with the time and the change of tensions since the last measurement."""
         assert self._filter is not None
         if self._last_change is not None:

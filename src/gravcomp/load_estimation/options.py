@@ -15,7 +15,11 @@ class LoadEstimationOptions:
         "none", choices=KINDS,
         description="unknown load at the tip: a force in any direction, or a payload, whose force is its mass times gravity",
     )  # fmt: skip
-    compensate: bool = parameter(True, description="let the model carry the estimated load, so that the cables hold it")
+    compensate: bool = parameter(True, description="let the model carry the payload that is found, so that the cables hold it")
+    compensate_force: bool = parameter(
+        False,
+        description="the same for a force, which must not depend on where the tip is: at a wall the cables would press harder",
+    )
     tip_std: float = parameter(
         0.5, edge="mm", minimum=0.001, maximum=100.0, description="standard deviation of a measured tip along each axis"
     )

@@ -4,22 +4,34 @@ import numpy as np
 
 _STUCK = 25  # equal readings in a row: a sensor in use has noise
 _SMOOTHED = 0.05  # of the newest reading in the mean
-_NEGATIVE, _OFF = 0.02, 0.05  # of the largest tension: a cable cannot push; a slack cable reads nothing
-_LEAST = 50  # readings before a mean counts
+_NEGATIVE, _OFF = 2.0, 5.0  # expected zero errors: a cable cannot push; a slack cable reads nothing
+_SLACK = 1e-6  # of the largest tension: what the model has in a slack cable
+_MODEL = 0.5  # of the expected tension: by so much the model of a robot without load may be wrong
+LEAST = 50
+"""Readings after which a fault is found: fewer say nothing about a sensor."""
 
 
 class TensionCheck:
     """Watches the tension sensors of a robot's cables."""
 
-    def __init__(self, names: tuple[str, ...], tension_max: float):
-        """tension_max in N."""
-        self._names, self._largest = names, tension_max
+    def __init__(self, names: tuple[str, ...], tension_max: float, offset: float):
+        """tension_max in N; offset in N: expected zero error of a sensor."""
+        self._names, self._largest, self._offset = names, tension_max, offset
+        self._not_zeroed = np.zeros(len(names), bool)  # as found without load
         self._last = np.full(len(names), np.nan)
         self._equal, self._count = np.zeros(len(names), int), 0
         self._mean, self._expected = np.zeros(len(names)), np.zeros(len(names))
 
-    def observe(self, tension: np.ndarray, expected: np.ndarray) -> str:
-        """Take readings (m,) N and what the model expects; return what is wrong, empty for nothing."""
+    @property
+    def is_known(self) -> bool:
+        """Whether enough was read to know that the sensors are right."""
+        return self._count >= LEAST
+
+    def observe(self, tension: np.ndarray, expected: np.ndarray, unloaded: bool = False) -> str:
+        """Take readings (m,) N and what the model expects; return what is wrong, empty for nothing.
+
+        unloaded: the robot carries nothing, so that a taut cable's zero shows, too.
+        """
         if tension.shape != self._last.shape:
             return f"{tension.size} tensions for {len(self._names)} cables"
         if not np.isfinite(tension).all():
@@ -35,20 +47,25 @@ class TensionCheck:
         self._mean += share * (tension - self._mean)
         self._expected += share * (expected - self._expected)
         self._count += 1
-        stuck = (self._equal >= _STUCK) & ((self._mean != 0.0) | (self._expected > _OFF * self._largest))
+        stuck = (self._equal >= _STUCK) & ((self._mean != 0.0) | (self._expected > _OFF * self._offset))
         if stuck.any():
             return f"the tension sensor of {self._of(stuck)} is stuck at {tension[stuck][0]:.4g} N"
-        if self._count < _LEAST:
+        if not self.is_known:
             return ""
-        sign = (self._mean < -_NEGATIVE * self._largest) & (self._expected > _NEGATIVE * self._largest)
+        negative = self._mean < -_NEGATIVE * self._offset
+        sign = negative & (self._expected > _NEGATIVE * self._offset)
         if sign.any():
             return f"the tension sensor of {self._of(sign)} has the wrong sign: {self._mean[sign][0]:.3g} N on a taut cable"
-        off = (np.abs(self._mean) > _OFF * self._largest) & (self._expected < 1e-6 * self._largest)
-        negative = self._mean < -_NEGATIVE * self._largest
-        if (off | negative).any():
-            found = off | negative
+        off = negative | ((np.abs(self._mean) > _OFF * self._offset) & (self._expected < _SLACK * self._largest))
+        if off.any():
+            return f"the tension sensor of {self._of(off)} is not zeroed: it reads {self._mean[off][0]:.3g} N on a slack cable"
+        if unloaded:
+            self._not_zeroed = np.abs(self._mean - self._expected) > _OFF * self._offset + _MODEL * self._expected
+        if self._not_zeroed.any():
+            off = self._not_zeroed
             return (
-                f"the tension sensor of {self._of(found)} is not zeroed: it reads {self._mean[found][0]:.3g} N on a slack cable"
+                f"the tension sensor of {self._of(off)} is not zeroed: it reads {self._mean[off][0]:.3g} N"
+                f" where the model without load has {self._expected[off][0]:.3g} N"
             )
         return ""
 

@@ -21,7 +21,7 @@ _BRIEF = 0.25  # of these, but the errors of model and sensors take their time t
 class LoadedCase:
     """An unknown load: a payload in kg, or a force (3,) in N in soft_base; sensors; inclination and roll of the base, deg.
 
-    brief: shorter in every phase.
+    brief: shorter in every phase; compensated: the model carries a force that is found, as it does a payload.
     """
 
     payload: float = 0.0
@@ -31,6 +31,7 @@ class LoadedCase:
     inclination: float = 0.0
     roll: float = 0.0
     brief: bool = False
+    compensated: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,8 +49,7 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     kind = "payload" if case.force is None else "force"
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
     share = _BRIEF if case.brief else 1.0
-    # A force that pushes the robot far cannot be compensated, and one that comes suddenly is not known soon enough.
-    options = LoadEstimationOptions(kind=kind, compensate=case.force is None)
+    options = LoadEstimationOptions(kind=kind, compensate_force=case.compensated)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = rest_target(setup.robot, tip_direction_weight=setup.direction_weight)
     loop.hold(target)

@@ -1,0 +1,96 @@
+"""The anchored model in a process of its own, with low priority: a step of it may take longer than the time between samples.
+
+While a question is computed, newer ones are left out: the next one that is asked after the answer is that of the newest sample.
+So the owner never waits, and what lies in the connection stays small.
+"""
+
+import multiprocessing
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from multiprocessing.connection import Connection
+
+from gravcomp.description import Robot
+from gravcomp.environment.give_way import give_way
+from gravcomp.load_estimation.anchored_follower import Answer, Question
+from gravcomp.scene.scene import Scene
+
+_PAUSE = 5.0  # s between two starts: a process that dies at once must not take the machine's time
+
+
+class AnchoredProcess:
+    """A worker (`anchored_follower`) that does not let its owner wait.
+
+    Attribute sentence: what the user has to know, empty while all is well.
+    """
+
+    def __init__(self, robot: Robot, scene: Scene | None = None):
+        """robot: as the running model has it; scene: what it touches."""
+        self._described = pickle.dumps((robot, scene))
+        self.sentence = ""
+        self._process, self._connection = self._start()
+
+    def exchange(self, question: Question) -> list[Answer]:
+        """Return what has been computed since the last call, and pass this question on, if none is being computed."""
+        answers: list[Answer] = []
+        if self._process is None:
+            if time.monotonic() - self._started < _PAUSE:
+                return answers
+            self._process, self._connection = self._start()
+        try:
+            while self._connection.poll():
+                received = self._connection.recv()
+                self._busy = False
+                self.sentence = ""
+                if received is not None and received[0] == self._generation:
+                    answers.append(received[1])
+            if not self._busy:
+                self._connection.send((self._generation, question))
+                self._busy = True
+        except (EOFError, OSError):
+            self._give_up()
+        return answers
+
+    def reset(self) -> None:
+        """Forget the robot's shape, and what is being computed."""
+        self._generation += 1
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._end(self._process)
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process; None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    def _start(self) -> tuple[subprocess.Popen | None, Connection]:
+        """Start the process, which answers None when it is ready; return it and the connection to it."""
+        self._started, self._generation, self._busy = time.monotonic(), 0, True
+        ours, theirs = multiprocessing.Pipe()
+        with theirs, tempfile.TemporaryFile() as described:  # a pipe would let this process wait for the other's imports
+            described.write(self._described)
+            described.seek(0)
+            process = subprocess.Popen(
+                [sys.executable, "-m", "gravcomp.load_estimation.anchored_worker", str(theirs.fileno())],
+                stdin=described,
+                stdout=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,  # Ctrl-C reaches its owner alone
+                preexec_fn=give_way,
+            )
+        return process, ours
+
+    def _give_up(self) -> None:
+        assert self._process is not None
+        code = self._end(self._process)
+        self.sentence = f"the process of the second model has ended (exit code {code}); it is started again"
+
+    def _end(self, process: subprocess.Popen) -> int:
+        self._connection.close()
+        process.kill()
+        self._process = None
+        return process.wait()
