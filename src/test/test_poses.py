@@ -117,7 +117,7 @@ def test_a_marker_that_was_taken_for_another_one_is_named():
     assert not mistaken(residual, "abcde", "xyz")
     residual[3, 1, 0] += 0.05
     (sentence,) = mistaken(residual, "abcde", "xyz")
-    assert sentence.startswith("Marker y of pose d is 5")
+    assert sentence.startswith("Marker y of pose d is ")
 
 
 def elastica(modulus: float, gravity: np.ndarray, stations: np.ndarray) -> np.ndarray:
@@ -138,7 +138,7 @@ def elastica(modulus: float, gravity: np.ndarray, stations: np.ndarray) -> np.nd
 
 
 def test_the_interval_of_the_modulus_holds_that_of_a_rod():
-    """A solid's clamp resists the contraction across, a rod's does not: no noise, and the markers fit within 0.1 mm."""
+    """A solid's clamp resists the contraction across, a rod's does not. The residuals hardly show it: 1 % of the sag."""
     bar = dataclasses.replace(ROBOT, cables=()).with_material(poissons_ratio=0.49)
     at = np.array([[0.0, 0.0, z] for z in (40e-3, 70e-3, 100e-3)])
     gravity = np.array([[-9.81, 0.0, 0.0], [-8.6, 0.0, 4.7]])
@@ -147,7 +147,7 @@ def test_the_interval_of_the_modulus_holds_that_of_a_rod():
     fit = fit_poses(bar, poses, (MODULUS,))
     (modulus,) = fit.estimates
     off = abs(modulus.value - 500.0)
-    assert fit.rms < 0.1e-3
+    assert fit.rms < 0.01 * np.abs(measured_at - at).max()
     assert 1.96 * PosePriors().stiffness * modulus.value < off < modulus.interval < 4.0 * off
 
 

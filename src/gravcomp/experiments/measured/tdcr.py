@@ -33,14 +33,14 @@ def repeatability(pulls: Pulls, near: float = 0.3e-3) -> float:
     return float(np.sqrt(((pulls.tip[one] - pulls.tip[other]) ** 2).sum(axis=1).mean() / 2)) if len(one) else float("nan")
 
 
-def left_out(pulls: Pulls, names: np.ndarray, start: ChainFit, progress: Callable[[str], None]) -> np.ndarray:
-    """Return the tips (k, 3) predicted by fits to the rows of other names; names (k,), in five folds."""
+def left_out(pulls: Pulls, names: np.ndarray, start: ChainFit, what: str, progress: Callable[[str], None]) -> np.ndarray:
+    """Return the tips (k, 3) predicted by fits to the rows of other names; names (k,), in five folds, of `what`."""
     distinct = np.unique(names)
     fold_of = dict(zip(distinct, np.random.default_rng(0).permutation(np.arange(len(distinct)) % _FOLDS)))
     fold = np.array([fold_of[name] for name in names])
     predicted = np.empty_like(pulls.tip)
     for number in np.unique(fold):
-        progress(f"fold {number + 1} of {fold.max() + 1}")
+        progress(f"{what}, fold {number + 1} of {fold.max() + 1}")
         predicted[fold == number] = fit(pulls, fold != number, start).predict(pulls, fold == number)
     return predicted
 
@@ -61,11 +61,11 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     whole = fit(pulls, np.ones(len(pulls.tip), dtype=bool))
     inside = whole.predict(pulls)
     kind = np.array(["tendon" if alone else _LAST.sub("", name) for name, alone in zip(pulls.pattern, pulls.single)])
-    by_pattern = left_out(pulls, pulls.pattern, whole, lambda text: progress(f"patterns, {text}"))
+    by_pattern = left_out(pulls, pulls.pattern, whole, "patterns", progress)
     error = {"patterns": by_pattern - pulls.tip}
     for what, names in (("kinds of patterns", kind), ("directions", np.array([name.split("_")[-1] for name in pulls.pattern]))):
         if not brief and len(np.unique(names[several])) > 1:
-            predicted = left_out(pulls, names, whole, lambda text, what=what: progress(f"{what}, {text}"))
+            predicted = left_out(pulls, names, whole, what, progress)
             error[what] = predicted - pulls.tip
     held = {what: 1e3 * rms_distance(wrong[several]) for what, wrong in error.items()}
     alone = 1e3 * rms_distance(error["patterns"][pulls.single]) if pulls.single.any() else float("nan")
