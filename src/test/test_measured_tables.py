@@ -77,9 +77,27 @@ def test_a_recording_does_not_depend_on_the_order_of_rows_and_columns(tmp_path):
     assert (plain.rest - plain.held)[:, 0] == pytest.approx(-10e-3)
 
 
+def test_instants_at_which_a_marker_is_mistaken_are_left_out(tmp_path):
+    rows = beam_table()
+    write(tmp_path / "beam" / "gravity_c.csv", rows)
+    plain = read_recording(tmp_path / "beam" / "gravity_c.csv")
+    for line in (3, 480):
+        rows[line][2] += 50.0
+    write(tmp_path / "beam" / "gravity_c.csv", rows)
+    found = read_recording(tmp_path / "beam" / "gravity_c.csv")
+    assert found.mistaken == 2 and len(found.time) == len(plain.time) - 2
+    assert found.rest == pytest.approx(plain.rest, abs=1e-9) and found.held == pytest.approx(plain.held, abs=1e-9)
+
+
+def loose(rows):
+    """Rows in which one marker moves about."""
+    return [rows[0], *([*row[:4], row[4] + 5.0 * np.sin(i), *row[5:]] for i, row in enumerate(rows[1:]))]
+
+
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
+        ("gravity_c", loose, "the markers do not keep their distances"),
         ("weight_c", lambda rows: rows, "begins with neither gravity nor load"),
         ("gravity_c", lambda rows: [row[:-1] for row in rows], "column 'tip3_z_mm' is missing"),
         ("gravity_c", lambda rows: [*rows[:9], [0.08, "", *rows[9][2:]], *rows[10:]], "line 10: tip1_x_mm is empty"),

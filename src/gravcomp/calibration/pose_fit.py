@@ -3,7 +3,8 @@
     min over x of  sum |marker(x) - measured|^2 / sigma^2 + sum_i x_i^2
 
 x holds the logarithm of the modulus, which has no prior, and the other unknowns in units of the standard deviation of their
-priors. Intervals hold at 95 % (`pose_intervals`); that of the modulus contains what the model lacks, as in `fit`.
+priors. Intervals hold at 95 % (`pose_intervals`); they contain what the clamp leaves open, and that of the modulus what the model
+lacks, as in `fit`.
 """
 
 import dataclasses
@@ -13,7 +14,7 @@ import numpy as np
 
 from gravcomp.calibration.fit import TipNoise
 from gravcomp.calibration.measured import MeasurementError, rms_distance
-from gravcomp.calibration.pose_intervals import covariance, not_shown
+from gravcomp.calibration.pose_intervals import covariance, mistaken, not_shown, systematic
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import PoseParameters, Poses
 from gravcomp.config import parameter
@@ -177,6 +178,9 @@ def fit_poses(
     matrix = covariance(solution.jac[: poses.measured.size], (predicted - poses.measured) / noise, prior)
     variance = np.diag(matrix) + np.where(prior, 0.0, priors.stiffness**2)
     half = float(student.ppf(0.975, max(1, poses.measured.size - len(unknowns)))) * np.sqrt(variance)
+    progress("what the clamp leaves open")
+    loose = (PosePredictor(_without_contraction(robot), poses).predict(parameters) - predicted).ravel() / noise
+    half += systematic(solution.jac[: poses.measured.size], loose, prior)
     estimates = tuple(
         _estimate(unknown, initial, parameters, float(value), float(width))
         for unknown, value, width in zip(unknowns, solution.x, half)
@@ -188,8 +192,20 @@ def fit_poses(
             "Only the robot's own weight bends it against its stiffness here, so the poses show Young's modulus over density: a"
             " density that is 1 % off makes the modulus 1 % off. Weigh the robot, or hang weights of known mass from it."
         )
+    sentences += mistaken(predicted - poses.measured, poses.name, poses.marker_name)
     rms = rms_distance(predicted - poses.measured)
     return PoseFit(solution.x, parameters, estimates, predicted, rms_before, rms, count, tuple(sentences))
+
+
+def _without_contraction(robot: Robot) -> Robot:
+    """Return the robot of materials that do not contract across; wound springs, whose geometry would change, stay."""
+    springs = [segment.spring is not None for segment in robot.segments] or [False] * len(robot.materials)
+    return robot.with_materials(
+        [
+            material if spring else dataclasses.replace(material, poissons_ratio=0.0)
+            for material, spring in zip(robot.materials, springs)
+        ]
+    )
 
 
 def _weight_alone(robot: Robot, poses: Poses) -> bool:

@@ -4,6 +4,12 @@ cov = (J^T J / (s^2 d) + P)^-1, with the residuals' variance s^2, the prior P, a
 are alike in all poses where it was not placed quite as described, and those of one pose are alike in all markers where friction
 or creep holds the body; k alike residuals count as one. With the intraclass correlation rho of groups of k residuals, by the
 analysis of variance, d = 1 + (k - 1) rho (L. Kish, Survey Sampling, 1965; B. R. Moulton, Journal of Econometrics 32, 1986).
+
+What the residuals do not show is added to the half intervals: by how much x would differ if the clamp did not hold the section
+(`systematic`). The finite elements hold all of the clamped face, which resists the contraction across that bending brings; a real
+clamp or a rod does not, or not wholly. Without lateral contraction (Poisson's ratio zero) there is nothing to resist, and the
+bending stiffness of a rod does not depend on it: that model's markers minus the model's are the largest error that the clamp
+makes, with what elements near the clamp resist in addition.
 """
 
 from collections.abc import Sequence
@@ -16,6 +22,8 @@ LITTLE = 0.8
 _OPEN = 1e-4  # precision of an unknown without a prior that nothing shows: a deviation of 100
 _ALONE = 0.3  # half interval of a logarithm without a prior from which the data hardly show it
 _TOGETHER = 0.95  # correlation of two unknowns that are known together only
+_FAR = 8.0  # of the median distance, that is twelve standard deviations of noise
+_FEWEST = 6  # markers in all poses, from which their median says what is usual
 
 
 def design_effect(residual: np.ndarray) -> float:
@@ -48,6 +56,17 @@ def covariance(jacobian: np.ndarray, residual: np.ndarray, prior: np.ndarray) ->
     return np.asarray(np.linalg.inv(jacobian.T @ jacobian / variance + np.diag(np.where(prior, 1.0, _OPEN))))
 
 
+def systematic(jacobian: np.ndarray, change: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    """Return by how much (n,) x changes with residuals that change by `change` (3 k p,); NaN: not known, and left out.
+
+    jacobian (3 k p, n) of the residuals by x; prior (n,): whether an entry of x has a prior of deviation 1.
+    """
+    known = np.isfinite(change)
+    rows = jacobian[known]
+    weights = rows.T @ rows + np.diag(np.where(prior, 1.0, _OPEN))
+    return np.abs(np.linalg.solve(weights, rows.T @ change[known]))
+
+
 def not_shown(names: Sequence[str], matrix: np.ndarray, prior: np.ndarray) -> list[str]:
     """Return sentences on the unknowns that the data hardly show, or show together only; matrix (n, n): the covariance of x."""
     deviation = np.sqrt(np.diag(matrix))
@@ -65,3 +84,16 @@ def not_shown(names: Sequence[str], matrix: np.ndarray, prior: np.ndarray) -> li
                     " them measured by itself, would separate them."
                 )
     return found
+
+
+def mistaken(residual: np.ndarray, poses: Sequence[str], markers: Sequence[str]) -> list[str]:
+    """Return sentences on single markers that are much farther off than the others; residual (k, p, 3) in m."""
+    distance = np.linalg.norm(residual, axis=2)
+    if distance.size < _FEWEST:
+        return []
+    usual = float(np.median(distance))
+    return [
+        f"Marker {markers[j]} of pose {poses[i]} is {1e3 * distance[i, j]:.3g} mm off after the fit, most are"
+        f" {1e3 * usual:.2g} mm: was it taken for another one? It counts like the others."
+        for i, j in np.argwhere(distance > _FAR * usual)
+    ]

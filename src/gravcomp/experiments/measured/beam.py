@@ -183,6 +183,11 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         notes=[
             f"beam: the mass of the plate with the markers is not written down; {1e3 * PLATE:g} ± {1e3 * PLATE:g} g are assumed,"
             f" and the bare beam leaves it open.{moved}",
+            *(
+                f"beam: {r.name}: {r.mistaken} instants are left out, at which the markers do not keep their distances"
+                for r in recordings
+                if r.mistaken
+            ),
             f"beam: the hand holds the face aside by {aside_mm:.1f} mm (RMS of the recordings). Its error in height is not"
             " measured, and remains in the error of the markers at rest.",
         ],

@@ -13,17 +13,22 @@ _KIND = re.compile(r"gravity|load(?P<grams>\d+)")  # how the name of a file begi
 _QUIET = 2.0  # s after the release, when the beam no longer swings
 _REST = 1.0  # s at the end, in which it rests
 _HAND = 0.1  # s before the release, in which the hand may already move
+_RIGID = 1e-3  # m by which a distance between markers may differ from its median: ten times the error of a marker
 
 
 @dataclasses.dataclass(frozen=True)
 class Recording:
-    """One recording. mass of the weight in kg; time (t,) in s from the release; markers (t, 3, 3) in m, `held` (3, 3): before."""
+    """One recording. mass of the weight in kg; time (t,) in s from the release; markers (t, 3, 3) in m, `held` (3, 3): before.
+
+    mistaken: number of instants that are left out, as the markers are not as far from each other there as they are otherwise.
+    """
 
     name: str
     mass: float
     time: np.ndarray
     markers: np.ndarray
     held: np.ndarray
+    mistaken: int = 0
 
     @property
     def rest(self) -> np.ndarray:
@@ -47,6 +52,15 @@ def read(path: Path) -> Recording:
     time = table.numbers("time_s")
     order = np.argsort(time, kind="stable")
     time, markers = time[order], table.vectors(names, 1e-3)[order].reshape(-1, 3, 3)
+    if not len(time):
+        raise MeasurementError(f"{path}: contains no rows below its header")
+    whole = _rigid(markers)
+    if 2 * whole.sum() < len(whole):
+        raise MeasurementError(
+            f"{path}: the markers do not keep their distances: at {(~whole).sum()} of {len(whole)} instants one differs by more"
+            f" than {1e3 * _RIGID:g} mm from its median. Are tip1 to tip3 fixed to the free face?"
+        )
+    time, markers = time[whole], markers[whole]
     height = markers[:, :, 0].mean(axis=1)
     fallen = np.flatnonzero(height < height[:10].mean() - 2e-3)
     if not len(fallen):
@@ -58,7 +72,14 @@ def read(path: Path) -> Recording:
             f"{path}: begins {release - time[0]:.2f} s before the release and ends {after:.2f} s after it;"
             f" needed: more than {_HAND:g} s and at least {_QUIET + _REST:g} s"
         )
-    return Recording(path.stem, 1e-3 * float(kind["grams"] or 0), time - release, markers, markers[before].mean(axis=0))
+    held = markers[before].mean(axis=0)
+    return Recording(path.stem, 1e-3 * float(kind["grams"] or 0), time - release, markers, held, int((~whole).sum()))
+
+
+def _rigid(markers: np.ndarray) -> np.ndarray:
+    """Return at which instants (t,) the markers (t, 3, 3) are as far from each other as they are otherwise."""
+    distance = np.linalg.norm(markers - np.roll(markers, 1, axis=1), axis=2)
+    return np.asarray((np.abs(distance - np.median(distance, axis=0)) < _RIGID).all(axis=1))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -78,5 +78,6 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
                 + " mm; the authors' model 11.3, 18.4, 19.2, 35.6 mm.",
             ),
         ],
+        notes=[f"tentacle: {sentence}" for sentence in fit.open],
         data={"tentacle_mm": 1e3 * fit.rms, "tentacle_held_mm": 1e3 * rms_distance(outside)},
     )
