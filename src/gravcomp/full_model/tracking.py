@@ -25,6 +25,7 @@ from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.payload import with_payload
+from gravcomp.full_model.shifted_factor import ShiftedFactor
 from gravcomp.full_model.turning_loads import TurningFactor
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, NotPositiveDefinite
@@ -70,6 +71,7 @@ class StaticTracker:
         self._matrix = model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         self._stiffness = self._matrix.mean_diagonal()
+        self._shifted = ShiftedFactor(self._matrix, self._stiffness)
         self.reset()
 
     def reset(self) -> None:
@@ -313,9 +315,9 @@ class StaticTracker:
     ) -> tuple[BlockCholesky, np.ndarray, bool]:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
-        If the tangent is not positive definite, a multiple of the identity is added: the step still goes downhill, but its
-        length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does not help, or
-        immediately if `stable`.
+        If the tangent is not positive definite, a multiple of the identity is added (`ShiftedFactor`): the step still goes
+        downhill, but its length no longer measures the distance to the equilibrium. Raises NotPositiveDefinite if that does
+        not help, or immediately if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
         force = self._assemble(state, load, origin)
@@ -325,15 +327,7 @@ class StaticTracker:
             if stable:
                 raise
         self._assemble(state, load, origin)  # again, as the factorisation writes over it
-        tangent = self._matrix.values.copy()
-        for power in range(-6, 1):
-            self._matrix.values[:] = tangent
-            self._matrix.add_diagonal(self._stiffness * 10.0**power)
-            try:
-                return self._matrix.factor(), force, False
-            except NotPositiveDefinite:
-                continue
-        raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
+        return self._shifted.factor(), force, False
 
     def _assemble(self, state: Equilibrium, load: AppliedLoad, origin: np.ndarray | None) -> np.ndarray:
         """Assemble the tangent at `state` and return the internal forces (n, 3)."""
