@@ -23,8 +23,8 @@ def test_an_image_and_a_model_are_built(type_in, line, about):
 
 
 def test_the_firmware_is_tested(type_in):
-    """With the tests of one file: all of them are tests of this run as well, and here they would run a second time."""
-    code, output = type_in("./gravcomp firmware test", "--frames 2000 -k test_firmware.py")
+    """With the tests of a short file: all of them are tests of this run as well, and here they would run a second time."""
+    code, output = type_in("./gravcomp firmware test", "--frames 2000 -k test_board_heater.py")
     assert code == 0 and "lines reached" in output, output
 
 

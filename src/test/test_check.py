@@ -1,9 +1,12 @@
 """The checks of `./gravcomp check`: lint, format and types of the whole source."""
 
+import fcntl
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from gravcomp.cache import cache_folder
 from gravcomp.commands.__main__ import main
 from gravcomp.commands.check import CHECKS, installed, run_check
 
@@ -29,3 +32,19 @@ def test_a_failing_check_is_reported_with_code_1(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr()
     assert "ruff check: failed" in printed.out and "ruff format: passed" in printed.out
     assert "F401" in printed.err
+
+
+def test_types_that_were_checked_before_are_in_a_cache_that_one_run_uses_at_a_time(tmp_path, monkeypatch):
+    commands = []
+
+    def run(command: list[str], **options: object) -> subprocess.CompletedProcess:
+        commands.append(command)
+        with open(cache_folder("mypy") / "lock", "w") as lock, pytest.raises(BlockingIOError):
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return subprocess.CompletedProcess(command, 0, "")
+
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    monkeypatch.setattr(subprocess, "run", run)
+    for _ in range(2):
+        assert run_check(ROOT, "mypy") == (True, "")
+    assert [command[-2:] for command in commands] == [["--cache-dir", str(tmp_path / "mypy")]] * 2

@@ -7,8 +7,9 @@ import pytest
 
 from gravcomp.description import Payload, load_robot_file
 from gravcomp.full_model.law_range import beyond_range
+from gravcomp.full_model.shifted_factor import ShiftedFactor
 from gravcomp.inverse import InverseController, straight_target
-from gravcomp.mechanics.block_matrix import BlockMatrix
+from gravcomp.mechanics.block_matrix import BlockMatrix, NotPositiveDefinite
 from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
 
 G = 9.81
@@ -273,3 +274,30 @@ def test_a_shape_beyond_the_range_of_its_law_is_reported(law, message):
     u[:, 2] = -0.45 * model.mesh.nodes[:, 2]
     assert message in beyond_range(model, u) and bool(beyond_range(model, u)) == bool(message)
     assert not beyond_range(model, 0.5 * u)
+
+
+def test_an_indefinite_tangent_gets_the_smallest_shift_that_helps_with_two_factorisations_where_the_last_one_is_still_it(
+    simulator, monkeypatch
+):
+    model, factors, factor = simulator.model, [], BlockMatrix.factor
+    matrix, force = model.new_matrix(), np.ones(model.pattern.n)
+    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    definite, unit = matrix.values.copy(), matrix.mean_diagonal()
+    monkeypatch.setattr(BlockMatrix, "factor", lambda matrix: factors.append(1) or factor(matrix))
+    shifted = ShiftedFactor(matrix, unit)
+
+    def lack(share: float, shift: float = 0.0) -> None:
+        """Set the tangent that lacks a share of the unit on its diagonal, with a shift."""
+        matrix.values[:] = definite
+        matrix.add_diagonal((shift - share) * unit)
+
+    # Tangents that need more, the same, less, as little as there is, and most.
+    for share, power, most in ((0.5e-3, -3, 4), (0.4e-3, -3, 2), (0.5e-4, -4, 3), (0.5e-6, -6, 3), (0.5e-6, -6, 1), (0.5, 0, 7)):
+        lack(share, shift=10.0**power)
+        expected = factor(matrix).solve(force)
+        lack(share)
+        factors.clear()
+        assert shifted.factor().solve(force) == pytest.approx(expected, rel=1e-6) and len(factors) <= most
+    lack(2.0)
+    with pytest.raises(NotPositiveDefinite, match="with any shift"):
+        shifted.factor()

@@ -1,22 +1,31 @@
 """`gravcomp check`: check the source with ruff (lint and format) and mypy (types)."""
 
 import argparse
+import contextlib
+import fcntl
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gravcomp.cache import cache_folder
 from gravcomp.commands import output
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check: the tool's module and the arguments for it."""
+    """A check: the tool's module and the arguments for it.
+
+    keeps: the tool finds what has not changed since an earlier run, also of another copy of the repository, in a folder of
+    `~/.cache/gravcomp`.
+    """
 
     tool: str
     arguments: tuple[str, ...]
     remedy: str = ""
+    keeps: bool = False
 
 
 CHECKS = {
@@ -24,7 +33,7 @@ CHECKS = {
         "ruff", ("check", "--output-format", "concise"), "many findings are repaired by: .venv/bin/ruff check --fix"
     ),
     "ruff format": Check("ruff", ("format", "--check"), "repaired by: .venv/bin/ruff format"),
-    "mypy": Check("mypy", ()),
+    "mypy": Check("mypy", (), keeps=True),
 }
 """Checks by name, in the order in which they run; pyproject.toml holds the rules."""
 
@@ -58,14 +67,27 @@ def run(args: argparse.Namespace) -> int:
 def run_check(root: Path, name: str) -> tuple[bool, str]:
     """Run one of CHECKS over the repository at `root`. Returns whether it passed, and the output of the tool."""
     check = CHECKS[name]
-    done = subprocess.run(
-        [sys.executable, "-m", check.tool, *check.arguments],
-        cwd=root,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    with _kept(check) as options:
+        done = subprocess.run(
+            [sys.executable, "-m", check.tool, *check.arguments, *options],
+            cwd=root,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
     return done.returncode == 0, done.stdout.strip()
+
+
+@contextlib.contextmanager
+def _kept(check: Check) -> Iterator[list[str]]:
+    """Context with the options that name the folder of what the tool keeps, which no other run uses meanwhile."""
+    if not check.keeps:
+        yield []
+        return
+    folder = cache_folder(check.tool)
+    with open(folder / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield ["--cache-dir", str(folder)]
 
 
 def installed(tool: str) -> bool:

@@ -25,6 +25,7 @@ from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.payload import with_payload
+from gravcomp.full_model.shifted_factor import ShiftedFactor
 from gravcomp.full_model.supports import SupportedFactor, add_springs
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.block_matrix import BlockCholesky, Factor, NotPositiveDefinite
@@ -70,6 +71,7 @@ class StaticTracker:
         self._matrix = model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         self._stiffness = self._matrix.mean_diagonal()
+        self._shifted = ShiftedFactor(self._matrix, self._stiffness)
         self.reset()
 
     def reset(self) -> None:
@@ -317,8 +319,8 @@ class StaticTracker:
         """Return the factorised tangent, the internal forces (n, 3), and whether the tangent is exact.
 
         If the tangent is not positive definite, it is supported where walls press. If it is not even then, a multiple of the
-        identity is added: the step still goes downhill, but its length no longer measures the distance to the equilibrium.
-        Raises NotPositiveDefinite if that does not help, or before that if `stable`.
+        identity is added (`ShiftedFactor`): the step still goes downhill, but its length no longer measures the distance to the
+        equilibrium. Raises NotPositiveDefinite if that does not help, or before that if `stable`.
         """
         self._kept = None  # the storage of that factor is written over
         force = self._assemble(state, load, origin)
@@ -335,14 +337,8 @@ class StaticTracker:
             return supported, force, True
         if stable:
             raise NotPositiveDefinite("the tangent stiffness is not positive definite, with supports where walls press")
-        for power in range(-6, 1):
-            self._matrix.values[:] = tangent
-            self._matrix.add_diagonal(self._stiffness * 10.0**power)
-            try:
-                return self._matrix.factor(), force, False
-            except NotPositiveDefinite:
-                continue
-        raise NotPositiveDefinite("the tangent stiffness is not positive definite, with any shift of its diagonal")
+        self._matrix.values[:] = tangent
+        return self._shifted.factor(), force, False
 
     def _supported_factor(self, sections: list[np.ndarray]) -> SupportedFactor | None:
         """Return the factor of the assembled tangent with supports of `sections`, rows (n,); None where that does not help."""
