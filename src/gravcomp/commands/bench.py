@@ -46,6 +46,7 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     "graph": {"composed": (False, "compare the delay with the inner nodes in one process with that as processes")},
     "robots": {
         "loop": (False, "measure the loop on each robot's virtual robot instead of its model"),
+        "every": (1, "compute every N-th path of the closed loop, with N times fewer steps, and row of the references"),
         "again": (False, "measure again what was measured before with the same robots and the same program"),
     },
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
