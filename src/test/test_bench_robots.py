@@ -40,7 +40,9 @@ def test_mesh_and_rest_of_a_robot_are_measured(short):
     assert measured["elements"] == [6, 4, 1]
 
 
-@pytest.mark.parametrize(("options", "words"), [({"loop": True}, "exclude each other"), ({"figures": ["build_s"]}, "has 'build_s'")])
+@pytest.mark.parametrize(
+    ("options", "words"), [({"loop": True}, "exclude each other"), ({"figures": ["build_s"]}, "has 'build_s'")]
+)
 def test_the_mesh_alone_has_no_other_figures(options, words):
     with pytest.raises(ConfigError, match=words):
         robots.run(silent, mesh=True, **options)
