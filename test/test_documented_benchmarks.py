@@ -37,6 +37,7 @@ def test_performance_is_measured(made, apart, line, about):
     ("line", "key", "answer"),
     [
         ("./gravcomp bench robots --write src/doc/figures.md", "rest_error_pct", '"rest_error_pct": '),
+        ("./gravcomp bench robots --mesh --write src/doc/figures.md", "rest_error_pct", '"rest_error_pct": '),
         ("./gravcomp bench robots --loop --write src/doc/figures.md", "unholdable", '"unholdable": null'),
     ],
 )

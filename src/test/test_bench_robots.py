@@ -32,10 +32,20 @@ def short(tmp_path):
 
 
 def test_mesh_and_rest_of_a_robot_are_measured(short):
-    measured = robots.run(silent, files=[short], figures=["mesh_error_pct", "rest_error_pct"])["robots"]["short"]
+    found = robots.run(silent, files=[short], mesh=True)
+    measured = found["robots"]["short"]
+    assert list(found) == ["robots"] and list(measured) == ["mesh_error_pct", "rest_error_pct", "elements"]
     assert 0.0 < measured["mesh_error_pct"] < 1.0
     assert measured["rest_error_pct"] < 1e-7
     assert measured["elements"] == [6, 4, 1]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"), [({"loop": True}, "exclude each other"), ({"figures": ["build_s"]}, "has 'build_s'")]
+)
+def test_the_mesh_alone_has_no_other_figures(options, words):
+    with pytest.raises(ConfigError, match=words):
+        robots.run(silent, mesh=True, **options)
 
 
 def test_a_robot_that_fails_is_reported_and_the_others_go_on(short, tmp_path):

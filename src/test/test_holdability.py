@@ -58,6 +58,14 @@ def test_the_tension_is_that_of_the_beam(search):
     assert found.lateral < search.tolerance and found.demand == pytest.approx(found.tension / 5.0)
 
 
+def test_a_robot_that_would_sag_by_many_lengths_has_a_linear_estimate():
+    """Its cables may not be pulled in by as much as the linear response asks for."""
+    soft = HoldSearch(RobotModel(arm(modulus=2e-4 * _MODULUS, displacement_max=0.1)))
+    for direction in sphere(6)[1:-1]:
+        tension, lateral = soft.linear.tension(_GRAVITY * direction)
+        assert tension.max() <= soft.wide.tension_max and lateral > 10.0 * _LENGTH
+
+
 def test_an_upright_rod_buckles_at_its_critical_length(search):
     """Greenhill: a clamped rod buckles under its own weight at w L^3 = 7.837 E I."""
     points = search.path.follow(np.array([0.0, 0.0, -_GRAVITY]), search.wide, np.zeros(3), most=10.0)

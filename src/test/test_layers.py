@@ -26,38 +26,61 @@ def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path
     assert choice.error > mesh_choice.ACCURACY
 
 
-def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_mesh_found(monkeypatch, tmp_path):
-    """The tips of the meshes are made up: cells through the wall always seem to gain most, and the estimate climbs with them."""
+class MadeUp(mesh_choice._Tips):
+    """Tips that are made up: `size` is the change from one mesh to another. Nothing is meshed."""
 
-    class Climbing(mesh_choice._Tips):
+    def __init__(self, robot, start):
+        self._robot = robot
+
+    def unknowns(self, elements):
+        return 12 * elements.around * elements.along * elements.radial
+
+    def cost(self, elements):
+        return self.unknowns(elements)
+
+    def finer(self, elements, direction):
+        finer = mesh_choice._finer(self._robot, elements, direction)
+        return None if finer == elements else finer
+
+    def change(self, one, other):
+        return np.array([[self.size(one, other), 0.0, 0.0]])
+
+
+def chosen_by(tips, segment, monkeypatch, folder):
+    """The mesh that is chosen for a segment with made-up tips."""
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(folder))
+    monkeypatch.setattr(mesh_choice, "_Tips", tips)
+    monkeypatch.setattr(mesh_choice, "_MOST_UNKNOWNS", 6000)
+    return chosen_mesh(Robot("finger", segments=(segment,)))
+
+
+def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_mesh_found(monkeypatch, tmp_path):
+    """Cells through the wall always seem to gain most, and the estimate climbs with them."""
+
+    class Climbing(MadeUp):
         asked: ClassVar[list] = []
 
-        def __init__(self, robot, start):
-            self._robot = robot
-
-        def unknowns(self, elements):
-            return 12 * elements.around * elements.along * elements.radial
-
-        def cost(self, elements):
-            return self.unknowns(elements)
-
-        def finer(self, elements, direction):
-            finer = mesh_choice._finer(self._robot, elements, direction)
-            return None if finer == elements else finer
-
-        def change(self, one, other):
+        def size(self, one, other):
             self.asked.append(one)
-            size = 0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4 * (other.around > one.around)
-            return np.array([[size, 0.0, 0.0]])
+            return 0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4 * (other.around > one.around)
 
-    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
-    monkeypatch.setattr(mesh_choice, "_Tips", Climbing)
-    monkeypatch.setattr(mesh_choice, "_MOST_UNKNOWNS", 6000)
     segment = Segment("a", 0.08, section=Section("ellipse", 18e-3, 12e-3), material=Material(youngs_modulus=0.5e6))
-    choice = chosen_mesh(Robot("finger", segments=(segment,)))
+    choice = chosen_by(Climbing, segment, monkeypatch, tmp_path)
     assert max(one.radial for one in Climbing.asked) >= 3
     assert all(one.radial <= 0.5 * one.around for one in Climbing.asked)
     assert choice.elements.radial == min(one.radial for one in Climbing.asked)
+
+
+def test_flat_cells_do_not_tell_the_error_of_cells_that_are_not(monkeypatch, tmp_path):
+    """A solid rod starts with few elements around, so the next ring would make its cells flat, whose tip is far off."""
+
+    class FarWithFlatCells(MadeUp):
+        def size(self, one, other):
+            return 0.01 if other.radial > 0.5 * other.around else 1.5e-3 / one.radial**2 * (other.radial > one.radial)
+
+    segment = Segment("a", 0.15, 10e-3, material=Material(youngs_modulus=0.5e6, poissons_ratio=0.49))
+    choice = chosen_by(FarWithFlatCells, segment, monkeypatch, tmp_path)
+    assert choice.error < mesh_choice.ACCURACY and choice.elements.radial == 2
 
 
 def test_the_mesh_of_a_section_whose_division_does_not_change_with_each_number_is_chosen(monkeypatch, tmp_path):

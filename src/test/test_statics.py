@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gravcomp.description import Payload, load_robot_file
+from gravcomp.description import Elements, Material, Payload, Robot, Segment, load_robot_file
 from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.shifted_factor import ShiftedFactor
 from gravcomp.inverse import InverseController, straight_target
@@ -301,3 +301,12 @@ def test_an_indefinite_tangent_gets_the_smallest_shift_that_helps_with_two_facto
     lack(2.0)
     with pytest.raises(NotPositiveDefinite, match="with any shift"):
         shifted.factor()
+
+
+def test_a_soft_robot_hangs_down_although_it_sags_by_many_lengths_linearly():
+    """500 mm of 0.05 MPa: its linear response is 37 lengths; the beam hangs below a bend at its clamp."""
+    material = Material(youngs_modulus=0.05e6, poissons_ratio=0.49, density=1050.0)
+    segment = Segment("s", length=0.5, outer_diameter=25e-3, lumen_diameter=8e-3, material=material)
+    robot = Robot("soft", segments=(segment,), elements=Elements(around=6, along=6))
+    shape = Simulator(robot, reduced=False).solve([-G, 0.0, 0.0])
+    assert shape.is_equilibrium and shape.tip_position[0] < -0.45 and abs(shape.tip_position[2]) < 0.1

@@ -19,6 +19,8 @@ FIGURES = {
     "reduced_step_ms": "step of the reduced model",
     "reduced_error_pct": "reduced against full model",
 }
+OF_THE_MESH = ("mesh_error_pct", "rest_error_pct")
+"""Those that no load on the machine changes, and that need no reduced model."""
 
 
 def measure(name: str, file: str, every: int = 1) -> dict[str, Any]:

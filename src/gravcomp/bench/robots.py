@@ -30,6 +30,7 @@ def run(
     figures: Sequence[str] = (),
     every: int = 1,
     loop: bool = False,
+    mesh: bool = False,
     again: bool = False,
 ) -> dict:
     """Return `robots`, the figures of `robot_figures.FIGURES` of every robot by name, and the figures of `whole_figures`.
@@ -37,16 +38,18 @@ def run(
     files: robot files or names of shipped robots; none: all shipped ones, and those in ../shared/robots if that exists. The
     figures of `whole_figures` are computed if no file is given, or if they are asked for. figures: names of the figures wanted,
     none: all; every: compute every `every`-th row and path only; loop: the figures of `robot_loop.FIGURES` in place of all
-    others; again: measure the robots' figures again that were measured before. Raises ConfigError for a figure that does not
-    exist.
+    others; mesh: those of `robot_figures.OF_THE_MESH`; again: measure the robots' figures again that were measured before.
+    Raises ConfigError for a figure that does not exist, and for loop with mesh.
     """
+    if loop and mesh:
+        raise ConfigError("--loop and --mesh exclude each other: each measures only its own figures")
     if loop:
         return {"robots": robot_loop.run([str(file) for file in files or _all_files()], figures, progress, every, again=again)}
-    allowed = [*robot_figures.FIGURES, *whole_figures.FIGURES]
+    allowed = list(robot_figures.OF_THE_MESH) if mesh else [*robot_figures.FIGURES, *whole_figures.FIGURES]
     for name in figures:
         if name not in allowed:
             raise ConfigError(f"--figures has '{name}'; allowed: {', '.join(allowed)}")
-    wanted = [name for name in robot_figures.FIGURES if not figures or name in figures]
+    wanted = [name for name in robot_figures.FIGURES if name in (figures or allowed)]
     result: dict[str, Any] = {"robots": {}}
     if wanted:
         chosen = list(files or _all_files())
@@ -57,7 +60,7 @@ def run(
 
             name, measured = _of(str(file), wanted, show, every, again)
             result["robots"][name] = measured
-    whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files)]
+    whole = [name for name in whole_figures.FIGURES if name in figures or (not figures and not files and not mesh)]
     return result | whole_figures.run(progress, whole, every)
 
 

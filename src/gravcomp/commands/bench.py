@@ -46,6 +46,8 @@ OPTIONS: dict[str, dict[str, tuple[float, str]]] = {
     "graph": {"composed": (False, "compare the delay with the inner nodes in one process with that as processes")},
     "robots": {
         "loop": (False, "measure the loop on each robot's virtual robot instead of its model"),
+        "mesh": (False, "measure only the error of each robot's mesh and its shape without load"),
+        "every": (1, "compute every N-th path of the closed loop, with N times fewer steps, and row of the references"),
         "again": (False, "measure again what was measured before with the same robots and the same program"),
     },
     "track": {"seeds": (3, "number of seeds of the virtual robot")},
@@ -70,7 +72,7 @@ LISTS: dict[str, dict[str, tuple[str, str]]] = {
 }
 """Keyword arguments of a benchmark's `run` that are lists of texts: positional, or an option."""
 
-KINDS = ("loop", "composed")
+KINDS = ("loop", "mesh", "composed")
 """Options with which a benchmark measures something else, which has a table of its own."""
 
 BRIEF: dict[str, dict[str, Any]] = {

@@ -28,19 +28,23 @@ def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
     file = load_robot_file(robot)
     parts = compilation.LOOP + (compilation.VIRTUAL if virtual else ())
     compile_parts(parts + (compilation.SURROUNDED if file.scene or file.zones else ()))
-    _choose_mesh(file.robot)
+    choose_mesh(file.robot)
     return ModelBuilder(robot)
 
 
-def _choose_mesh(described: "Robot") -> None:
+def choose_mesh(described: "Robot") -> None:
     """Choose the robot's mesh, once for a robot, where its file gives none: the simulator would do it without a word.
 
-    A robot without a mesh is left to the nodes, which report the error.
+    A robot without a mesh is left to what needs the mesh, which reports the error.
     """
-    from gravcomp.full_model.mesh_choice import with_chosen_elements
+    from gravcomp.full_model.mesh_choice import is_chosen, with_chosen_elements
     from gravcomp.mesh.mesh import MeshError
 
+    if is_chosen(described):
+        return
     what = f"choosing the mesh of {described.name}, once for this robot (up to half a minute)"
+    if not output.console().is_terminal:
+        output.note(what)  # there a status is not shown
     with output.console().status(what), contextlib.suppress(MeshError):
         with_chosen_elements(described)
 

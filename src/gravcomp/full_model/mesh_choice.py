@@ -17,6 +17,7 @@ import dataclasses
 import json
 import logging
 import math
+from pathlib import Path
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 7  # part of the key; to be raised when the choice changes
+_FORMAT = 8  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -45,7 +46,8 @@ _START_ALONG = 8
 # The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
 _SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
-# The most cells through the wall, of those around: with more they are flat, and the estimate of both directions is wrong.
+# The most cells through the wall, of those around: with more they are flat, and the estimate of both directions is wrong. What
+# more cells through the wall change is then measured on the mesh with the next number around.
 _FLAT = 0.5
 
 
@@ -64,10 +66,15 @@ def with_chosen_elements(robot: Robot) -> Robot:
     return dataclasses.replace(robot, elements=chosen_mesh(robot).elements)
 
 
+def is_chosen(robot: Robot) -> bool:
+    """Return whether `with_chosen_elements` has no choice to compute: the robot has a mesh, or its choice is in the cache."""
+    return robot.body is not None or robot.elements is not None or _place_of(_rounded(robot)).exists()
+
+
 def chosen_mesh(robot: Robot) -> MeshChoice:
     """Return the choice for a robot of segments, whatever its `elements` are. Raises MeshError if it cannot be meshed."""
     rounded = _rounded(robot)
-    path = cache_path("mesh", content_key(_FORMAT, rounded), ".json")
+    path = _place_of(rounded)
     if path.exists():
         stored = json.loads(path.read_text())
         return MeshChoice(Elements(**stored["elements"]), stored["error"])
@@ -81,6 +88,11 @@ def chosen_mesh(robot: Robot) -> MeshChoice:
         )
     write_whole(path, json.dumps(dataclasses.asdict(choice)))
     return choice
+
+
+def _place_of(rounded: Robot) -> Path:
+    """The file of the choice for a robot of `_rounded` in the cache, which may not exist yet."""
+    return cache_path("mesh", content_key(_FORMAT, rounded), ".json")
 
 
 def _rounded(robot: Robot) -> Robot:
@@ -120,12 +132,16 @@ def _choose(robot: Robot) -> MeshChoice:
         gains: dict[str, float] = {}
         meshes: dict[str, Elements] = {}
         for direction in _ORDER:
-            finer = tips.finer(here, direction)
+            base, finer = here, tips.finer(here, direction)
             if finer is None:
                 continue
-            twice = _to_twice(getattr(here, direction), getattr(finer, direction), direction)
-            changes[direction] = twice * tips.change(here, finer)
-            flat = "around" in changes and direction == "radial" and finer.radial > _FLAT * finer.around
+            flat = direction == "radial" and "around" in changes and finer.radial > _FLAT * finer.around
+            if flat and "around" in meshes and (deeper := tips.finer(meshes["around"], direction)) is not None:
+                base, finer = meshes["around"], deeper
+            twice = _to_twice(getattr(base, direction), getattr(finer, direction), direction)
+            changes[direction] = twice * tips.change(base, finer)
+            if base != here:  # more elements around are what allows more cells through the wall: they gain both changes
+                gains["around"] = _largest(changes["around"] + changes[direction]) / (tips.cost(base) - tips.cost(here))
             if flat or tips.unknowns(finer) > _MOST_UNKNOWNS:  # not to be used, but the error has to be known
                 continue
             meshes[direction] = finer

@@ -107,6 +107,7 @@ def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape:
 def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
     """Follow the equilibrium of the straight robot up to the load; returns whether there is one within the steps allowed."""
     done, step = 0.0, _STEP
+    smallest = _SMALLEST * solver.share_of_steps(load.gravity)
     for _ in range(_MOST_STEPS):
         before, part = solver.state, min(1.0, done + step)
         if solver.track(part * load.gravity, CableInput(tension=part * load.tension), _ITERATIONS).converged:
@@ -115,7 +116,7 @@ def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
                 return True
             continue
         solver.state, step = before, step / 2.0
-        if step < _SMALLEST:
+        if step < smallest:
             break
     return False
 

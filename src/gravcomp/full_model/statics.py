@@ -8,15 +8,20 @@ import dataclasses
 
 import numpy as np
 
+from gravcomp.full_model.applied_load import AppliedLoad
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
+from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.full_model.wrench import Load, PointLoads
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 
 # Parts of the load in which it is applied where an obstacle has friction.
 _RUBBING_PART = 0.1
 # Smallest part of a change of load that continues an equilibrium.
 _LEAST_PART = 1.0 / 16
+# Lengths of the robot by which it may sag linearly before its loads change in smaller steps.
+_SAG = 3.0
 
 
 class StaticSolver(StaticTracker):
@@ -28,8 +33,9 @@ class StaticSolver(StaticTracker):
         """Return the equilibrium under gravity (3,), the cables' input and point loads.
 
         If tracking from the current state fails, the load is applied in steps to the straight robot; a step that fails is
-        halved. If a step of 1 / parts of the load fails, the branch of equilibria ends there in a limit point, or nearly: the
-        last equilibrium is returned with `load_fraction` below 1 and `converged` False, and the solver keeps its state.
+        halved. If a step of 1 / parts of the load fails, or of the share of it that suits a soft robot (`share_of_steps`), the
+        branch of equilibria ends there in a limit point, or nearly: the last equilibrium is returned with `load_fraction` below
+        1 and `converged` False, and the solver keeps its state.
         """
         start, loads = self.state, PointLoads.of(self.model, wrench)
         depth = self._depth(gravity)
@@ -39,7 +45,22 @@ class StaticSolver(StaticTracker):
         origin = self.state.tendons.displacement
         part = _RUBBING_PART if self._rubs else 0.25  # friction depends on the way: the whole load at once is none
         ends = np.zeros(3), np.asarray(gravity)
-        return self._in_parts(ends, origin, cables, part, 1.0 / parts, start, loads, 15, exact=True, depth=depth)
+        least = self.share_of_steps(gravity, loads) / parts
+        return self._in_parts(ends, origin, cables, part, least, start, loads, 15, exact=True, depth=depth)
+
+    def share_of_steps(self, gravity: np.ndarray, loads: PointLoads | None = None) -> float:
+        """Return by how much smaller the steps of a load have to be than those of a robot that sags by three lengths at most.
+
+        By its linear response at rest, a long soft robot sags by many lengths, and no small part of its load converges from
+        there. The solver has to be at rest: the current state is that of `reset`.
+        """
+        load = AppliedLoad(self.model.weight(gravity), with_payload(self.model, gravity, loads), 1.0).at(self.state.u)
+        tip = np.kron(self.model.section_rows(1.0)[0, : self.model.n_free, None], np.eye(3))
+        try:
+            sag = float(np.linalg.norm(self.compliance(np.column_stack([tip, load]), loads)[:3, 3]))
+        except NotPositiveDefinite:
+            return 1.0
+        return min(1.0, _SAG * self.model.length / sag) if sag > 0.0 else 1.0
 
     def approach(self, before: np.ndarray, gravity: np.ndarray, cables: CableInput) -> Equilibrium:
         """Return the equilibrium that continues the current state, which balances the gravity `before` (3,), to a new load.

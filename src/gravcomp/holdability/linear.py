@@ -1,8 +1,11 @@
 """A first estimate of the tensions that keep the robot's shape at rest, from its linear response there to gravity and cables.
 
 One factorisation gives the responses to gravity along three axes and to every cable; then each direction of gravity takes one
-quadratic programme.
+quadratic programme. The linear response of a soft robot sags by many times its length, where the solver's accuracy is out of
+reach. So a programme has no more gravity than lets the tip sag by the length; gravity, limits and answer are scaled alike.
 """
+
+import dataclasses
 
 import numpy as np
 
@@ -40,14 +43,16 @@ class LinearHolding:
         """Return the tensions (m,) in N that hold the tip under gravity (3,), and the lateral error that remains, in m."""
         count = len(self._compliance)
         zero = np.zeros(count)
+        times = max(1.0, float(np.linalg.norm(self._by_gravity[:3] @ gravity)) / self._model.length)
+        part = gravity / times
         response = Response(
-            self._compliance, self._by_tension, self._path_by_gravity @ gravity, self._effector + self._by_gravity @ gravity
+            self._compliance, self._by_tension, self._path_by_gravity @ part, self._effector + self._by_gravity @ part
         )
         self._solver.reset()  # the answer does not depend on the order of the directions
         programme = build_programme(
             response,
             self._target,
-            self._limits,
+            _scaled(self._limits, 1.0 / times),
             tension=zero,
             displacement=zero,
             backbone_station=self._model.effectors.station,
@@ -59,5 +64,17 @@ class LinearHolding:
         tension, _ = unscaled(
             solution.unknowns, solution.multipliers, programme.scale, programme.tension_lower, programme.tension_upper
         )
+        tension = times * tension
         error = self._by_tension[:3] @ tension + self._by_gravity[:3] @ gravity
         return tension, float(np.linalg.norm(error - (error @ self._along) * self._along))
+
+
+def _scaled(limits: Limits, factor: float) -> Limits:
+    """The limits of tension and displacement, times a factor."""
+    return dataclasses.replace(
+        limits,
+        tension_min=factor * limits.tension_min,
+        tension_max=factor * limits.tension_max,
+        displacement_min=factor * limits.displacement_min,
+        displacement_max=factor * limits.displacement_max,
+    )

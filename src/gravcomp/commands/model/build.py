@@ -42,12 +42,15 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from gravcomp.commands.preparation import choose_mesh
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.reduction import load
     from gravcomp.training.build import alone, build
 
-    model = RobotModel(load_robot_file(robot).robot)
+    described = load_robot_file(robot).robot
+    choose_mesh(described)
+    model = RobotModel(described)
     reduction = None if force else load(model)
     if reduction is not None:
         return model, reduction, 0.0

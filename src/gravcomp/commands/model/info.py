@@ -31,6 +31,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0. Raises ConfigError, MeshError, ValueError."""
     import numpy as np
 
+    from gravcomp.commands.preparation import choose_mesh
     from gravcomp.description import load_robot_file
     from gravcomp.full_model.modes import natural_frequencies
     from gravcomp.holdability.text import lines
@@ -43,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
         checked_target("--picture", Path(args.picture))
     file = load_robot_file(args.robot)
     hold.check(args, file.robot.length)
+    choose_mesh(file.robot)
     simulator = Simulator(file.robot, reduced=False)
     robot, model = simulator.robot, simulator.model
     quality = mesh_quality(model.mesh)

@@ -47,7 +47,7 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     """
     import numpy as np
 
-    from gravcomp.commands.preparation import compile_parts
+    from gravcomp.commands.preparation import choose_mesh, compile_parts
     from gravcomp.description import load_robot_file
     from gravcomp.launcher import compilation
     from gravcomp.simulation import Simulator
@@ -61,6 +61,7 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     wanted = _wanted(args, file.robot.length)
     if file.scene or file.zones:
         compile_parts(("model", "contact") if wanted is None else compilation.LOOP + compilation.SURROUNDED)
+    choose_mesh(file.robot)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
     if wanted is not None:
