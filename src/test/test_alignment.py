@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from gravcomp.bench.simulated_streams import KINDS, simulated
-from gravcomp.orientation import GravityEstimator, Problem
+from gravcomp.orientation import EstimatorOptions, GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.recordings.imu import read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
 SHAKEN = replace(KINDS["phone"], turning=2.5, turning_hz=1.2, speed=0.7, speed_hz=2.5, pauses=False)
+
+WIDE = replace(KINDS["phone"], turning=0.4, turning_hz=0.4, speed=1.2, speed_hz=0.35, pauses=False, first_rest=0.0)
 
 ARM = replace(KINDS["arm at 2 m/s^2"], rate=100.0, first_rest=2.0, pauses=False)
 
@@ -22,9 +24,9 @@ def rows(recording, index):
     return replace(recording, **{name: getattr(recording, name)[index] for name in names})
 
 
-def errors(recording):
+def errors(recording, options=None):
     """Return error and standard deviation of the inclination in deg, and problem, of each sample."""
-    estimator, found = GravityEstimator(), []
+    estimator, found = GravityEstimator(options), []
     for sample, true in zip(recording.samples(), recording.orientation.tolist()):
         estimate = estimator.update(*sample)
         assert not isinstance(estimate, Problem)
@@ -64,6 +66,25 @@ def test_a_start_in_fast_motion_is_aligned_within_two_seconds(seed):
     moving = simulated(replace(SHAKEN, first_rest=0.0), seed, 4.0)
     error, std, _ = errors(moving)
     assert error[round(2.5 * moving.rate) :].max() < 4.0
+    assert (error < 3.0 * std + 1.0)[round(0.5 * moving.rate) :].all()
+
+
+@pytest.mark.parametrize("seed", [100, 102])
+def test_a_start_in_motion_that_is_slower_than_seconds_goes_on_until_the_vertical_shows(seed):
+    moving = simulated(WIDE, seed, 6.0)
+    error, std, _ = errors(moving)
+    assert error[round(4.5 * moving.rate) :].max() < 6.0
+    assert (error < 3.0 * std + 1.0)[round(2.5 * moving.rate) :].all()
+
+
+def test_samples_beyond_the_range_of_the_accelerometer_do_not_keep_the_inclination_from_being_found():
+    moving = simulated(replace(SHAKEN, first_rest=0.0), 4, 5.0)
+    options, largest = EstimatorOptions(), 20.0
+    options = replace(options, filter=replace(options.filter, sensor=replace(options.filter.sensor, accel_range=largest)))
+    clipped = replace(moving, accel=np.clip(moving.accel, -largest, largest))
+    assert (np.abs(moving.accel) > largest).any(axis=1).mean() > 0.02
+    error, std, _ = errors(clipped, options)
+    assert error[round(3.0 * moving.rate) :].max() < 6.0
     assert (error < 3.0 * std + 1.0)[round(0.5 * moving.rate) :].all()
 
 

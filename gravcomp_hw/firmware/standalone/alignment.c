@@ -4,14 +4,17 @@
 #include "../core/memory.h"
 #include "quaternion.h"
 
-#define GC_LONGEST 5.0f               // s
-#define GC_SURE 0.0349065850f         // rad
+#define GC_LONGEST 10.0f              // s
+#define GC_SURE 0.0174532925f         // rad
 #define GC_START_STD 0.0872664626f    // rad
 #define GC_LARGEST_STD 1.57079633f    // rad
 #define GC_LOST 0.174532925f          // rad
 #define GC_SWING 0.3f                 // s
 #define GC_MEMORY 1.0f                // s
 #define GC_SMOOTHING 0.05f            // s
+#define GC_SLOWEST 0.4f               // of the time since the start: the longest time scale that a line leaves
+#define GC_HIDDEN 1.5f                // RMS of the acceleration in the line, of that left by it, where the motion is as slow
+#define GC_PI 3.14159265f
 #define GC_ROOT_OF_THREE 1.73205081f
 
 static float squared(float x) { return x * x; }
@@ -42,6 +45,8 @@ void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravi
   alignment->shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
   alignment->active = true;
   alignment->elapsed = alignment->square = 0.0f;
+  alignment->force_square = alignment->unsure = 0.0f;
+  gc_copy(alignment->force, force, sizeof alignment->force);
   gc_zero(alignment->velocity, sizeof alignment->velocity);
   gc_zero(alignment->sum, sizeof alignment->sum);
   gc_zero(alignment->moment, sizeof alignment->moment);
@@ -64,7 +69,19 @@ static float scatter_of(const gc_alignment *alignment) {
   return gc_max(0.0f, alignment->square / t - on_line);
 }
 
-void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float *up) {
+// Return the RMS on each axis of the acceleration that is too slow to be left by the line, m/s^2.
+static float hidden(const gc_alignment *alignment, float scatter) {
+  const float t = alignment->elapsed;
+  const float left = alignment->force_square / t - square_of(alignment->velocity) / (t * t);
+  if (!(left > 0.0f)) {
+    return 0.0f;
+  }
+  const float slow = gc_min(GC_PI * gc_sqrt(scatter / left) / (GC_SLOWEST * t), 1.0f);
+  return GC_HIDDEN * slow * slow * gc_sqrt(left) / GC_ROOT_OF_THREE;
+}
+
+void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity,
+                       float noise, float *up) {
   const gc_quaternion turn = gc_quaternion_exponential(-rate[0] * dt, -rate[1] * dt, -rate[2] * dt);
   const float middle = alignment->elapsed + 0.5f * dt;
   float mean[3], slope[3];
@@ -78,6 +95,13 @@ void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, con
     alignment->moment[i] += middle * mean[i] * dt;
   }
   alignment->square += dt * square_of(mean);
+  gc_quaternion_rotate(turn, alignment->force, alignment->force);
+  const float gain = dt / (GC_SMOOTHING + dt);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    alignment->force[i] += gain * (force[i] - alignment->force[i]);
+  }
+  alignment->force_square += dt * square_of(alignment->force);
+  alignment->unsure += squared(noise) * dt;
   alignment->elapsed += dt;
   alignment->active = alignment->elapsed < GC_LONGEST && gc_alignment_std(alignment, gravity) > GC_SURE;
   // Within a swing of the motion the mean is surer than the slope.
@@ -103,8 +127,11 @@ float gc_alignment_std(const gc_alignment *alignment, float gravity) {
   if (!(t > 0.0f)) {
     return gc_min(at_rest, GC_LARGEST_STD);
   }
+  const float scatter = scatter_of(alignment);
   const float before = alignment->shaken * squared(GC_SWING * gravity) * GC_SWING / (GC_SWING + t);
-  const float by_motion = gc_sqrt(12.0f * (scatter_of(alignment) + before) / (1.0f + t / GC_SWING)) / (gravity * t);
+  const float resolved = 12.0f * (scatter + before) / (1.0f + t / GC_SWING);
+  // A step of v by d turns the slope by 1.5 d / t at most.
+  const float variance = resolved + 2.25f * alignment->unsure + squared(t * hidden(alignment, scatter));
   const float least = t > GC_SWING ? GC_START_STD * GC_SWING / t : at_rest;
-  return gc_min(gc_max(by_motion, least), GC_LARGEST_STD);
+  return gc_min(gc_max(gc_sqrt(variance) / (gravity * t), least), GC_LARGEST_STD);
 }

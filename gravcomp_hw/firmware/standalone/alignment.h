@@ -15,6 +15,8 @@ typedef struct {
   float elapsed;                        // s, t
   float velocity[3], sum[3], moment[3]; // v in m/s; the integrals of v dt and of t v dt
   float square;                         // integral of v^2 dt
+  float force[3], force_square;         // smoothed specific force in m/s^2; integral of its square
+  float unsure;                         // variance of v by samples without specific force, (m/s)^2
 } gc_alignment;
 
 // Whether the sensor may have turned too far, other than the rates around it (rad/s) show, in a gap (s) to bridge it.
@@ -26,8 +28,10 @@ void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, co
 // Begin with the first specific force (3,) after a gap.
 void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity);
 
-// Take a sample dt s after the last one; write a vector (3,) that points up.
-void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float *up);
+// Take a sample dt s after the last one; write a vector (3,) that points up. noise in m/s^2/sqrt(Hz): of the specific force,
+// where it cannot be measured and `force` is the likeliest one.
+void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity,
+                       float noise, float *up);
 
 // Write the newest velocity (3,) beyond the line in m/s; returns its standard deviation on each axis.
 float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity);

@@ -226,18 +226,21 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
     state->rest.still = state->rest.calm = 0u;
   }
   predict(filter, step);
+  float rate[3];
+  for (uint32_t i = 0; i < 3u; ++i) {
+    rate[i] = step->gyro[i] - state->bias[i];
+  }
   if (step->gyro_usable && step->accel_usable) {
-    float rate[3], up[3];
-    for (uint32_t i = 0; i < 3u; ++i) {
-      rate[i] = step->gyro[i] - state->bias[i];
-    }
     gc_alignment_watch(&state->alignment, step->dt, rate, step->accel, s->gravity);
-    if (state->alignment.active) {
-      gc_alignment_take(&state->alignment, step->dt, rate, step->accel, state->gravity_norm, up);
-      set_aligned(state, up);
-      return true;
-    }
-  } else if (state->alignment.active) {
+  }
+  if (state->alignment.active && step->gyro_usable) {
+    const float noise = step->accel_usable ? 0.0f : GC_UNKNOWN_ACCEL_NOISE;
+    float up[3];
+    gc_alignment_take(&state->alignment, step->dt, rate, step->accel, state->gravity_norm, noise, up);
+    set_aligned(state, up);
+    return true;
+  }
+  if (state->alignment.active) {
     gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm);
   }
   if (step->accel_usable) {

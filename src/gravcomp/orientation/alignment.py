@@ -4,7 +4,8 @@ One specific force in motion says little about the vertical, and the filter's li
 that is wrong by a right angle. The integral of the specific force, turned back by the rates, is a velocity that grows along the
 vertical by g per second, plus that of the motion, which is bounded for a sensor that stays near one place. So the straight line
 that fits this integral best shows the vertical, however wrong the start was; how far the integral is from it shows how sure that
-is.
+is. A motion that is slower than the time since the start looks like a part of that line. Its share shows in the time scale of
+what is left: as long as that is as slow as it can be within this time, more of the same is in the line.
 """
 
 import math
@@ -12,15 +13,22 @@ from collections.abc import Sequence
 
 from gravcomp.orientation import quaternion as quat
 
-LONGEST = 5.0  # s; then the filter corrects
-SURE = math.radians(2.0)  # at this standard deviation, too
+LONGEST = 10.0  # s; then the filter corrects
+SURE = math.radians(1.0)  # at this standard deviation, too
 START_STD = math.radians(5.0)  # of one specific force at rest
 LARGEST_STD = math.radians(90.0)  # nothing is known
 LOST = math.radians(10.0)  # of a bridged gap: more is not bridged
 TOGETHER = math.sqrt(0.75)  # correlation between the slope of a line that fits evenly spread errors and its value at the end
 _SWING = 0.3  # s, about the time that a motion goes in one direction
 _MEMORY = 1.0  # s, of the motion before the gap
-_SMOOTHING = 0.05  # s, of the rates whose change is measured: noise and vibration change rates, but hardly turn the sensor
+_SMOOTHING = 0.05  # s, of rates and specific force whose change is measured: noise hardly turns or moves the sensor
+
+# Half a period of a sinusoid is pi v / a, with the RMS of its velocity and acceleration. What a line leaves of one that is slower
+# than a period in the time t has 0.4 t, however slow it is, because its low frequencies are in the line.
+_SLOWEST = 0.4
+# RMS of the acceleration that is in the line, of the one that is left, for such a motion: 1.7 at a third of a period, 1.1 at
+# half, 0.7 at two thirds, 0.3 at one.
+_HIDDEN = 1.5
 
 
 class Alignment:
@@ -38,16 +46,21 @@ class Alignment:
         self._elapsed = 0.0  # t
         self._velocity = self._sum = self._moment = (0.0, 0.0, 0.0)  # v; the integrals of v dt and of t v dt
         self._square = 0.0  # integral of v^2 dt
+        self._force = (0.0, 0.0, 0.0)  # smoothed specific force, m/s^2
+        self._force_square = 0.0  # integral of its square
+        self._unsure = 0.0  # variance of v by samples without specific force, (m/s)^2
 
     def saved(self) -> tuple:
         """Return the state, for `restore`."""
         moving = self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed
-        return *moving, self._velocity, self._sum, self._moment, self._square
+        line = self._velocity, self._sum, self._moment, self._square
+        return *moving, *line, self._force, self._force_square, self._unsure
 
     def restore(self, state: tuple) -> None:
         """Set a saved state."""
         self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed = state[:6]
-        self._velocity, self._sum, self._moment, self._square = state[6:]
+        self._velocity, self._sum, self._moment, self._square = state[6:10]
+        self._force, self._force_square, self._unsure = state[10:]
 
     def lost_in(self, gap: float, *around: float) -> bool:
         """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s).
@@ -74,10 +87,15 @@ class Alignment:
         """Begin with the first specific force (3,) after a gap, as `watch`."""
         self._shaken = max(self._shaken, (math.hypot(*force) / gravity - 1.0) ** 2)
         self.active, self._elapsed, self._square = True, 0.0, 0.0
+        self._force = (float(force[0]), float(force[1]), float(force[2]))
+        self._force_square = self._unsure = 0.0
         self._velocity = self._sum = self._moment = (0.0, 0.0, 0.0)
 
-    def take(self, dt: float, rate: quat.Vector, force: quat.Vector, gravity: float) -> quat.Vector:
-        """Take a sample `dt` s after the last one, as `watch`; return a vector (3,) that points up, m/s^2."""
+    def take(self, dt: float, rate: quat.Vector, force: quat.Vector, gravity: float, noise: float = 0.0) -> quat.Vector:
+        """Take a sample `dt` s after the last one, as `watch`; return a vector (3,) that points up, m/s^2.
+
+        noise: of the specific force, m/s^2/sqrt(Hz), where it cannot be measured and `force` is the likeliest one.
+        """
         wx, wy, wz = rate
         turn = quat.exponential(-wx * dt, -wy * dt, -wz * dt)
         middle = self._elapsed + 0.5 * dt
@@ -90,6 +108,11 @@ class Alignment:
         x, y, z = quat.rotate(turn, self._moment)
         self._moment = x + middle * mx * dt, y + middle * my * dt, z + middle * mz * dt
         self._square += dt * (mx * mx + my * my + mz * mz)
+        x, y, z = quat.rotate(turn, self._force)
+        gain = dt / (_SMOOTHING + dt)
+        self._force = x + gain * (fx - x), y + gain * (fy - y), z + gain * (fz - z)
+        self._force_square += dt * sum(f * f for f in self._force)
+        self._unsure += noise * noise * dt
         self._elapsed += dt
         self.active = self._elapsed < LONGEST and self.std(gravity) > SURE
         # Within a swing of the motion the mean is surer than the slope.
@@ -123,6 +146,18 @@ class Alignment:
         t, at_rest = self._elapsed, math.hypot(START_STD, math.sqrt(self._shaken))
         if not t:
             return min(at_rest, LARGEST_STD)
+        scatter = self._scatter()
         before = self._shaken * (_SWING * gravity) ** 2 * _SWING / (_SWING + t)
-        by_motion = math.sqrt(12.0 * (self._scatter() + before) / (1.0 + t / _SWING)) / (gravity * t)
-        return min(max(by_motion, START_STD * _SWING / t if t > _SWING else at_rest), LARGEST_STD)
+        resolved = 12.0 * (scatter + before) / (1.0 + t / _SWING)
+        # A step of v by d turns the slope by 1.5 d / t at most.
+        variance = resolved + 2.25 * self._unsure + (t * self._hidden(scatter)) ** 2
+        return min(max(math.sqrt(variance) / (gravity * t), START_STD * _SWING / t if t > _SWING else at_rest), LARGEST_STD)
+
+    def _hidden(self, scatter: float) -> float:
+        """Return the RMS on each axis of the acceleration that is too slow to be left by the line, m/s^2."""
+        t = self._elapsed
+        left = self._force_square / t - sum(v * v for v in self._velocity) / t**2
+        if left <= 0.0:
+            return 0.0
+        slow = min(math.pi * math.sqrt(scatter / left) / (_SLOWEST * t), 1.0)
+        return _HIDDEN * slow * slow * math.sqrt(left / 3.0)

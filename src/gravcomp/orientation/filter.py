@@ -143,18 +143,22 @@ class OrientationFilter:
             resting = False
         self._predict(dt, rate, force, step.gyro_usable, step.accel_usable)
         if step.gyro_usable and step.accel_usable:
-            x, y, z = (w - b for w, b in zip(rate, self._bias))
-            self._alignment.watch(dt, (x, y, z), force, self.options.gravity)
-            if self._alignment.active:
-                self._set_aligned(self._alignment.take(dt, (x, y, z), force, self._gravity_norm))
-                return resting
-        elif self._alignment.active:
+            self._alignment.watch(dt, self._unbiased(rate), force, self.options.gravity)
+        if self._alignment.active and step.gyro_usable:
+            noise = 0.0 if step.accel_usable else UNKNOWN_ACCEL_NOISE
+            self._set_aligned(self._alignment.take(dt, self._unbiased(rate), force, self._gravity_norm, noise))
+            return resting
+        if self._alignment.active:
             self._alignment.begin(force, self._gravity_norm)
         if step.accel_usable:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
             self._learn_gravity(dt)
         return resting
+
+    def _unbiased(self, rate: quat.Vector) -> quat.Vector:
+        x, y, z = (w - b for w, b in zip(rate, self._bias))
+        return x, y, z
 
     def _saved(self) -> tuple:
         """Return the state that steps change, for `_restore`."""
