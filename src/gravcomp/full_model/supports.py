@@ -64,8 +64,8 @@ def add_springs(matrix: BlockMatrix, model: MeshedModel, sections: Sequence[np.n
 def unstable_motions(negative: int, compliance: np.ndarray, turning: np.ndarray) -> int:
     """Return how many motions, which the walls allow, have a negative stiffness.
 
-    negative: n(A); compliance (k, k): R A^-1 R^T, rows of N first; turning (t,): D of the last rows, none of which is 0. Rows of N
-    may depend on each other, as those of a face on a plane do: with walls that yield a little, each of them counts.
+    negative: n(A); compliance (k, k): R A^-1 R^T, rows of N first; turning (t,): D of the last rows, none of which is 0. Rows of
+    N may depend on each other, as those of a face on a plane do: with walls that yield a little, each of them counts.
     """
     held = len(compliance) - len(turning)
     inner = -0.5 * (compliance + compliance.T)
