@@ -186,17 +186,25 @@ def test_a_rod_that_an_end_load_buckles_in_a_tube_follows_the_closed_form():
     assert shape.is_equilibrium and shape.tip_position[:2] == pytest.approx(tip * turned[:2] / np.linalg.norm(turned), abs=2e-5)
 
 
-def test_the_motions_that_walls_allow_are_counted_where_they_would_grow():
+@pytest.mark.parametrize("case", ["independent", "a face on a plane", "at the clamp", "a force that is nearly 0"])
+def test_the_motions_that_walls_allow_are_counted_where_they_would_grow(case):
     """Against the eigenvalues of the stiffness on these motions, for random bodies, walls and forces that turn."""
     rng, counts = np.random.default_rng(3), []
     for _ in range(60):
         a = rng.standard_normal((8, 8))
         a = a + a.T + 4.0 * np.eye(8)
-        rows, turning = rng.standard_normal((4, 8)), 3.0 * rng.standard_normal(2)
+        walls, turns, turning = rng.standard_normal((2, 8)), rng.standard_normal((2, 8)), 3.0 * rng.standard_normal(2)
+        if case == "a face on a plane":  # its corners do not move independently
+            walls = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]) @ walls
+        elif case == "at the clamp":
+            walls = np.vstack([walls, np.zeros(8)])
+        elif case == "a force that is nearly 0":
+            turning[0] *= 1e-22
+        rows = np.vstack([walls, turns])
         negative = int((np.linalg.eigvalsh(a) < 0.0).sum())
         found = unstable_motions(negative, rows @ np.linalg.solve(a, rows.T), turning)
-        allowed = null_space(rows[:2])
-        on_walls = allowed.T @ (a - rows[2:].T @ (turning[:, None] * rows[2:])) @ allowed
+        allowed = null_space(walls)
+        on_walls = allowed.T @ (a - turns.T @ (turning[:, None] * turns)) @ allowed
         assert found == (np.linalg.eigvalsh(on_walls) < 0.0).sum()
         counts.append(found)
     assert {0, 1} <= set(counts)

@@ -9,6 +9,7 @@ import pytest
 from gravcomp.description import Cable, Lumen, Material, Robot, Section, Segment
 from gravcomp.full_model import mesh_choice
 from gravcomp.full_model.mesh_choice import chosen_mesh
+from gravcomp.full_model.mesh_loads import MeshLoad
 from gravcomp.mesh import tube_mesh
 from gravcomp.mesh.layers import layers_of
 from gravcomp.mesh.quality import mesh_quality
@@ -31,6 +32,7 @@ class MadeUp(mesh_choice._Tips):
 
     def __init__(self, robot, start):
         self._robot = robot
+        self._loads = [MeshLoad("horizontal", np.zeros(3), np.zeros(0)), MeshLoad("bent", np.zeros(3), np.zeros(0))]
 
     def unknowns(self, elements):
         return 12 * elements.around * elements.along * elements.radial
@@ -43,7 +45,7 @@ class MadeUp(mesh_choice._Tips):
         return None if finer == elements else finer
 
     def change(self, one, other):
-        return np.array([[self.size(one, other), 0.0, 0.0]])
+        return np.array([[self.size(one, other), 0.0, 0.0], np.zeros(3)])
 
 
 def chosen_by(tips, segment, monkeypatch, folder):
@@ -52,6 +54,16 @@ def chosen_by(tips, segment, monkeypatch, folder):
     monkeypatch.setattr(mesh_choice, "_Tips", tips)
     monkeypatch.setattr(mesh_choice, "_MOST_UNKNOWNS", 6000)
     return chosen_mesh(Robot("finger", segments=(segment,)))
+
+
+def test_a_load_without_equilibrium_is_named(monkeypatch, tmp_path, caplog):
+    class Lost(MadeUp):
+        def change(self, one, other):
+            return np.array([[1e-5, 0.0, 0.0], np.full(3, np.nan)])
+
+    material = Material(youngs_modulus=1e6, poissons_ratio=0.3, density=1000.0)
+    chosen_by(Lost, Segment("s", 0.1, 10e-3, 4e-3, material=material), monkeypatch, tmp_path)
+    assert "'finger' is chosen without the load 'bent'" in caplog.text and "horizontal" not in caplog.text
 
 
 def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_mesh_found(monkeypatch, tmp_path):

@@ -78,7 +78,13 @@ def chosen_mesh(robot: Robot) -> MeshChoice:
     if path.exists():
         stored = json.loads(path.read_text())
         return MeshChoice(Elements(**stored["elements"]), stored["error"])
-    choice = _choose(rounded)
+    choice, left_out = _choose(rounded)
+    if left_out:
+        logging.getLogger(__name__).warning(
+            "the mesh for '%s' is chosen without the load '%s', for which no equilibrium is found",
+            robot.name,
+            "' and '".join(left_out),
+        )
     if choice.error > ACCURACY:
         logging.getLogger(__name__).warning(
             "the mesh chosen for '%s' leaves an estimated error of %.2g %% of the length; wanted: %g %%",
@@ -123,9 +129,11 @@ def _rounded_down(modulus: float) -> float:
     return 2.0 ** (math.floor(4.0 * math.log2(modulus)) / 4.0)
 
 
-def _choose(robot: Robot) -> MeshChoice:
+def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
+    """Return the choice, and the names of the loads that are left out, as a mesh or a finer one has no equilibrium under them."""
     here = _start(robot)
     tips, choices = _Tips(robot, here), []
+    left_out: dict[Elements, list[str]] = {}
     while True:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
@@ -150,8 +158,10 @@ def _choose(robot: Robot) -> MeshChoice:
                 break
         else:  # all directions are measured
             choices.append(MeshChoice(here, _together(list(changes.values())) if changes else 0.0))
+            left_out[here] = tips.left_out(list(changes.values()))
             if choices[-1].error <= _USED * ACCURACY or not gains:
-                return min(choices, key=lambda choice: choice.error)
+                best = min(choices, key=lambda choice: choice.error)
+                return best, left_out[best.elements]
         here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
 
 
@@ -210,6 +220,11 @@ class _Tips:
             self._known.clear()
             self._loads = less_tension(self._loads)
         return change
+
+    def left_out(self, changes: list[np.ndarray]) -> list[str]:
+        """Return the names of the loads without equilibrium, whose entries in the changes (l, 3) are NaN."""
+        lost = np.isnan(changes).any(axis=(0, 2)) if changes else np.zeros(0)
+        return [load.name for load, without in zip(self._loads, lost) if without]
 
     def _tips(self, elements: Elements, near: Elements | None = None) -> np.ndarray:
         """The tips (l, 3) in m; near: a mesh that is nearly the same."""

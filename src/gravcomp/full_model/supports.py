@@ -27,6 +27,9 @@ from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.turning_loads import add_part
 from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix
 
+# By how much walls yield, of the compliance of the robot where they hold it.
+_SOFT = 1e-7
+
 
 class SupportedFactor:
     """Solves with A, of which A' has a factor. Attribute: negative, the number of negative eigenvalues of A."""
@@ -61,9 +64,16 @@ def add_springs(matrix: BlockMatrix, model: MeshedModel, sections: Sequence[np.n
 def unstable_motions(negative: int, compliance: np.ndarray, turning: np.ndarray) -> int:
     """Return how many motions, which the walls allow, have a negative stiffness.
 
-    negative: n(A); compliance (k, k): R A^-1 R^T, rows of N first; turning (t,): D of the last rows, none of which is 0.
+    negative: n(A); compliance (k, k): R A^-1 R^T, rows of N first; turning (t,): D of the last rows, none of which is 0. Rows of
+    N may depend on each other, as those of a face on a plane do: with walls that yield a little, each of them counts.
     """
+    held = len(compliance) - len(turning)
     inner = -0.5 * (compliance + compliance.T)
-    held = len(inner) - len(turning)
     inner[range(held, len(inner)), range(held, len(inner))] += 1.0 / turning
+    # Scaling changes no sign. Without it, the rounding error of the entry of a force that is nearly 0 hides all others.
+    size = np.abs(inner.diagonal())
+    size[:held][size[:held] == 0.0] = 1.0  # at the clamp
+    size[held:] = 1.0 / np.abs(turning)
+    inner /= np.sqrt(np.outer(size, size))
+    inner[range(held), range(held)] -= _SOFT
     return negative + int((np.linalg.eigvalsh(inner) < 0.0).sum()) - int((turning < 0.0).sum()) - held
