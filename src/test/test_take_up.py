@@ -117,3 +117,48 @@ def test_only_a_motor_that_has_turned_back_goes_out_and_none_beyond_the_limit_of
 def test_a_gear_finer_than_the_position_loop_and_a_take_up_that_is_switched_off_move_nothing():
     assert farthest_beyond([1e-3, 5e-4], backlash=math.radians(0.05)) == 0.0
     assert farthest_beyond([1e-3, 5e-4], take_up_time=0.0) == 0.0
+
+
+def times_taken_up(target, duration: float, **drive) -> int:
+    """How often a rotor that follows at once goes out while its target (m) is that function of the time for `duration` s."""
+    take_up = TakeUp(dataclasses.replace(article()[1].drive, **drive), RESTS)
+    rotor, times, before = target(0.0), 0, False
+    for step in range(round(duration / 0.004)):
+        rotor, _ = take_up.step(target(0.004 * step), rotor, 0.004)
+        times, before = times + (take_up.moves and not before), take_up.moves
+    return times
+
+
+@pytest.mark.parametrize("rate", [0.03e-3, 0.01e-3, 0.005e-3])
+def test_a_target_that_creeps_is_not_at_rest_until_it_stops(rate):
+    def crept(time: float) -> float:
+        return 1e-3 - rate * min(time, 12.0)
+
+    assert times_taken_up(crept, 12.0) == 0
+    assert times_taken_up(crept, 25.0) == 1
+
+
+@pytest.mark.parametrize("period", [6.0, 20.0])
+def test_a_target_that_swings_slowly_does_not_rest_where_it_turns_round(period):
+    swing = 0.1e-3
+    for late in np.linspace(0.0, 1.0, 7):
+        assert times_taken_up(lambda time, late=late: swing * math.sin(2 * math.pi * (time / period + late)), 2 * period) <= 1
+
+
+def test_a_small_step_after_a_long_rest_is_taken_up_too():
+    play = math.radians(0.6) * 0.005
+    assert times_taken_up(lambda time: 1e-3 - (0.3 * play if time > 60.0 else 0.0), 80.0) == 1
+
+
+def test_a_target_that_trembles_toward_the_limit_while_it_is_taken_up_leads_no_motor_beyond_it():
+    play, edge = math.radians(0.6) * 0.005, -1e-3
+    over = 4.0 / 3.0 * play + 2.0 * RESTS
+    take_up = TakeUp(dataclasses.replace(article()[1].drive, displacement_min=edge), RESTS)
+    rotor, last, out = edge + 1e-3, edge + over, []
+    for step in range(400):
+        target = rotor if step == 0 else last - 0.15 * play * take_up.moves
+        goal, _ = take_up.step(target, rotor, 0.004)
+        rotor += float(np.clip(goal - rotor, -0.2 * play, 0.2 * play))
+        out.append(goal)
+    assert min(out) == edge
+    assert not take_up.moves, "it ends"

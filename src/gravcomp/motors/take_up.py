@@ -10,15 +10,23 @@ How loose the gear may be follows from the rotor as in a play operator of the la
     x = min(w, max(0, x_last - (d - d_last))),   d: displacement of the rotor; 0: on the flank that winds in
 
 A target that stays is taken up once, so that nothing moves at rest.
+
+A target that creeps also stays for a while. It leaves its band slowly, and the next one only counts as rest when it stays there
+for `_STAYS` times as long as in the last, or for `_LATEST` rests. So a target that creeps steadily or turns round on a parabola
+is not taken up: a parabola spends at most (1 + sqrt(2))^2 times as long in the band around its vertex as in the one before.
 """
 
 import enum
+import math
 
 from gravcomp.description.hardware import Drive
 
 _SPREAD = 1.0 / 3.0  # of the described backlash, by which that of a gear is larger at most
 _LEAST = 0.2  # of the backlash: what is left loose, and by how much a target moves that stays
 _WAY = 1.0 / 3.0  # of the rest before: time in which the motor winds in again
+_STAYS = (1.0 + math.sqrt(2.0)) ** 2  # stays of a target that creeps, after which it rests
+_CREEPS = 2.0  # bands: a target that has gone farther between two steps has not crept
+_LATEST = 30.0  # of the rest: a small step after a long rest is taken up, too
 
 
 class _Phase(enum.Enum):
@@ -46,6 +54,7 @@ class TakeUp:
         self._last: float | None = None  # displacement
         self._kept: float | None = None  # target that stays, for `_since` s
         self._phase, self._since, self._done = _Phase.NONE, 0.0, False
+        self._rest = self._time  # s, after which a target that stays is at rest
 
     @property
     def moves(self) -> bool:
@@ -62,18 +71,21 @@ class TakeUp:
         moved = 0.0 if self._last is None else displacement - self._last
         self._loose, self._last = min(self._width, max(0.0, self._loose - moved)), displacement
         if self._kept is None or abs(target - self._kept) > self._least:
+            crept = self._kept is not None and abs(target - self._kept) <= _CREEPS * self._least
+            self._rest = min(max(1.0, _STAYS * self._since / self._time), _LATEST) * self._time if crept else self._time
             self._phase, self._kept, self._since, self._done = _Phase.NONE, target, 0.0, False
         self._since += dt
         if self._phase is _Phase.NONE and self._is_due(target):
             self._phase, self._done = _Phase.OUT, True
-        if self._phase is _Phase.OUT and displacement <= target - self._over + self._rest_error:
+        outward = max(target - self._over, self._farthest)  # the target may tremble after the take-up has begun
+        if self._phase is _Phase.OUT and displacement <= outward + self._rest_error:
             self._phase = _Phase.IN
         if self._phase is _Phase.IN and displacement >= target - self._rest_error:
             self._phase = _Phase.NONE
         if self._phase is _Phase.OUT:
-            return target - self._over, None
+            return outward, None
         return target, self._speed if self._phase is _Phase.IN else None
 
     def _is_due(self, target: float) -> bool:
-        rests = not self._done and self._since >= self._time
+        rests = not self._done and self._since >= self._rest
         return rests and self._loose > self._least and target - self._over >= self._farthest
