@@ -314,7 +314,11 @@ static void drive(gc_board *board) {
       continue;
     }
     gc_motor *motor = &board->motors[index];
-    gc_motor_drive(motor, &board->parameters, index, dt, fastest);
+    if (board->state == GC_STANDALONE) {
+      gc_motor_follow(motor, &board->parameters, index, dt);
+    } else {
+      gc_motor_drive(motor, &board->parameters, index, dt, fastest);
+    }
     if (gc_motor_is_astray(motor, &board->parameters, index, dt)) {
       board->faults |= GC_FAULT_MOTOR;
       gc_board_enter(board, GC_FAULT);

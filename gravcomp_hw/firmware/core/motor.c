@@ -55,10 +55,14 @@ void gc_motor_warm(gc_motor *motor, const gc_parameters *parameters, float dt) {
   motor->heat += (current * current - motor->heat) * dt / lag;
 }
 
+// Whether the motor pulls an antagonist when it turns back.
+static bool is_two_way(const gc_parameters *parameters, uint32_t index) {
+  return ((uint32_t)gc_parameter_int(parameters, GC_TWO_WAY) >> index & 1u) != 0u;
+}
+
 // Smallest feed-forward (N): an antagonist is pulled by the other sign.
 static float least_pull(const gc_parameters *parameters, uint32_t index) {
-  const uint32_t two_way = (uint32_t)gc_parameter_int(parameters, GC_TWO_WAY);
-  return (two_way >> index & 1u) != 0u ? -gc_parameter_real(parameters, GC_TENSION_LIMIT)
+  return is_two_way(parameters, index) ? -gc_parameter_real(parameters, GC_TENSION_LIMIT)
                                        : gc_parameter_real(parameters, GC_PRETENSION);
 }
 
@@ -72,21 +76,36 @@ void gc_motor_hold(gc_motor *motor, const gc_parameters *parameters, uint32_t in
   motor->tension = 0.0f;
   const float forward = pull(motor, parameters, index) / gc_parameter_real(parameters, GC_NEWTON_PER_AMPERE);
   gc_position_loop_reset(&motor->loop, motor->target, current - forward);
+  gc_take_up_reset(&motor->take_up);
   motor->astray = 0.0f;
   motor->stalled = 0.0f;
 }
 
-void gc_motor_drive(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt, float fastest) {
+static void go(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt, gc_way way) {
   const gc_position_input input = {
-      .target = motor->target,
+      .target = way.target,
       .pull = pull(motor, parameters, index),
       .displacement = gc_motor_displacement(motor, parameters, index),
       .velocity = gc_motor_velocity(motor, parameters, index),
-      .fastest = fastest,
+      .fastest = way.fastest,
       .dt = dt,
   };
   const float current = gc_position_loop_step(&motor->loop, parameters, &input);
   motor->wanted = gc_motor_direction(parameters, index) * gc_round(1e3f * current);
+}
+
+void gc_motor_drive(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt, float fastest) {
+  const gc_way straight = {.target = motor->target, .fastest = fastest};
+  go(motor, parameters, index, dt, straight);
+}
+
+void gc_motor_follow(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt) {
+  if (is_two_way(parameters, index)) {  // it has its cables on both flanks of the gear
+    gc_motor_drive(motor, parameters, index, dt, gc_parameter_real(parameters, GC_VELOCITY_LIMIT));
+    return;
+  }
+  const float at = gc_motor_displacement(motor, parameters, index);
+  go(motor, parameters, index, dt, gc_take_up_step(&motor->take_up, parameters, motor->target, at, dt));
 }
 
 bool gc_motor_is_astray(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt) {

@@ -8,6 +8,7 @@
 #include "parameters.h"
 #include "position_loop.h"
 #include "rotor.h"
+#include "take_up.h"
 
 typedef struct {
   gc_rotor rotor;
@@ -21,6 +22,7 @@ typedef struct {
   float target;     // m
   float tension;    // N, expected
   gc_position_loop loop;
+  gc_take_up take_up;
   float astray;   // s, too far from the setpoint or too fast
   float stalled;  // s at the limit of current without motion
 } gc_motor;
@@ -48,8 +50,11 @@ void gc_motor_warm(gc_motor *motor, const gc_parameters *parameters, float dt);
 // Start the loop at rest where the cable is, with the current that is sent.
 void gc_motor_hold(gc_motor *motor, const gc_parameters *parameters, uint32_t index);
 
-// Step the loop by `dt` s toward the target; sets `wanted`.
+// Step the loop by `dt` s toward the target at no more than `fastest` (m/s); sets `wanted`.
 void gc_motor_drive(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt, float fastest);
+
+// The same within the limit of velocity; a motor that only pulls takes up the backlash of its gear where the target rests.
+void gc_motor_follow(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt);
 
 // Whether the motor stalls or runs away while the board drives it; `dt` s since the last look.
 bool gc_motor_is_astray(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt);

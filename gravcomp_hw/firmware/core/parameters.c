@@ -54,6 +54,8 @@ static const description descriptions[GC_PARAMETER_COUNT] = {
     [GC_HEATER_RISE] = {WHOLE, 0.0f, 40.0f, 15.0f},
     [GC_HEATER_GAIN] = {REAL, 0.0f, 10.0f, 0.25f},
     [GC_HEATER_INTEGRAL_TIME] = {REAL, 0.1f, 10000.0f, 40.0f},
+    [GC_BACKLASH] = {REAL, 0.0f, 0.1f, 5.2359878e-5f},
+    [GC_TAKE_UP_TIME] = {REAL, 0.0f, 60.0f, 0.3f},
 };
 
 static bool fits(uint32_t key, uint32_t word) {

@@ -45,10 +45,12 @@ enum {
   GC_HEATER_RISE,      // degC
   GC_HEATER_GAIN,      // 1/degC
   GC_HEATER_INTEGRAL_TIME,  // s
+  GC_BACKLASH,      // m of cable, of the gear
+  GC_TAKE_UP_TIME,  // s of rest of a target after which the loop on the board takes up the backlash; 0: never
   GC_PARAMETER_COUNT
 };
 
-#define GC_PARAMETER_VERSION 2u
+#define GC_PARAMETER_VERSION 3u
 
 typedef struct {
   uint32_t words[GC_PARAMETER_COUNT];

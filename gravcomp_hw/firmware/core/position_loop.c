@@ -10,6 +10,10 @@ void gc_position_loop_reset(gc_position_loop *loop, float displacement, float ho
   loop->integral = holding;
 }
 
+float gc_position_loop_rest_error(const gc_parameters *parameters) {
+  return REST_COUNTS * gc_parameter_real(parameters, GC_TRAVEL_PER_COUNT);
+}
+
 static void advance(gc_position_loop *loop, float target, float acceleration, float fastest, float dt) {
   const float remaining = target - loop->setpoint;
   const float change = acceleration * dt;
@@ -38,8 +42,7 @@ float gc_position_loop_step(gc_position_loop *loop, const gc_parameters *paramet
   const float lag = wanted - input->velocity;
   const float proportional = gc_parameter_real(parameters, GC_VELOCITY_GAIN) * lag +
                              input->pull / gc_parameter_real(parameters, GC_NEWTON_PER_AMPERE);
-  const float rest_error = REST_COUNTS * gc_parameter_real(parameters, GC_TRAVEL_PER_COUNT);
-  const bool at_rest = gc_abs(error) < rest_error && gc_abs(loop->setpoint_velocity) <= 0.0f;
+  const bool at_rest = gc_abs(error) < gc_position_loop_rest_error(parameters) && gc_abs(loop->setpoint_velocity) <= 0.0f;
   float integral = loop->integral;
   if (!at_rest) {
     integral += gc_parameter_real(parameters, GC_VELOCITY_INTEGRAL) * lag * input->dt;

@@ -13,6 +13,9 @@ typedef struct {
 // Start at rest at a displacement (m) with a current (A) that holds the cable there.
 void gc_position_loop_reset(gc_position_loop *loop, float displacement, float holding);
 
+// Distance (m) from its target within which the loop is at rest.
+float gc_position_loop_rest_error(const gc_parameters *parameters);
+
 // What a step needs in addition to the parameters.
 typedef struct {
   float target;        // m

@@ -17,6 +17,7 @@ REAL = frozenset(
         "travel_per_count", "displacement_min", "displacement_max", "velocity_limit", "acceleration_limit", "position_gain",
         "velocity_gain", "velocity_integral", "newton_per_ampere", "tension_limit", "pretension", "homing_velocity",
         "homing_travel", "homing_slack", "following_error", "overspeed", "heater_gain", "heater_integral_time",
+        "backlash", "take_up_time",
     }
 )  # fmt: skip
 """Parameters that are float32."""
@@ -121,6 +122,8 @@ def settings_of(hardware: Hardware, *, between: bool) -> dict[str, float]:
         "following_error": watchdog.following_error,
         "overspeed": watchdog.overspeed,
         "stall_time": round(1000.0 * watchdog.stall_time),
+        "backlash": drive.backlash * drive.capstan_radius,
+        "take_up_time": drive.take_up_time,
     }
 
 

@@ -1,0 +1,69 @@
+#include "take_up.h"
+
+#include "maths.h"
+#include "position_loop.h"
+
+#define SPREAD (1.0f / 3.0f)  // of the described backlash, by which that of a gear is larger at most
+#define LEAST 0.2f            // of the backlash: what is left loose, and by how much a target moves that stays
+#define WAY (1.0f / 3.0f)     // of the rest before: time in which the motor winds in again
+#define STAYS 5.8284271f      // (1 + sqrt(2))^2: stays of a target that creeps, after which it rests
+#define CREEPS 2.0f           // bands: a target that has gone farther between two steps has not crept
+#define LATEST 30.0f          // of the rest: a small step after a long rest is taken up, too
+
+void gc_take_up_reset(gc_take_up *take_up) { gc_zero(take_up, sizeof *take_up); }
+
+// For how long (s) a target has to stay in its new band until it is at rest.
+static float next_rest(const gc_take_up *take_up, float target, float least, float rest_time) {
+  const bool crept = take_up->started && gc_abs(target - take_up->kept) <= CREEPS * least;
+  return crept ? gc_min(gc_max(1.0f, STAYS * take_up->since / rest_time), LATEST) * rest_time : rest_time;
+}
+
+// Follow the rotor inside a backlash of `width`, and for how long the target stays within `least`.
+static void observe(gc_take_up *take_up, float target, float displacement, float width, float least, float rest_time) {
+  const float moved = take_up->started ? displacement - take_up->last : 0.0f;
+  take_up->loose = gc_min(width, gc_max(0.0f, take_up->loose - moved));
+  take_up->last = displacement;
+  if (!take_up->started || gc_abs(target - take_up->kept) > least) {
+    take_up->rest = next_rest(take_up, target, least, rest_time);
+    take_up->kept = target;
+    take_up->since = 0.0f;
+    take_up->done = false;
+    take_up->phase = GC_TAKEN_UP;
+  }
+  take_up->started = true;
+}
+
+gc_way gc_take_up_step(gc_take_up *take_up, const gc_parameters *parameters, float target, float displacement, float dt) {
+  const float play = gc_parameter_real(parameters, GC_BACKLASH);
+  const float rest_time = gc_parameter_real(parameters, GC_TAKE_UP_TIME);
+  const float rest_error = gc_position_loop_rest_error(parameters);
+  const float width = (1.0f + SPREAD) * play, least = LEAST * play;
+  const float over = width + 2.0f * rest_error, farthest = gc_parameter_real(parameters, GC_DISPLACEMENT_MIN);
+  const float out = gc_max(target - over, farthest);  // the target may tremble after the take-up has begun
+  gc_way way = {.target = target, .fastest = gc_parameter_real(parameters, GC_VELOCITY_LIMIT)};
+  if (rest_time <= 0.0f || least <= rest_error) {
+    return way;
+  }
+  observe(take_up, target, displacement, width, least, rest_time);
+  take_up->since = gc_min(LATEST * rest_time, take_up->since + dt);
+  const bool rests = !take_up->done && take_up->since >= take_up->rest;
+  const bool has_room = target - over >= farthest;
+  if (take_up->phase == GC_TAKEN_UP && rests && take_up->loose > least && has_room) {
+    take_up->phase = GC_TAKE_UP_OUT;
+    take_up->done = true;
+  }
+  if (take_up->phase == GC_TAKE_UP_OUT && displacement <= out + rest_error) {
+    take_up->phase = GC_TAKE_UP_IN;
+  }
+  if (take_up->phase == GC_TAKE_UP_IN && displacement >= target - rest_error) {
+    take_up->phase = GC_TAKEN_UP;
+  }
+  if (take_up->phase == GC_TAKE_UP_OUT) {
+    way.target = out;
+  } else if (take_up->phase == GC_TAKE_UP_IN) {
+    way.fastest = gc_min(way.fastest, over / (WAY * rest_time));
+  } else {
+    // It stays on its target.
+  }
+  return way;
+}

@@ -1,0 +1,38 @@
+// Taking up the backlash of a gear: a motor at rest ends on the flank that winds in, as gravcomp.motors.take_up describes it.
+//
+//     x = min(w, max(0, x_last - (d - d_last))),   d: displacement of the rotor; 0: on the flank that winds in
+//
+// Where its target rests and the gear may be loose by x, the motor pays out by the largest backlash w and winds in again, once.
+#ifndef GC_TAKE_UP_H
+#define GC_TAKE_UP_H
+
+#include <stdbool.h>
+
+#include "parameters.h"
+
+typedef enum { GC_TAKEN_UP, GC_TAKE_UP_OUT, GC_TAKE_UP_IN } gc_take_up_phase;
+
+// Zeros: the gear is on the flank that winds in, as homing leaves it, and no target is known.
+typedef struct {
+  bool started;  // last and kept are known
+  float last;    // m, displacement of the rotor
+  float loose;   // m, by which the gear may be loose
+  float kept;    // m, target that stays
+  float since;   // s for which it stays
+  float rest;    // s after which it is at rest: longer where it creeps
+  bool done;     // the motor has gone out for it
+  gc_take_up_phase phase;
+} gc_take_up;
+
+// Where a motor goes now on its way to its target.
+typedef struct {
+  float target;   // m
+  float fastest;  // m/s
+} gc_way;
+
+void gc_take_up_reset(gc_take_up *take_up);
+
+// The way to `target` (m); displacement (m) is that of the rotor, `dt` (s) the time since the last step.
+gc_way gc_take_up_step(gc_take_up *take_up, const gc_parameters *parameters, float target, float displacement, float dt);
+
+#endif
