@@ -223,7 +223,9 @@ class _Tips:
 
     def left_out(self, changes: list[np.ndarray]) -> list[str]:
         """Return the names of the loads without equilibrium, whose entries in the changes (l, 3) are NaN."""
-        lost = np.isnan(changes).any(axis=(0, 2)) if changes else np.zeros(0)
+        if not changes:
+            return []
+        lost = np.atleast_1d(np.isnan(changes).any(axis=(0, 2)))
         return [load.name for load, without in zip(self._loads, lost) if without]
 
     def _tips(self, elements: Elements, near: Elements | None = None) -> np.ndarray:
