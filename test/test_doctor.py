@@ -106,7 +106,7 @@ def test_the_doctor_finds_rates_delays_and_fitting_qos(gravcomp, robot, observer
     found = {}
 
     def regular() -> bool:
-        """Whether all topics come regularly, as far as a slow machine allows; half of the rate is a loop that leaves samples out."""
+        """Whether all topics come regularly, as far as a slow machine allows; a loop that leaves samples out has half."""
         answer = gravcomp("doctor", "--graph", "--namespace", NAMESPACE, "--json", ROS_DOMAIN_ID=DOMAIN)
         found.update({f["subject"]: f for f in answer.json["findings"]})
         return all(0.7 * wanted < rate < 1.1 * wanted for rate, wanted in (rates(found[name]) for name in RATED))
