@@ -35,9 +35,9 @@ def test_every_shipped_robot_is_read(name):
 
 
 def test_other_sections_are_returned_as_they_are(document, tmp_path):
-    document["hardware"] = {"motors": [1, 2]}
+    document["hardware"] = {"motors": [1, 2], "drive": {"capstan_radius_mm": 5.0}}
     file = load(document, tmp_path)
-    assert file.section("hardware") == {"motors": [1, 2]}
+    assert file.section("hardware") == {"motors": [1, 2], "drive": {"capstan_radius_mm": 5.0}}
     with pytest.raises(ConfigError, match="there is no section 'motor'"):
         file.section("motor")
 

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gravcomp.cache import cache_folder
 from gravcomp.commands import output
 
 
@@ -84,6 +83,8 @@ def _kept(check: Check) -> Iterator[list[str]]:
     if not check.keeps:
         yield []
         return
+    from gravcomp.cache import cache_folder
+
     folder = cache_folder(check.tool)
     with open(folder / "lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
