@@ -158,7 +158,11 @@ def make_plan(
     )
     predictor = StaticPredictor(robot, windows, near=shapes)
     initial = starting_parameters(robot, ())
-    unknowns = unknowns_of(robot, predictor.predict(initial), initial, None, priors)
+    try:
+        predicted = predictor.predict(initial)
+    except RuntimeError as error:  # an equilibrium that a search finds may not be reached from the other poses
+        raise ConfigError(f"robot '{robot.name}': {error}; no calibration can be planned") from None
+    unknowns = unknowns_of(robot, predicted, initial, None, priors)
     progress(f"planning: sensitivities of {len(candidates)} poses")
     derivatives = predictor.differentiate(initial, {unknown.kind for unknown in unknowns})
     scale = 1.0 / np.repeat([noise.position_share * robot.length, noise.direction], 3)
