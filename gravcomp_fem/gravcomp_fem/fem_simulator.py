@@ -6,6 +6,7 @@ model moves from one stamp to the next, starting at rest in the first equilibriu
 are added to gravity (`gravcomp.external_loads.base_turn`), from the rate in imu/data, if anybody publishes it.
 """
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -29,6 +30,8 @@ from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.inverse.limits import within_limits
 from gravcomp.launcher import model_builder
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.mesh.mesh import MeshError
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
 from gravcomp_fem.conversion import pose_message, seconds, vector_of
@@ -70,7 +73,8 @@ class FemSimulator(ManagedNode):
         cables = np.zeros(len(self.robot_file.robot.cables))
         straight = self._simulator.step(np.zeros(3), cables)
         within_limits(cables, cables, robot.limits, 0.0)
-        self._holdable = holdable_payload(straight, self._simulator.tip_compliance(), robot.limits.tension_max)  # kg
+        with contextlib.suppress(NotPositiveDefinite, MeshError):  # unstable, or without a section at its end
+            self._holdable = holdable_payload(straight, self._simulator.tip_compliance(), robot.limits.tension_max)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
         around = scene or self.robot_file.zones or not self.parameters.turn.enabled
         self._turn = None if around else BaseTurn(self._simulator.model, self.parameters.turn)

@@ -15,6 +15,7 @@ from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.full_model.wrench import Load, PointLoads
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.mesh.mesh import MeshError
 
 # Parts of the load in which it is applied where an obstacle has friction.
 _RUBBING_PART = 0.1
@@ -55,10 +56,10 @@ class StaticSolver(StaticTracker):
         there. The solver has to be at rest: the current state is that of `reset`.
         """
         load = AppliedLoad(self.model.weight(gravity), with_payload(self.model, gravity, loads), 1.0).at(self.state.u)
-        tip = np.kron(self.model.section_rows(1.0)[0, : self.model.n_free, None], np.eye(3))
         try:
+            tip = np.kron(self.model.section_rows(1.0)[0, : self.model.n_free, None], np.eye(3))
             sag = float(np.linalg.norm(self.compliance(np.column_stack([tip, load]), loads)[:3, 3]))
-        except NotPositiveDefinite:
+        except (NotPositiveDefinite, MeshError):  # unstable, or a body without a section at its end
             return 1.0
         return min(1.0, _SAG * self.model.length / sag) if sag > 0.0 else 1.0
 

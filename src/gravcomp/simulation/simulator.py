@@ -1,5 +1,6 @@
 """Quasi-static simulation of a robot as one object: gravity and cables in, shape and response out."""
 
+import contextlib
 import dataclasses
 import math
 import time
@@ -20,6 +21,8 @@ from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.shape import Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Load, PointLoads
+from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.mesh.mesh import MeshError
 from gravcomp.simulation.search_pace import SearchPace
 
 if TYPE_CHECKING:
@@ -108,7 +111,8 @@ class Simulator:
         for displacement in (None, slack, slack + _SMALL_PULL * self.model.length, slack):
             shape = self.step(np.zeros(3), displacement, duration=_SHORT_STEP)
             if shape.cable_tension.any():
-                self.solver.tip_compliance()  # a step keeps its tangent while the shape hardly changes; this one assembles it
+                with contextlib.suppress(NotPositiveDefinite, MeshError):  # a body without a section at its end has none
+                    self.solver.tip_compliance()  # a step keeps its tangent while the shape hardly changes; this assembles it
         self.reset()
 
     def step(
