@@ -18,7 +18,7 @@ from gravcomp.calibration.pose_report import error_bars, fitted_table, views
 from gravcomp.experiments.measured.folder_table import folder_table
 from gravcomp.experiments.measured.part import Part
 from gravcomp.experiments.measured.tdcr_fit import ChainFit, fit
-from gravcomp.experiments.measured.tdcr_model import CHAIN, UNKNOWNS, Pulls, read, values
+from gravcomp.experiments.measured.tdcr_model import CHAIN, COLUMNS, UNKNOWNS, Pulls, read, values
 from gravcomp.report.result import Figure
 
 CONSTANT_CURVATURE = 7.0  # mm: with eleven fitted parameters, without the single pulls
@@ -80,7 +80,7 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
         ),
         Figure("tdcr: tip, fitted, RMSE", 1e3 * rms_distance((inside - pulls.tip)[several]), "mm"),
     ]
-    others = {path.name: other_table(path, whole) for path in _others(table.path)}
+    others = {other.path.name: other_table(other, whole) for other in _others(table)}
     figures += [Figure(f"tdcr: {name}, predicted by the fit to {table.path.name}, RMSE", v, "mm") for name, v in others.items()]
     scatters = {
         "tdcr: pulls of single tendons, five-fold, RMSE": alone,
@@ -121,18 +121,19 @@ def evaluate(folder: Path, progress: Callable[[str], None], brief: bool) -> Part
     )
 
 
-def other_table(path: Path, whole: ChainFit) -> float:
+def other_table(table: CsvTable, whole: ChainFit) -> float:
     """Return the root mean square error in mm of another table, without the pulls of single tendons where there are others."""
-    pulls = read(CsvTable.read(path))
+    pulls = read(table)
     if not len(pulls.tip):
-        raise MeasurementError(f"{path}: contains no rows below its header")
+        raise MeasurementError(f"{table.path}: contains no rows below its header")
     error = whole.predict(pulls) - pulls.tip
     return 1e3 * rms_distance(error if pulls.single.all() else error[~pulls.single])
 
 
-def _others(path: Path) -> list[Path]:
-    """Return the other tables of the folder of a table."""
-    return sorted(other for other in path.parent.glob("*.csv") if other != path)
+def _others(table: CsvTable) -> list[CsvTable]:
+    """Return the other tables of the folder of a table that have pulls and tips."""
+    paths = sorted(other for other in table.path.parent.glob("*.csv") if other != table.path)
+    return [other for other in map(CsvTable.read, paths) if set(COLUMNS) <= set(other.header)]
 
 
 def _estimates(whole: ChainFit) -> list[PoseEstimate]:

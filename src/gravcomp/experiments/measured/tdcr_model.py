@@ -17,6 +17,10 @@ from gravcomp.calibration.chain import Chain
 from gravcomp.calibration.csv_table import CsvTable
 
 SERVOS = (4, 3, 9, 5, 2, 8, 6, 1, 7)  # three a segment, from the base
+_PULLED, _TIP = tuple(f"servo_{number}_mm" for number in SERVOS), ("tip_x", "tip_y", "tip_z")
+COLUMNS = ("pattern_label", *_PULLED, *_TIP)
+"""Columns that a table must have."""
+
 CHAIN = Chain(np.array([60e-3, 62.5e-3, 64e-3]), 4.5e-3, 8e-3, np.repeat([0, 1, 2], 3))
 ANGLES = np.radians([190.0, -145.0, -120.0])  # of the first tendon of each segment; from the columns of a linear fit
 STIFFNESS = np.log(4.0e6)  # of the tendons over the bending stiffness, in 1/m^3
@@ -98,9 +102,8 @@ def read(table: CsvTable) -> Pulls:
 
     The part of a pattern in which it is held, and its repetitions, bear the name of the pattern.
     """
-    servos, tip = [f"servo_{number}_mm" for number in SERVOS], [f"tip_{axis}" for axis in "xyz"]
-    table.require(["pattern_label", *servos, *tip])
-    displacement, places = table.vectors(servos, 1e-3), table.vectors(tip, 1e-3)
+    table.require(COLUMNS)
+    displacement, places = table.vectors(_PULLED, 1e-3), table.vectors(_TIP, 1e-3)
     order = np.arange(len(table.rows))
     if "timestamp" in table.header:
         order = np.argsort(table.numbers("timestamp"), kind="stable")
