@@ -3,6 +3,7 @@
 import dataclasses
 import os
 import signal
+import subprocess
 import time
 
 import numpy as np
@@ -35,7 +36,11 @@ def worker(monkeypatch):
     worker.close()
 
 
-def test_a_process_answers_as_one_that_computes_at_once_and_is_replaced_when_it_dies(worker):
+def refused(*_, **__):
+    raise OSError("no memory")
+
+
+def test_a_process_answers_as_one_that_computes_at_once_and_is_replaced_when_it_dies(worker, monkeypatch):
     assert worker.exchange(QUESTION) == []  # it imports, and this process goes on
     (answer,) = until(lambda: worker.exchange(QUESTION))
     (same,) = AtOnce(AnchoredModel(RobotModel(ROBOT))).exchange(QUESTION)
@@ -50,6 +55,9 @@ def test_a_process_answers_as_one_that_computes_at_once_and_is_replaced_when_it_
     assert again.found.carried == pytest.approx(same.found.carried, rel=1e-9)  # from rest, not from its last shape
     os.kill(worker.pid, signal.SIGKILL)
     assert "exit code -9" in until(lambda: (worker.exchange(QUESTION), worker.sentence)[1])
+    with monkeypatch.context() as full:
+        full.setattr(subprocess, "Popen", refused)
+        assert worker.exchange(QUESTION) == [] and "does not start: no memory" in worker.sentence
     assert until(lambda: worker.exchange(QUESTION)) and worker.sentence == ""
     second = psutil.Process(worker.pid)
     worker.close()

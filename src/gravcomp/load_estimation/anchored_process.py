@@ -38,7 +38,11 @@ class AnchoredProcess:
         if self._process is None:
             if time.monotonic() - self._started < _PAUSE:
                 return answers
-            self._process, self._connection = self._start()
+            try:
+                self._process, self._connection = self._start()
+            except OSError as error:
+                self.sentence = f"the process of the second model does not start: {error}"
+                return answers
         try:
             while self._connection.poll():
                 received = self._connection.recv()
