@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import null_space
 from scipy.spatial.transform import Rotation
 
-from gravcomp.bench.contact import scene_of, slender_rod
+from gravcomp.bench.contact import slender_rod
+from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
 from gravcomp.description import Elements, load_robot_file

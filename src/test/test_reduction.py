@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from coarse_article import SMALL, built_once, cache_of_the_run, coarse
 
-from gravcomp.bench.contact import scene_of
+from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.description import Fibres, PronyTerm
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mesh import MeshError, tube_mesh

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from arc_robot import LENGTH, STATIONS, ArcRobot, centre_line, description
 
-from gravcomp.bench.contact import scene_of
+from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target

@@ -6,25 +6,22 @@ What a scene that is wrong does to the loop is in `wrong_scene`, the virtual rob
 import dataclasses
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gravcomp.config import from_mapping
+from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, random_scene, scene_of, seeded_gravity
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.references.calculix_contact import Rest, cylinder, stored_rests
 from gravcomp.references.contact_beams import buckled_in_tube, laid_on_plane, over_peg, pressed_on_plane
-from gravcomp.scene import SceneSection
 from gravcomp.scene.scene import Scene
 from gravcomp.simulation import RobotModel, Simulator
 
 Progress = Callable[[str], None]
 
-_GRAVITY = 9.81
 _SCENES, _STEPS = 200, 20  # seeded scenes, and steps of motion in each
 _TIMED, _BRIEFLY_TIMED = 120, 30  # steps, of which the first 20 do not count
 _TURN, _INTERVAL = np.deg2rad(2.0), 0.01  # of gravity in a step, rad; s
@@ -35,18 +32,13 @@ _SMALL = 0.01  # deflection of the closed forms, of the length
 
 def run(progress: Progress, *, every: int = 1) -> dict:
     """Return all figures, with every `every`-th of the scenes; see the functions below, `contact_rods` and `wrong_scene`."""
-    from gravcomp.bench.contact_rods import rods  # the virtual robot, which tests of `scene_of` do not need
+    from gravcomp.bench.contact_rods import rods  # the virtual robot, which tests of `slender_rod` do not need
     from gravcomp.bench.wrong_scene import wrong_scene
 
     return {
         **accuracy(progress), **motion(progress, every), **rods(progress, every), **step_time(progress, every),
         **wrong_scene(progress),
     }  # fmt: skip
-
-
-def scene_of(**kinds: Any) -> Scene:
-    """Return a scene of the obstacles that a section `scene` would have."""
-    return Scene(from_mapping(SceneSection, kinds, source="scene", key="scene"))
 
 
 def slender_rod() -> Robot:
@@ -96,7 +88,7 @@ def accuracy(progress: Progress) -> dict:
     low = -0.5 * model.robot.segments[0].outer_diameter
     for rest in stored_rests():
         plane = scene_of(planes=[{"normal": [1, 0, 0], "point_mm": [1e3 * (low - rest.gap), 0, 0]}])
-        shape = Simulator(model, reduced=False, scene=plane).solve(np.array([-_GRAVITY, 0.0, 0.0]))
+        shape = Simulator(model, reduced=False, scene=plane).solve(np.array([-GRAVITY, 0.0, 0.0]))
         errors[f"CalculiX, {1e3 * rest.gap:g} mm over a plane"] = _from_calculix(shape, rest, model.length)
     worst = max(max(pair.values()) for pair in errors.values())
     return {"contact_error_pct": worst, "contact_by_case_pct": errors}
@@ -155,11 +147,6 @@ class SceneMotion:
     steps: int
 
 
-def moved_robot() -> Robot:
-    """Return the robot of the seeded scenes: the article's, with fewer elements."""
-    return dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=6, along=10))
-
-
 def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
     """Turn gravity in the scene of a seed, there and back. None where `solve` does not enter it from the straight robot."""
     simulator, start = Simulator(model, reduced=False, scene=random_scene(seed, model.robot)), seeded_gravity(seed)
@@ -185,40 +172,6 @@ def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
         moved, last = simulator.displacements.copy(), gravity
     gained = (model.elements.energy(moved) - net) / whole if whole else 0.0
     return SceneMotion(deepest, gained, bool(len(shape.contacts)), lost, len(angles))
-
-
-def random_scene(seed: int, robot: Robot, rough: bool = True) -> Scene:
-    """Return an obstacle in the way of a sagging robot: a plane, a ball, a peg, a cuboid or a tube, some of them `rough`."""
-    rng = np.random.default_rng(seed)
-    length, radius = 1e3 * robot.length, 0.5e3 * robot.segments[0].outer_diameter
-    place, deep = rng.uniform(0.5, 1.0) * length, rng.uniform(0.03, 0.15) * length
-    friction = float(rng.choice([0.0, 0.3])) * rough
-    angle = rng.uniform(-0.3, 0.3)
-    down = np.array([-np.cos(angle), np.sin(angle), 0.0])
-    common = {"friction": friction}
-    size = rng.uniform(0.5, 2.0) * radius
-    middle = (down * (radius + deep + size) + [0.0, 0.0, place]).tolist()
-    kind = seed % 5
-    if kind == 0:
-        return scene_of(planes=[common | {"normal": (-down).tolist(), "point_mm": (down * (radius + deep)).tolist()}])
-    if kind == 1:
-        return scene_of(spheres=[common | {"centre_mm": middle, "radius_mm": size}])
-    across = np.cross(down, [0.0, 0.0, 1.0]) * length
-    if kind == 2:
-        ends = [(np.array(middle) - across).tolist(), (np.array(middle) + across).tolist()]
-        return scene_of(tubes=[common | {"points_mm": ends, "radius_mm": [size], "side": "outside"}])
-    if kind == 3:
-        box = {"centre_mm": middle, "size_mm": [2 * size] * 3, "rpy_deg": [0.0, 0.0, float(np.degrees(-angle))]}
-        return scene_of(boxes=[common | box])
-    bend = rng.uniform(-0.2, 0.2, 2) * length
-    line = [[0, 0, -length / 5], [0, 0, length / 3], [bend[0] / 2, bend[1] / 2, length], [bend[0], bend[1], 1.5 * length]]
-    return scene_of(tubes=[common | {"points_mm": line, "radius_mm": [radius + deep / 2]}])
-
-
-def seeded_gravity(seed: int) -> np.ndarray:
-    """Return gravity (3,) in m/s^2 for a robot that lies nearly horizontal."""
-    tilt = np.random.default_rng(1000 + seed).uniform(-0.3, 0.3)
-    return _GRAVITY * np.array([-np.cos(tilt), 0.0, np.sin(tilt)])
 
 
 def timed_scenes() -> dict[str, Scene]:
@@ -253,11 +206,11 @@ def _timed(scene: Scene, reduced: bool, count: int) -> dict[str, float]:
     """Return the time of a step of the article's robot whose base turns, ms, median places, and share of reduced steps."""
     robot = load_robot_file("article").robot
     simulator, controller = Simulator(robot, reduced=reduced, scene=scene), InverseController(robot)
-    target, shape = straight_target(simulator.model.length), simulator.solve(np.array([-_GRAVITY, 0.0, 0.0]))
+    target, shape = straight_target(simulator.model.length), simulator.solve(np.array([-GRAVITY, 0.0, 0.0]))
     times, places, used = [], [], 0
     for step in range(count):
         angle = 0.3 * np.sin(0.02 * step)
-        gravity = _GRAVITY * np.array([-np.cos(angle), np.sin(angle), 0.0])
+        gravity = GRAVITY * np.array([-np.cos(angle), np.sin(angle), 0.0])
         started = time.process_time()
         shape = simulator.step(gravity)
         controller.step(

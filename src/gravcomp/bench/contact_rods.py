@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gravcomp.bench.contact import moved_robot, random_scene, seeded_gravity
+from gravcomp.bench.contact_scenes import moved_robot, random_scene, seeded_gravity
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.description.hardware import Hardware
 from gravcomp.scene.scene import Scene
