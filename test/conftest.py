@@ -161,7 +161,7 @@ def made(folder):
                 cwd=folder,
                 capture_output=True,
                 text=True,
-                timeout=700,
+                timeout=1500,
                 start_new_session=True,
                 preexec_fn=_give_way if low else None,
             )

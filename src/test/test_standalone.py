@@ -206,12 +206,13 @@ def test_the_forces_of_a_turning_base_are_those_of_the_host(parameters, built, f
     """Over lost samples, one of an unknown kind, and a pause after which the rates begin again."""
     estimator = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))
     mount, turn, loop = parameters.robot.imu_mount.rotation, BaseTurn(built[0], parameters.turn), StandaloneLoop(found.blob)
-    worst = largest = 0.0
+    orientation, worst, largest = quat.IDENTITY, 0.0, 0.0
     for k in range(600):
+        gyro = np.array([1.0, -0.5, 0.3]) * np.sin(0.05 * k)
+        orientation = quat.normalised(quat.multiply(orientation, quat.exponential(*(0.01 * gyro))))
         if k in (200, 201) or 400 <= k < 420:
             continue
-        gyro = np.array([1.0, -0.5, 0.3]) * np.sin(0.05 * k)
-        accel = np.full(3, np.nan) if k == 300 else np.array([0.0, 0.0, 9.81])
+        accel = np.full(3, np.nan) if k == 300 else np.array(quat.rotate(quat.conjugate(orientation), (0.0, 0.0, 9.81)))
         estimate = estimator.update(k * 10_000_000, gyro.tolist(), accel.tolist())
         if not isinstance(estimate, Problem):
             turn.add(0.01 * k, mount @ np.array(estimate.imu.angular_velocity))
