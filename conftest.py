@@ -4,11 +4,12 @@ With its own domain, a test does not hear the nodes of a test that runs at the s
 
 Marks of the tests that start a graph of nodes, which is slow where others take its processors:
 
-    graph    it waits for events: another such test may run next to it
+    graph    it waits for events: another such test may run next to it where there are processors for two graphs
     rates    it asserts rates or delays: no other graph runs meanwhile
 
 All tests with the mark `rates` run in one process, one after the other. They begin first; next to them run tests without a graph,
-those that take longest first. A test of the commands in test/ without a mark starts no graph that goes on.
+those that take longest first. With fewer than four processors the tests with the mark `graph` follow in the same process. A test
+of the commands in test/ without a mark starts no graph that goes on.
 """
 
 import fcntl
@@ -25,6 +26,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _COMMANDS = Path(__file__).parent / "test"
 _SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
+# A graph takes up to 0.9 of a processor: beside the other tests two of them starve on two.
+_ONE_GRAPH = (os.cpu_count() or 1) < 4
 # Modules that begin first among their kind, in this order: those that take longest. pytest-xdist gives a process that has at most
 # two tests left its next module at once, so a short one comes behind each that has a single long test.
 FIRST = (
@@ -93,7 +96,8 @@ def _mark(item: pytest.Item) -> str:
 def _group(item: pytest.Item) -> str:
     """Return the name of the tests that run in one process, one after the other: those of a module, which share its fixtures."""
     mark = _mark(item)
-    return mark if mark == "rates" else f"{item.path.stem}-{mark}".strip("-")
+    alone = mark == "rates" or (mark and _ONE_GRAPH)
+    return "rates" if alone else f"{item.path.stem}-{mark}".strip("-")
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

@@ -160,8 +160,8 @@ class Ros2:
         assert self.ask(ChangeState, f"{node}/change_state", ChangeState.Request(transition=Transition(id=transition))).success
         return "Transitioning successful"
 
-    def until(self, done, what: str) -> None:
-        end = time.monotonic() + PATIENCE
+    def until(self, done, what: str, patience: float = PATIENCE) -> None:
+        end = time.monotonic() + patience
         while not done():
             assert time.monotonic() < end, what
             self._executor.spin_once(0.05)

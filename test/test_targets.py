@@ -27,9 +27,9 @@ def ros2(graph):
 
 
 def test_the_status_says_whether_the_target_can_be_held(graph, ros2):
-    """The answer comes some seconds after the start, from a process of low priority."""
+    """The answer comes some seconds after the start, from a process of low priority, which waits for the other tests."""
     statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
-    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "no answer comes")
+    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "no answer comes", 500.0)
     assert statuses[-1].holdable == 1 and "the cables hold the tip" in statuses[-1].hold_message
 
 
