@@ -12,8 +12,8 @@ pytestmark = pytest.mark.timeout(1600)
         pytest.param("./gravcomp reproduce all --write src/doc/figures.md", "index", marks=pytest.mark.graph),
     ],
 )
-def test_experiments_are_reproduced(made, line, about):
+def test_experiments_are_reproduced(made, apart, line, about):
     """Without --brief all of them take minutes. `test_figures_table` checks what --write does with a document."""
-    code, output = made(line, low=True)  # also next to the graph of another test
+    code, output = made(line, low=bool(apart))
     # 1: a figure misses its limit, which can happen in a brief run.
     assert code in (0, 1) and about in output, output
