@@ -80,6 +80,22 @@ def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
         make_plan(heavy, PERIOD, orientations=orientations)
 
 
+@pytest.mark.parametrize("limits", [{"displacement_min": -1e-6, "displacement_max": 1e-6}, {"tension_max": 2e-4}])
+def test_a_plan_whose_pulls_nobody_can_see_is_refused(robot, limits):
+    weak = dataclasses.replace(robot, limits=Limits(**{"tension_max": 2.0, **limits}))
+    with pytest.raises(
+        ConfigError, match=r"displacement_max_mm: .* by more than [\d.e-]+ mm.* uncertain by 0\.16 mm and 0\.5 deg"
+    ):
+        make_plan(weak, PERIOD, orientations=planning.ORIENTATIONS[:1])
+
+
+def test_cables_with_a_short_stroke_are_pulled_as_far_as_it_allows(robot):
+    short = dataclasses.replace(robot, limits=Limits(tension_max=2.0, displacement_max=1e-6))
+    poses = make_plan(short, PERIOD, orientations=planning.ORIENTATIONS[:1]).poses
+    moved = [np.linalg.norm(pose.tip - poses[0].tip) for pose in poses if pose.pulled]
+    assert max(moved) > 1e-3 and max(pose.displacement.max() for pose in poses) <= 1e-6
+
+
 def test_a_plan_is_read_as_it_was_saved(plan, tmp_path):
     save_plan(plan, tmp_path / "plan.json")
     read = load_plan(tmp_path / "plan.json")

@@ -137,14 +137,16 @@ def make_plan(
     orientations: tuple[tuple[float, float], ...] = ORIENTATIONS,
     inverse: InverseOptions | None = None,
 ) -> Plan:
-    """Return the plan for a robot with the first period `period` in s. Raises ConfigError where the limits allow no pose.
+    """Return the plan for a robot with the first period `period` in s.
+
+    Raises ConfigError where the limits allow no pose, and where no pull that they allow shows in a measured tip.
 
     orientations: candidates, inclination and roll of the base in rad; inverse: of the controller, to hold the robot in its shape
     at rest in some of the poses; None: only one cable at a time is pulled, as by hand.
     """
     options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
     robot = with_coarse_elements(robot)
-    candidates, usual, shapes = _candidates(robot, transmission, options, progress, orientations, inverse)
+    candidates, usual, shapes = _candidates(robot, transmission, options, noise, progress, orientations, inverse)
     if not candidates:
         raise ConfigError(
             f"robot '{robot.name}': in none of {len(orientations)} orientations has the released robot an equilibrium within"
@@ -191,6 +193,7 @@ def _candidates(
     robot: Robot,
     transmission: Transmission | None,
     options: PlanOptions,
+    noise: TipNoise,
     progress: Callable[[str], None],
     orientations: tuple[tuple[float, float], ...],
     inverse: InverseOptions | None,
@@ -198,6 +201,7 @@ def _candidates(
     """Return the poses that the limits allow, whether each is measured at every station, and their shapes."""
     simulator = Simulator(robot, reduced=False)
     found: list[tuple[PlannedPose, bool, Equilibrium]] = []
+    moves: list[tuple[float, float]] = []
     count = len(robot.cables)
     slack = options.slack * robot.length
     for number, (inclination, roll) in enumerate(orientations):
@@ -208,13 +212,16 @@ def _candidates(
             continue
         released = _pose(robot, inclination, roll, free, np.zeros(count), slack, transmission)
         found.append((released, True, simulator.solver.state))
-        turns = np.linalg.norm(free.response.compliance_ea[3:6], axis=0)
-        largest = np.minimum(options.tension * robot.limits.tension_max, options.bend / np.maximum(turns, 1e-12))
-        for one in np.eye(count):
+        largest = _largest_tension(robot, free, options)
+        moves += [(0.0, 0.0)] * int((largest == 0.0).sum())
+        for one in np.eye(count)[largest > 0.0]:
             for level in _LEVELS:
                 tension = level * largest * one
                 shape = simulator.solve(gravity, tension=tension)
-                if shape.is_equilibrium and _turned(shape, free) <= _FARTHER * options.bend:
+                if not shape.is_equilibrium:
+                    continue
+                moves.append((float(np.linalg.norm(shape.tip_position - free.tip_position)), _turned(shape, free)))
+                if moves[-1][1] <= _FARTHER * options.bend:
                     pose = _pose(robot, inclination, roll, shape, tension, slack, transmission)
                     found.append((pose, False, simulator.solver.state))
         held = None if inverse is None or not count else held_at_rest(simulator, robot, transmission, inverse, gravity)
@@ -222,9 +229,42 @@ def _candidates(
         if held is not None and 0.0 < strongest <= options.tension * robot.limits.tension_max:
             pose = _pose(robot, inclination, roll, held, held.cable_tension, slack, transmission)
             found.append((pose, True, simulator.solver.state))
+    if moves:
+        _refuse_unseen(np.array(moves), robot, options, noise)
     found = [entry for entry in found if entry[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
     poses, usual, shapes = zip(*found) if found else ((), (), ())
     return list(poses), list(usual), list(shapes)
+
+
+def _largest_tension(robot: Robot, free: Shape, options: PlanOptions) -> np.ndarray:
+    """Return the tension (m,) in N up to which each cable is pulled: within its limits, and as far as the tip may turn.
+
+    Turn and stroke are those of the linear response of the released robot.
+    """
+    limits, response = robot.limits, free.response
+    turns = np.linalg.norm(response.compliance_ea[3:6], axis=0)
+    stroke = limits.displacement_max - np.maximum(free.cable_displacement, limits.displacement_min)
+    by_stroke = np.maximum(stroke, 0.0) / np.maximum(np.diag(response.compliance_aa), 1e-12)
+    return np.minimum(np.minimum(options.tension * limits.tension_max, options.bend / np.maximum(turns, 1e-12)), by_stroke)
+
+
+def _refuse_unseen(moves: np.ndarray, robot: Robot, options: PlanOptions, noise: TipNoise) -> None:
+    """Raise ConfigError where no pull moves the tip by the deviation of a measured one.
+
+    moves (k, 2): for each pull the tip's way in m and its turn in rad.
+    """
+    farthest, turn = moves.max(axis=0)
+    deviation = noise.position_share * robot.length
+    if farthest < deviation and turn < noise.direction:
+        limits = robot.limits
+        raise ConfigError(
+            f"robot '{robot.name}': within robot.limits (displacement_min_mm: {1e3 * limits.displacement_min:.3g},"
+            f" displacement_max_mm: {1e3 * limits.displacement_max:.3g}, and"
+            f" {options.tension:.0%} of tension_max: {limits.tension_max:.3g}) no cable moves the tip by more than"
+            f" {1e3 * farthest:.2g} mm and turns it by more than {math.degrees(turn):.2g} deg. A measured tip is uncertain by"
+            f" {1e3 * deviation:.2g} mm and {math.degrees(noise.direction):.2g} deg; at least one of them is needed to plan a"
+            " calibration"
+        )
 
 
 def _turned(shape: Shape, free: Shape) -> float:
