@@ -43,6 +43,27 @@ def test_a_tube_bends_by_its_weight_as_a_cantilever(robot):
     assert bend_by_own_weight(robot(50, 4, 2.0).robot) == pytest.approx(expected, rel=2e-3)
 
 
+def test_a_tube_from_a_file_gets_the_capstans_of_the_described_one(robot, tmp_path):
+    creation = pytest.importorskip("trimesh.creation")
+    described = robot(50, 4, 2.0)
+    section = described.sections["robot"]
+    tube = creation.cylinder(2.0, 50.0, sections=48)
+    tube.apply_translation([0.0, 0.0, 25.0])
+    tube.export(tmp_path / "tube.stl")
+
+    def capstan(file):
+        body = {"file": file, "length_mm": 50.0, "material": section["segments"][0]["material"], "axis": "auto"}
+        cables = [{"end_mm": 50.0} | {k: v for k, v in cable.items() if k != "segment"} for cable in section["cables"]]
+        path = tmp_path / "from_file.yaml"
+        path.write_text(yaml.safe_dump({"robot": {"name": "tube", "body": body, "cables": cables}}))
+        return load_robot_file(path).hardware.drive.capstan_radius
+
+    radius = described.hardware.drive.capstan_radius
+    assert radius < 0.5 * STANDARD.capstan_radius
+    assert capstan("tube.stl") == pytest.approx(radius, rel=0.02)  # the surface has flat sides
+    assert capstan("gone.stl") == STANDARD.capstan_radius  # refused where the body is needed
+
+
 @pytest.mark.parametrize(("length", "diameter", "modulus"), [(50, 4, 2.0), (40, 8, 0.3), (120, 6, 1.0)])
 def test_backlash_turns_the_tip_by_little_of_what_its_weight_does(robot, length, diameter, modulus):
     file = robot(length, diameter, modulus)
