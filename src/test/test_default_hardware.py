@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import pytest
 import yaml
@@ -120,7 +121,20 @@ def test_homing_pulls_no_more_than_the_robot_stands_or_is_refused(robot, length,
 def test_a_small_capstan_with_the_standard_homing_is_refused(robot):
     hardware = robot(40, 8, 0.3, drive={"capstan_radius_mm": 0.2}, hardware={"homing": {"current_rise": 0.06}}).hardware
     assert "54 N before it counts as taut, and 5 N are allowed" in hardware.strong_homing
-    assert "may be 0.0056 A" in hardware.strong_homing
+    assert "may be 0.0055 A" in hardware.strong_homing and "A larger capstan" in hardware.strong_homing
+
+
+@pytest.mark.parametrize("tension", [1.0, 5.0])
+def test_a_refused_homing_says_that_the_capstans_are_assumed_and_what_would_be_allowed(robot, tension):
+    motors = {"motors": MOTORS}
+    refused = robot(50, 4, 2.0, hardware=motors, tension_max=tension).hardware
+    assert "capstans of 0.27 mm are assumed" in refused.strong_homing
+    assert "the virtual robot needs no homing" in refused.strong_homing
+    rise = re.search(r"current_rise may be ([\d.]+) A", refused.strong_homing)
+    assert (rise is None) == (tension == 1.0)  # 0.0015 A is less than the key may be
+    if rise:
+        homed = robot(50, 4, 2.0, hardware=motors | {"homing": {"current_rise": float(rise[1])}}, tension_max=tension)
+        assert not homed.hardware.strong_homing
 
 
 def test_the_article_is_homed():
