@@ -34,6 +34,8 @@ def test_edge_units_become_si_and_come_back():
     ("mapping", "words"),
     [
         ({"tubes": [{"length_mm": -5}]}, ["f.yaml", "tubes[0].length_mm", "-5", "1 to 2000 mm"]),
+        ({"tubes": [{"length_mm": 0.05}]}, ["1 to 2000 mm (looks like m: 50 mm)"]),
+        ({"tubes": [{"length_mm": 0.5}]}, ["looks like cm: 5 mm or m: 500 mm"]),
         ({"tubes": [{"lenght_mm": 5}]}, ["f.yaml", "tubes[0].lenght_mm", "did you mean 'length_mm'"]),
         ({"tubes": [{}]}, ["f.yaml", "tubes[0].length_mm", "missing"]),
         ({"tubes": 3}, ["f.yaml", "tubes", "3", "list"]),

@@ -51,6 +51,14 @@ def test_imu_mount_rotates_from_the_imu_into_the_base(document, tmp_path):
     assert rotation @ rotation.T == pytest.approx(np.eye(3)) and np.linalg.det(rotation) == pytest.approx(1.0)
 
 
+def test_segments_in_another_unit_than_the_cables_are_named(document, tmp_path):
+    for segment in document["robot"]["segments"]:
+        segment["length_mm"] /= 10.0
+    document["robot"]["cables"] = [{"name": "c", "angle_deg": 0.0, "radius_mm": 3.0, "end_mm": 95.0}]
+    with pytest.raises(ConfigError, match=r"ends at 95 mm.* length 10 mm; the segments look like cm: they would be 100 mm long"):
+        load(document, tmp_path)
+
+
 def change(path, value):
     """Return a function that sets the entry at `path`, or removes it where the value is None."""
 

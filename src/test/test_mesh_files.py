@@ -120,6 +120,27 @@ def test_inches_are_named_as_a_possibility(tmp_path):
     assert placed(inches(tmp_path), unit=25.4e-3).length == pytest.approx(0.08)
 
 
+@pytest.mark.parametrize(
+    ("in_mm", "file_unit", "end", "message"),
+    [
+        (0.1, None, 0.070, r"looks like cm: with body\.file_unit_mm: 10 the body is 80 mm long"),
+        (1 / 25.4, 1e-3, 0.080, r"looks like inch: with body\.file_unit_mm: 25\.4 the body is 80 mm long"),
+        (
+            1e-3,
+            1e-3,
+            0.080,
+            r"0\.08 mm long with the unit mm, as declared; allowed: 1 to .*m \(80 mm\): file_unit_mm: 1000",
+        ),
+        (0.1, None, 0.008, r"it must lie inside \(the file: unit mm, guessed.*: 8 mm long\)"),
+    ],
+)
+def test_a_unit_that_does_not_suit_the_cables_is_named(tmp_path, in_mm, file_unit, end, message):
+    nodes, cells = cone()
+    body = MeshBody(write(tmp_path / "cone.vtk", in_mm * nodes, cells), file_unit=file_unit)
+    with pytest.raises(ValueError, match=message):
+        RobotModel(Robot("cone", body=body, cables=(Cable("c", angle=0.0, radius=2.2e-3, end=end),)))
+
+
 def test_a_length_that_is_a_little_off_is_put_right(tmp_path):
     with pytest.raises(MeshError, match="write length_mm: 80, or leave it out"):
         placed(write(tmp_path / "cone.vtk", *cone()), length=0.0805)

@@ -142,7 +142,8 @@ def _scalar(value: Any, kind: type, declared: Parameter, *, source: str, key: st
     below = declared.minimum is not None and kind in (int, float) and value < declared.minimum
     above = declared.maximum is not None and kind in (int, float) and value > declared.maximum
     if below or above or (declared.choices is not None and value not in declared.choices):
-        raise ConfigError(f"{source}: {key} is {_show(value)}; allowed: {declared.allowed()}")
+        likely = declared.likely_units(value) if below or above else ""
+        raise ConfigError(f"{source}: {key} is {_show(value)}; allowed: {declared.allowed()}{likely}")
     return value * declared.factor if kind is float else value
 
 
