@@ -127,12 +127,15 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             problem = pictures.take(address) if pictures else ""
             figures = {
                 **state["figures"],
+                "overloaded": _overloaded(state["figures"]),
                 "nodes": state["nodes"],
                 "board": args.board,
                 "seed": described(load_robot_file(args.robot), args.seed).seed,
                 "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
             }
     output.result(figures, _summary(figures))
+    if figures["overloaded"]:
+        output.note(figures["overloaded"])
     if unfinished and figures["full_model_pct"]:
         output.note(
             f"The full model served {figures['full_model_pct']:g} % of the evaluated time, more slowly, because the reduced model"
@@ -262,6 +265,14 @@ def _follow(
             if time.monotonic() > deadline:
                 raise TimeoutError(f"the run did not end; the nodes' output is in {processes.logs}")
             time.sleep(0.2)
+
+
+def _overloaded(figures: dict[str, Any]) -> str | None:
+    """Return why the judge's figures are those of an overloaded machine; None where it kept up."""
+    from gravcomp.evaluation.overload import overload
+
+    delay = figures["delay_ms"] and 1e-3 * figures["delay_ms"]["median"]
+    return overload(figures["imu_rate_hz"], figures["command_rate_hz"], delay)
 
 
 def _summary(figures: dict[str, Any]) -> "Table":
