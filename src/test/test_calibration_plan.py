@@ -57,8 +57,8 @@ def test_pulls_of_small_robots_are_not_rounded_away(robot, tmp_path, largest_mm,
     pose = PlannedPose(0.0, 0.0, np.array([1e-3 * largest_mm, np.nan, np.nan]), ("c0",), np.full(3, 0.1), np.zeros(3))
     assert shown in pulls(robot, pose)
     write_plan_table(Plan((pose,) * 3, (1.0,) * 3, 1.0, 1.0), robot, tmp_path / "plan.csv")
-    text = (tmp_path / "plan.csv").read_text().replace(",,,\n", ",0,0,80\n")
-    (tmp_path / "plan.csv").write_text(text)
+    text = (tmp_path / "plan.csv").read_text(encoding="utf-8").replace(",,,\n", ",0,0,80\n")
+    (tmp_path / "plan.csv").write_text(text, encoding="utf-8")
     read = read_plan_table(tmp_path / "plan.csv", robot.cable_names)
     assert read.displacement[0, 0] == pytest.approx(1e-3 * largest_mm, rel=1e-3)
 
@@ -109,9 +109,9 @@ def test_a_filled_table_becomes_windows_at_rest(robot, plan, tmp_path):
     assert is_plan_table(path)
     with pytest.raises(MeasurementError, match="0 rows have a tip"):
         read_plan_table(path, robot.cable_names)
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     filled = [lines[0], *(line.removesuffix(",,,") + ",-10.5,0.2,79" if n < 4 else line for n, line in enumerate(lines[1:]))]
-    path.write_text("\n".join(filled))
+    path.write_text("\n".join(filled), encoding="utf-8")
     windows = read_plan_table(path, robot.cable_names)
     assert len(windows.gravity) == 4
     np.testing.assert_allclose(windows.tip_position[0], [-10.5e-3, 0.2e-3, 79e-3])
@@ -174,15 +174,15 @@ def test_no_pose_is_lost_on_a_full_disk(robot, tmp_path, monkeypatch):
     session = LiveSession(robot, session_plan(), out)
     now = run(session, 0.0, 0.0, 3.5)
     assert session.finished == 1
-    first, fsync = out.read_text(), os.fsync
+    first, fsync = out.read_text(encoding="utf-8"), os.fsync
     monkeypatch.setattr(os, "fsync", full_disk)
     now = run(session, 1.0, run(session, 0.0, now, 3.5), 3.5)
     assert session.phase == Phase.DONE and not session.save()
     assert "No space left" in session.sentence() and "are kept" in session.sentence()
-    assert out.read_text() == first and [path.name for path in tmp_path.iterdir()] == ["live.csv"]
+    assert out.read_text(encoding="utf-8") == first and [path.name for path in tmp_path.iterdir()] == ["live.csv"]
     monkeypatch.setattr(os, "fsync", fsync)
     assert session.save() and session.unwritten == "" and "all 3 poses" in session.sentence()
-    assert out.read_text().startswith(first) and LiveSession(robot, session_plan(), out).finished == 3
+    assert out.read_text(encoding="utf-8").startswith(first) and LiveSession(robot, session_plan(), out).finished == 3
 
 
 def full_disk(number):

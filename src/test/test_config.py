@@ -65,7 +65,7 @@ def test_declared_parameters_list_edge_defaults():
 @pytest.mark.parametrize(("text", "words"), [("a: [1", ["line"]), ("a: 1\na: 2", ["line 2", "twice"]), ("\tb: 1", ["line 1"])])
 def test_broken_yaml_names_the_line(tmp_path, text, words):
     path = tmp_path / "robot.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as error:
         load_yaml(path)
     for word in [str(path), *words]:
@@ -76,7 +76,7 @@ def test_broken_yaml_names_the_line(tmp_path, text, words):
 def test_a_document_that_is_nested_too_deeply_is_refused(tmp_path, depth):
     """Libyaml ends the process where its stack overflows."""
     path = tmp_path / "robot.yaml"
-    path.write_text("[" * depth)
+    path.write_text("[" * depth, encoding="utf-8")
     with pytest.raises(ConfigError, match="is nested too deeply"):
         load_yaml(path)
 

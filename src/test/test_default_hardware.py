@@ -32,7 +32,7 @@ def robot(tmp_path):
             "limits": limits,
         }
         path = tmp_path / "tube.yaml"
-        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}, **(hardware or {})}}))
+        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}, **(hardware or {})}}), encoding="utf-8")
         return load_robot_file(path)
 
     return make
@@ -56,7 +56,7 @@ def test_a_tube_from_a_file_gets_the_capstans_of_the_described_one(robot, tmp_pa
         body = {"file": file, "length_mm": 50.0, "material": section["segments"][0]["material"], "axis": "auto"}
         cables = [{"end_mm": 50.0} | {k: v for k, v in cable.items() if k != "segment"} for cable in section["cables"]]
         path = tmp_path / "from_file.yaml"
-        path.write_text(yaml.safe_dump({"robot": {"name": "tube", "body": body, "cables": cables}}))
+        path.write_text(yaml.safe_dump({"robot": {"name": "tube", "body": body, "cables": cables}}), encoding="utf-8")
         return load_robot_file(path).hardware.drive.capstan_radius
 
     radius = described.hardware.drive.capstan_radius

@@ -12,12 +12,12 @@ from gravcomp.description import load_robot_file, shipped_robots
 
 @pytest.fixture
 def document():
-    return copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text()))
+    return copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text(encoding="utf-8")))
 
 
 def load(document, folder):
     path = folder / "robot.yaml"
-    path.write_text(yaml.safe_dump(document))
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
     return load_robot_file(path)
 
 

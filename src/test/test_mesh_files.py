@@ -246,7 +246,7 @@ def test_two_bodies_are_refused(tmp_path):
 )  # fmt: skip
 def test_ten_million_elements_are_refused_before_they_are_read(tmp_path, name, head):
     path = tmp_path / name
-    path.write_text(head)
+    path.write_text(head, encoding="utf-8")
     refused(path, "10000000 cells; body.elements_max allows 20000")
 
 
@@ -306,7 +306,7 @@ def test_a_body_off_the_base_is_refused(tmp_path):
     ("name", "words"), [("a.3ds", "'.3ds' is not read"), ("a.vtk", "not what '.vtk' stands for"), ("a.stl", "a.stl")]
 )
 def test_what_is_no_mesh_is_refused(tmp_path, name, words):
-    (tmp_path / name).write_text("no mesh")
+    (tmp_path / name).write_text("no mesh", encoding="utf-8")
     refused(tmp_path / name, words)
     refused(tmp_path / "missing.vtk", "does not exist")
 
@@ -315,7 +315,8 @@ def robot_file(folder, body: str) -> str:
     write(folder / "cone.vtk", *cone())
     (folder / "robot.yaml").write_text(
         f"robot:\n  name: cone\n  body: {{file: cone.vtk, {body}}}\n"
-        "  cables: [{name: a, angle_deg: 0.0, radius_mm: 2.2, end_mm: 80.0}]\n"
+        "  cables: [{name: a, angle_deg: 0.0, radius_mm: 2.2, end_mm: 80.0}]\n",
+        encoding="utf-8",
     )
     return str(folder / "robot.yaml")
 

@@ -34,7 +34,7 @@ def stranger(tmp_path):
 
     def make(name="stranger", robot=ROBOT, **virtual):
         path = tmp_path / f"{name}.yaml"
-        path.write_text(yaml.safe_dump({"robot": robot, "virtual_robot": virtual}))
+        path.write_text(yaml.safe_dump({"robot": robot, "virtual_robot": virtual}), encoding="utf-8")
         return load_robot_file(path)
 
     return make
