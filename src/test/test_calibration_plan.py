@@ -8,14 +8,16 @@ import re
 import numpy as np
 import pytest
 
-from gravcomp.calibration import plan as planning
+from gravcomp.calibration import pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
-from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of, make_plan
+from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
+from gravcomp.calibration.planning import make_plan
+from gravcomp.calibration.pose_candidates import ORIENTATIONS
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.inverse import InverseOptions
@@ -41,7 +43,7 @@ def robot():
 def plan(robot):
     """A plan from half of the orientations, with small bends: the equilibria of neighbouring poses are near each other."""
     options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
-    return make_plan(robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[::2])
+    return make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[::2])
 
 
 def test_a_plan_keeps_to_its_time_and_to_the_limits(robot, plan):
@@ -71,7 +73,7 @@ def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, pl
 
 def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
     """A turn that takes longer than all poses may; a robot that its cables hold, but that has no equilibrium without them."""
-    orientations = planning.ORIENTATIONS[:1]
+    orientations = ORIENTATIONS[:1]
     slow = PlanOptions(budget=10.0, rate=np.radians(1.0))
     with pytest.raises(ConfigError, match=r"robot 'short': no pose of \d+ s fits into 10 s; allow more time \(--time\)"):
         make_plan(robot, PERIOD, options=slow, orientations=orientations)
@@ -86,12 +88,12 @@ def test_a_plan_whose_pulls_nobody_can_see_is_refused(robot, limits):
     with pytest.raises(
         ConfigError, match=r"displacement_max_mm: .* by more than [\d.e-]+ mm.* uncertain by 0\.16 mm and 0\.5 deg"
     ):
-        make_plan(weak, PERIOD, orientations=planning.ORIENTATIONS[:1])
+        make_plan(weak, PERIOD, orientations=ORIENTATIONS[:1])
 
 
 def test_cables_with_a_short_stroke_are_pulled_as_far_as_it_allows(robot):
     short = dataclasses.replace(robot, limits=Limits(tension_max=2.0, displacement_max=1e-6))
-    poses = make_plan(short, PERIOD, orientations=planning.ORIENTATIONS[:1]).poses
+    poses = make_plan(short, PERIOD, orientations=ORIENTATIONS[:1]).poses
     moved = [np.linalg.norm(pose.tip - poses[0].tip) for pose in poses if pose.pulled]
     assert max(moved) > 1e-3 and max(pose.displacement.max() for pose in poses) <= 1e-6
 
@@ -249,9 +251,7 @@ def test_a_pull_arrives_slower_and_slower_and_never_runs_past_its_goal(robot):
 def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
     """At every station, after the released robot and before single cables: so every cable is wound in to where it pulls."""
     options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
-    plan = make_plan(
-        robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[:2], inverse=InverseOptions(pretension=0.02)
-    )
+    plan = make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[:2], inverse=InverseOptions(pretension=0.02))
     for station in {pose.station for pose in plan.poses}:
         free, straight, *single = [pose for pose in plan.poses[:-1] if pose.station == station]
         assert not free.pulled and straight.pulled == robot.cable_names
@@ -265,15 +265,15 @@ def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
     ]
     assert all(winds_in)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "held_at_rest", lambda simulator, *_: simulator.solve(GRAVITY, tension=np.full(3, 1.9)))
-        tight = make_plan(robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[:1], inverse=InverseOptions())
+        patch.setattr(pose_candidates, "held_at_rest", lambda simulator, *_: simulator.solve(GRAVITY, tension=np.full(3, 1.9)))
+        tight = make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[:1], inverse=InverseOptions())
     assert all(len(pose.pulled) <= 1 and pose.tension.max() <= 0.7 * robot.limits.tension_max for pose in tight.poses)
 
 
 def test_a_robot_without_cables_has_a_plan(robot):
     bare = dataclasses.replace(robot, cables=())
     options = PlanOptions(budget=60.0, fewest=6, most=9)
-    plan = make_plan(bare, PERIOD, options=options, orientations=planning.ORIENTATIONS[:1], inverse=InverseOptions())
+    plan = make_plan(bare, PERIOD, options=options, orientations=ORIENTATIONS[:1], inverse=InverseOptions())
     assert len(plan.poses) >= 2 and not any(pose.pulled for pose in plan.poses)
 
 
