@@ -139,7 +139,8 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if unfinished and figures["full_model_pct"]:
         output.note(
             f"The full model served {figures['full_model_pct']:g} % of the evaluated time, more slowly, because the reduced model"
-            f" is not built yet. Next time: ./gravcomp model build {args.robot}, which goes on from here, then the demo again"
+            " is not built yet. Its build in the background ended with the demo, and what it has computed is kept. Next time:"
+            f" ./gravcomp model build {args.robot}, which goes on from there, then the demo again"
         )
     if problem:
         raise ConfigError(problem)

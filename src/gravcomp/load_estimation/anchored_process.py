@@ -96,7 +96,7 @@ class AnchoredProcess:
         return process, PatientEnd(ours)
 
     def _give_up(self) -> None:
-        """Let go of a process that has ended, or is about to: what is left of it may take until a later call."""
+        """Let go of a process that has ended, or is about to: its exit code may be known at a later call only."""
         assert self._process is not None
         self._connection.close()
         self._process.kill()
