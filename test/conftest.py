@@ -107,9 +107,9 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("repository")
     mirror(ROOT, folder, [Path(path) for path in (*WRITTEN_BY_LINES, *EXAMPLES)] + [Path("src/doc/pictures/none")])
     for name in EXAMPLES:
-        described, fine = (folder / name).read_text(), "elements: {around: 8, along: 12}"
+        described, fine = (folder / name).read_text(encoding="utf-8"), "elements: {around: 8, along: 12}"
         assert fine in described
-        (folder / name).write_text(described.replace(fine, "elements: {around: 4, along: 6}"))
+        (folder / name).write_text(described.replace(fine, "elements: {around: 4, along: 6}"), encoding="utf-8")
     for name in ("ROBOT", "my_robot", "left", "right", "robot"):
         shutil.copy(ROOT / "src/gravcomp/robots/article.yaml", folder / f"{name}.yaml")
     return folder

@@ -25,7 +25,7 @@ def inline_of(text: str) -> list[str]:
 
 def code_of(path: Path) -> list[str]:
     """Return the code lines, without comments, and the inline code of a document."""
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     return blocks_of(text) + inline_of(text)
 
 
@@ -44,7 +44,9 @@ def commands_of(path: Path) -> list[list[str]]:
 COMMAND_LINES = sorted({tuple(words) for path in DOCUMENTS for words in commands_of(path)})
 """The words after ./gravcomp of every command line, including those in the running text."""
 
-TYPED = sorted({line for path in DOCUMENTS for line in blocks_of(path.read_text()) if re.match(r"(\./gravcomp|ros2) ", line)})
+TYPED = sorted(
+    {line for path in DOCUMENTS for line in blocks_of(path.read_text(encoding="utf-8")) if re.match(r"(\./gravcomp|ros2) ", line)}
+)
 """Lines in blocks of code, which the reader types."""
 
 

@@ -174,19 +174,19 @@ def run_node(line: str, environment: dict[str, str], *, interrupt: bool = False)
     command = shlex.split(line) if shutil.which("ros2") else [find_executable(package, executable), *arguments]
     with tempfile.TemporaryDirectory() as folder:
         active, printed = Path(folder) / "active", Path(folder) / "printed"
-        with printed.open("w") as output:
+        with printed.open("w", encoding="utf-8") as output:
             environment = {**environment, ACTIVE_FILE: str(active)}
             process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=environment)
         end = time.monotonic() + 2 * PATIENCE
         while process.poll() is None and not (interrupt and active.exists()):
-            assert time.monotonic() < end, printed.read_text()
+            assert time.monotonic() < end, printed.read_text(encoding="utf-8")
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)  # nothing happens where the process has ended
         try:
             process.wait(PATIENCE)
         finally:
             process.kill()
-        return process.returncode, printed.read_text()
+        return process.returncode, printed.read_text(encoding="utf-8")
 
 
 def _interface(kind: str) -> type:

@@ -39,15 +39,15 @@ class Shell:
         handle, name = tempfile.mkstemp(prefix="output_", dir=cwd)
         os.close(handle)
         self.output = Path(name)
-        with open(self.output, "w") as output:
+        with open(self.output, "w", encoding="utf-8") as output:
             self.process = subprocess.Popen(
                 words, cwd=cwd, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, env=environment,
                 start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # fmt: skip
 
     def wait_for(self, sentence: str) -> None:
         end = time.monotonic() + START
-        while sentence not in self.output.read_text():
-            assert self.process.poll() is None and time.monotonic() < end, self.output.read_text()
+        while sentence not in self.output.read_text(encoding="utf-8"):
+            assert self.process.poll() is None and time.monotonic() < end, self.output.read_text(encoding="utf-8")
             time.sleep(0.1)
 
     def ctrl_c(self) -> int:

@@ -37,7 +37,8 @@ def test_an_arm_with_other_axes_is_refused_in_words(gravcomp, tmp_path):
     xacro = tmp_path / "two.urdf.xacro"
     xacro.write_text(
         '<robot name="two"><link name="world"/><link name="soft_tip"/>'
-        '<joint name="arm" type="fixed"><parent link="world"/><child link="soft_tip"/></joint></robot>'
+        '<joint name="arm" type="fixed"><parent link="world"/><child link="soft_tip"/></joint></robot>',
+        encoding="utf-8",
     )
     answer = gravcomp("arm", "--xacro", str(xacro))
     assert answer.code == 2 and "has no link 'soft_base'; it has: world, soft_tip" in answer.err

@@ -8,10 +8,10 @@ from gravcomp.description import shipped_robots
 
 
 def changed_robot(tmp_path, change) -> str:
-    document = yaml.safe_load(shipped_robots()["article"].read_text())
+    document = yaml.safe_load(shipped_robots()["article"].read_text(encoding="utf-8"))
     change(document)
     path = tmp_path / "robot.yaml"
-    path.write_text(yaml.safe_dump(document))
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
     return str(path)
 
 
@@ -25,7 +25,7 @@ def refused(answer, *words: str) -> None:
 def test_a_recording_that_cannot_be_used_is_refused(gravcomp, tmp_path):
     refused(gravcomp("demo", "--headless", "--imu", str(tmp_path / "none.npz")), "none.npz", "does not exist")
     text = tmp_path / "text.npz"
-    text.write_text("no arrays")
+    text.write_text("no arrays", encoding="utf-8")
     refused(gravcomp("demo", "--headless", "--imu", str(text)), "text.npz")
     shape = tmp_path / "shape.npz"
     np.savez(shape, gyr=np.zeros((100, 2)), acc=np.zeros((100, 3)), rate=100.0)

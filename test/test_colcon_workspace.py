@@ -62,7 +62,7 @@ def test_neighbour_uses_our_message():
     }
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _environment() -> dict[str, str]:
@@ -126,5 +126,5 @@ def test_the_tests_of_both_run(workspace):
 def test_a_release_carries_the_licence(folder):
     # Bloom releases a package's folder alone, so a link to the repository's file would lead nowhere.
     assert not (ROOT / folder / "LICENSE").is_symlink()
-    assert (ROOT / folder / "LICENSE").read_text() == (ROOT / "LICENSE").read_text()
-    assert '<license file="LICENSE">Apache-2.0</license>' in (ROOT / folder / "package.xml").read_text()
+    assert (ROOT / folder / "LICENSE").read_text(encoding="utf-8") == (ROOT / "LICENSE").read_text(encoding="utf-8")
+    assert '<license file="LICENSE">Apache-2.0</license>' in (ROOT / folder / "package.xml").read_text(encoding="utf-8")

@@ -146,7 +146,7 @@ def test_every_node_has_the_topics_and_services_of_the_table(robot, observer, tm
 
     graph, processes = robot
     urdf = tmp_path / "arm.urdf"
-    urdf.write_text(expanded(shipped_xacro("seven_axis_arm.urdf.xacro")))
+    urdf.write_text(expanded(shipped_xacro("seven_axis_arm.urdf.xacro")), encoding="utf-8")
     more = [
         graph.node("gravcomp_fem", "viewer", port=8860),
         graph.node("gravcomp_estimation", "arm_gravity", urdf=str(urdf)),

@@ -80,7 +80,7 @@ def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder
     ros2.until(lambda: len(samples) > 100, "no samples")
     ros2.run(PUBLISHED_ONCE)
     ros2.until(lambda: len(samples) > 500, "no samples")
-    assert recorder.ctrl_c() == 0, recorder.output.read_text()
+    assert recorder.ctrl_c() == 0, recorder.output.read_text(encoding="utf-8")
     # A message that was published once, by a node that ended since, is recorded as well.
     topics = describe(folder / "my_bag")["topics"]
     assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 400
@@ -93,7 +93,7 @@ def test_an_imu_is_calibrated_from_a_recording(live, type_in, folder):
     assert code == 0, output
     # The base is at rest: one pose, which is too few for the scale but enough for the offset of the gyroscope.
     code, output = type_in("./gravcomp calibrate-imu poses --write my_robot.yaml", "--robot article")
-    assert code == 0 and "gyroscope" in (folder / "my_robot.yaml").read_text(), output
+    assert code == 0 and "gyroscope" in (folder / "my_robot.yaml").read_text(encoding="utf-8"), output
 
 
 def test_each_ros2_line_does_what_it_says(live, ros2):

@@ -26,7 +26,7 @@ RECORDED = Path(__file__).parent / "data" / "imu_and_gravity"
 
 def test_every_line_is_run_by_a_test():
     """A new line of a document fails here until a test runs it."""
-    sources = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
+    sources = "".join(path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("test_*.py"))
     run = set(re.findall(r"""["']((?:\./gravcomp|ros2) [^"\n]*?)["'](?=[,)\]\s])""", sources))
     missing = [line for line in TYPED if line not in run and not line.startswith(FOREIGN)]
     assert not missing, "\n".join(missing)
@@ -96,7 +96,7 @@ def test_a_robot_is_calibrated_to_measured_tips(type_in, folder):
     for trial, gravity in enumerate(([-9.81, 0.0, 0.0], [0.0, -9.81, 0.0], [-6.9, 0.0, -6.9], [0.0, 6.9, -6.9])):
         tip = 1e3 * simulator.solve(gravity).tip_position
         rows += [",".join(map(str, [trial, 0.05 * k, *gravity, *[""] * len(robot.cables), *tip.round(4)])) for k in range(30)]
-    (folder / "measured.csv").write_text("\n".join(rows))
+    (folder / "measured.csv").write_text("\n".join(rows), encoding="utf-8")
     line = "./gravcomp calibrate DATA.csv --robot ROBOT.yaml --write CALIBRATED.yaml"
     code, output = type_in(line, DATA="measured.csv", ROBOT="ROBOT.yaml", CALIBRATED="calibrated.yaml")
     assert code == 0, output

@@ -88,7 +88,7 @@ def test_two_robots_run_side_by_side(folder, own_domain, type_in):
     try:
         for shell in shells:
             shell.wait_for("The live page: http://")
-        pages = {re.search(r"http://\S+", shell.output.read_text()).group() for shell in shells}
+        pages = {re.search(r"http://\S+", shell.output.read_text(encoding="utf-8")).group() for shell in shells}
         assert len(pages) == 2
         end = time.monotonic() + START
         line = "./gravcomp doctor --graph --namespace /left"

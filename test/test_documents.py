@@ -67,14 +67,14 @@ def test_help_is_given(gravcomp, words):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_link_leads_somewhere(name):
     path = ROOT / name
-    for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text()):
+    for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
         if re.match(r"https?:|mailto:", target):
             continue
         file, _, anchor = target.partition("#")
         place = (path.parent / file).resolve() if file else path
         assert place.exists(), f"{target} does not exist"
         if anchor:
-            headings = re.findall(r"^#+ (.+)$", place.read_text(), re.MULTILINE)
+            headings = re.findall(r"^#+ (.+)$", place.read_text(encoding="utf-8"), re.MULTILINE)
             slugs = [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
             assert anchor in slugs, f"{target}: no such heading"
 
@@ -90,7 +90,7 @@ def ports(*kinds: str) -> dict[str, str]:
 
 def executables_of(package: str) -> list[str]:
     """Return the executables of a package, by which `ros2 run` finds them."""
-    return re.findall(r"^\s+\"(\w+) = ", (ROOT / package / "setup.py").read_text(), re.MULTILINE)
+    return re.findall(r"^\s+\"(\w+) = ", (ROOT / package / "setup.py").read_text(encoding="utf-8"), re.MULTILINE)
 
 
 EXECUTABLES = {name: package for package in PACKAGES[:3] for name in executables_of(package)}
@@ -105,7 +105,7 @@ def check_ros2(words: list[str]) -> None:
                 if word.startswith(PACKAGES):
                     assert (ROOT / word).exists(), f"{word} does not exist"
         case ["launch", package, file, *rest]:
-            text = (ROOT / package / "launch" / file).read_text()
+            text = (ROOT / package / "launch" / file).read_text(encoding="utf-8")
             for word in rest:
                 assert re.search(rf"""["{{]\W*(name: )?{word.partition(":=")[0]}\b""", text), f"{file} has no argument {word}"
         case ["run", package, executable, *rest]:
@@ -128,7 +128,7 @@ def check_ros2(words: list[str]) -> None:
             name, kind, *content = [word for word in rest if not word.startswith("-")]
             assert ports("subscribes").get(name.lstrip("/")) == kind
             if content and kind.startswith("gravcomp_msgs/"):
-                fields = re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
+                fields = re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(encoding="utf-8"), re.MULTILINE)
                 assert set(re.findall(r"(\w+):", content[0])) <= set(fields)
         case ["param", "set" | "get" | "describe", name, key, *_]:
             assert key in parameters_of(name.lstrip("/"))
@@ -146,7 +146,7 @@ def check_ros2(words: list[str]) -> None:
             assert name.lstrip("/") in ports("publishes")
         case ["topic", "echo", name, "--field", field]:
             kind = ports("publishes")[name.lstrip("/")]
-            assert field in re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(), re.MULTILINE)
+            assert field in re.findall(r"^\S+ (\w+)", (ROOT / f"{kind}.msg").read_text(encoding="utf-8"), re.MULTILINE)
         case _:
             raise AssertionError(f"no check is known for {' '.join(words)}")
 
@@ -162,7 +162,7 @@ def test_ros2_lines_fit_the_graph(name):
 def test_topics_and_services_exist(name):
     topics = set(ports("publishes", "subscribes"))
     services = set(ports("services"))
-    for word in inline_of((ROOT / name).read_text()):
+    for word in inline_of((ROOT / name).read_text(encoding="utf-8")):
         if re.fullmatch(r"(imu|cable|robot|controller|target|truth|virtual|measured)/[a-z_]+", word):
             assert word in topics, f"no topic {word}"
         if word.startswith("~/") and "." not in word:
@@ -178,7 +178,7 @@ def test_parameters_and_keys_exist(name):
     article = load_yaml(shipped_robots()["article"])
     sections = (("hardware", Hardware), ("virtual_robot", VirtualRobotParameters))
     declared = {f"{section}.{leaf.key}" for section, kind in sections for leaf in declared_parameters(kind)}
-    for word in inline_of((ROOT / name).read_text()):
+    for word in inline_of((ROOT / name).read_text(encoding="utf-8")):
         if re.fullmatch(r"(inverse|prediction|calibration|filter|heater|lumen)\.[a-z_.]+", word):
             assert word in NODE_PARAMETERS, f"no parameter {word}"
         if re.fullmatch(r"(robot|hardware|virtual_robot)\.[a-z_.]+", word) and word not in declared:
@@ -190,7 +190,7 @@ def test_parameters_and_keys_exist(name):
 
 @pytest.mark.parametrize("name", CURRENT)
 def test_modules_exist(name):
-    text = (ROOT / name).read_text()
+    text = (ROOT / name).read_text(encoding="utf-8")
     words = {w for w in inline_of(text) if re.fullmatch(r"gravcomp(\.\w+)+", w) and not (ROOT / name).with_name(w).exists()}
     for word in words:
         assert exists(word), f"no module {word}"
@@ -232,7 +232,7 @@ DEFAULT_KEYS = {"via_points_mm", "creep_ratio", "creep_time", "prony", "fibres",
 
 def glossary_names() -> list[str]:
     """Return the names in the third column of the glossary's tables."""
-    rows = [line for line in (ROOT / GLOSSARY).read_text().splitlines() if line.startswith("| ")]
+    rows = [line for line in (ROOT / GLOSSARY).read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
     return sorted({word for row in rows for word in re.findall(r"`([^`]+)`", row.split(" | ")[2])})
 
 
@@ -242,7 +242,9 @@ def test_a_name_of_the_glossary_exists(name):
         assert exists(name), f"no module or name {name}"
     elif re.match(r"[A-Z]\w+\.", name):
         message, field = name.split(".")
-        assert re.search(rf"^\S+ {field}\b", (ROOT / f"gravcomp_msgs/msg/{message}.msg").read_text(), re.MULTILINE)
+        assert re.search(
+            rf"^\S+ {field}\b", (ROOT / f"gravcomp_msgs/msg/{message}.msg").read_text(encoding="utf-8"), re.MULTILINE
+        )
     elif name.startswith(("robot.", "hardware.")):
         pass  # test_parameters_and_keys_exist
     else:
@@ -253,7 +255,7 @@ def test_a_name_of_the_glossary_exists(name):
 
 def tree_of_the_core() -> list[list[str]]:
     """Return the packages and modules of the core, one list for each line of src/README.md; without robots/, which holds data."""
-    rows = re.findall(r"^\| (`\S.*?) \|", (ROOT / "src/README.md").read_text(), re.MULTILINE)
+    rows = re.findall(r"^\| (`\S.*?) \|", (ROOT / "src/README.md").read_text(encoding="utf-8"), re.MULTILINE)
     lines = [[name.strip("`/").removesuffix(".py") for name in row.split(", ")] for row in rows]
     return [[name for name in line if name != "robots"] for line in lines]
 
@@ -272,5 +274,7 @@ def test_no_import_goes_up():
         for name in line:
             folder = ROOT / "src/gravcomp" / name
             for path in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]:
-                imported = re.findall(r"^\s*(?:from|import) gravcomp(?:\.| import )(\w+)", path.read_text(), re.MULTILINE)
+                imported = re.findall(
+                    r"^\s*(?:from|import) gravcomp(?:\.| import )(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE
+                )
                 assert set(imported) <= allowed, f"{path.relative_to(ROOT)} imports {sorted(set(imported) - allowed)}"

@@ -112,7 +112,7 @@ def test_a_refused_target_is_reported_for_seconds_and_in_the_log(start, observer
     assert ControllerStatus.STALE in {heard[number].code for number in refused}
     assert refused == list(range(refused[0], refused[-1] + 1))
     end = time.monotonic() + 10.0
-    while "at most a full turn" not in (log := (tmp_path / "inverse_controller.log").read_text()):
+    while "at most a full turn" not in (log := (tmp_path / "inverse_controller.log").read_text(encoding="utf-8")):
         assert time.monotonic() < end, log
         time.sleep(0.1)
 
@@ -148,7 +148,7 @@ def test_a_change_of_a_parameter_is_an_event_and_a_refused_one_is_not(start, obs
 def test_a_node_ends_without_error_messages(start, observer, tmp_path):
     process = start("gravcomp_fem", "inverse_controller")
     process.stop()
-    assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text()
+    assert process.exit_code == 0 and "leaked" not in (tmp_path / "inverse_controller.log").read_text(encoding="utf-8")
 
 
 def test_a_node_waits_at_its_gate_and_can_be_ended_there(start, observer):
@@ -194,7 +194,7 @@ def test_an_override_of_the_quality_of_service_is_applied_or_named(start, observ
     observer.until(lambda: "inverse_controller" in observer.subscribers("/robot/deformation"), "it does not subscribe")
     (found,) = observer.subscriptions("/robot/deformation")
     assert found.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-    assert f"parameter {wrong} overrides nothing" in process.log.read_text()
+    assert f"parameter {wrong} overrides nothing" in process.log.read_text(encoding="utf-8")
 
 
 def test_a_wrong_override_of_the_quality_of_service_ends_the_node(tmp_path):

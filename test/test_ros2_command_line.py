@@ -70,7 +70,7 @@ def node():
 
 def test_the_command_line_works_on_a_running_node(node, tmp_path):
     file = tmp_path / "parameters.yaml"
-    file.write_text("/imu_estimator: {ros__parameters: {filter: {velocity_noise: 0.2}}}")
+    file.write_text("/imu_estimator: {ros__parameters: {filter: {velocity_noise: 0.2}}}", encoding="utf-8")
     for line, printed in ON_A_NODE:
         assert re.search(printed, ros2(line.format(file=file)), re.MULTILINE), line
 

@@ -80,8 +80,8 @@ def address(tmp_path_factory):
     with Graph(specs, tmp_path_factory.mktemp("logs"), host=NodeHost()) as processes:
         processes.start()
         log = processes.processes[viewer.name].log
-        processes.wait(lambda: "the page is at" in log.read_text(), PATIENCE, "the viewer's start")
-        yield log.read_text().split("the page is at ")[1].split()[0]
+        processes.wait(lambda: "the page is at" in log.read_text(encoding="utf-8"), PATIENCE, "the viewer's start")
+        yield log.read_text(encoding="utf-8").split("the page is at ")[1].split()[0]
 
 
 @pytest.fixture(scope="module")

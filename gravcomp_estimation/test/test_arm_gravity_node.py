@@ -75,7 +75,7 @@ class Bench:
 @pytest.fixture
 def bench(tmp_path):
     urdf = tmp_path / "two.urdf"
-    urdf.write_text(URDF)
+    urdf.write_text(URDF, encoding="utf-8")
     bench = Bench(str(urdf))
     yield bench
     bench.close()

@@ -94,4 +94,4 @@ def test_the_cables_wait_for_the_controllers_answer(stand):
     stand.willing = True
     stand.until(lambda: stand.calibrator.finished, "it does not end")
     assert np.abs(stand.heard[-1] - PULL).max() < 1e-6
-    assert stand.out.read_text().startswith("pose,trial,time_s")
+    assert stand.out.read_text(encoding="utf-8").startswith("pose,trial,time_s")

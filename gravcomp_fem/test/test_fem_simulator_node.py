@@ -106,10 +106,10 @@ def test_a_turn_that_becomes_faster_pulls_across_and_along_the_robot(stand):
 def loaded(monkeypatch, tmp_path):
     """A stand whose robot may be loaded, looks for a payload, and has a coarse mesh."""
     monkeypatch.setenv(MARK, "1")
-    described = yaml.safe_load(robot_path("article").read_text())
+    described = yaml.safe_load(robot_path("article").read_text(encoding="utf-8"))
     described["robot"] |= {"max_wrench": {"force": 0.2, "moment": 0.002}, "elements": {"around": 4, "along": 4}}
     described["nodes"]["fem_simulator"] = {"load": {"kind": "payload"}}
-    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(described))
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(described), encoding="utf-8")
     stand = Stand("--ros-args", "-p", f"robot:={tmp_path / 'robot.yaml'}")
     yield stand
     stand.close()

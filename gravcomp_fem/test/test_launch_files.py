@@ -9,7 +9,7 @@ import yaml
 from gravcomp.graph.nodes import node
 
 FOLDER = Path(__file__).resolve().parents[1] / "launch"
-YAML = yaml.safe_load((FOLDER / "robot.launch.yaml").read_text())["launch"]
+YAML = yaml.safe_load((FOLDER / "robot.launch.yaml").read_text(encoding="utf-8"))["launch"]
 
 
 def test_the_yaml_file_starts_the_nodes_of_the_loop():

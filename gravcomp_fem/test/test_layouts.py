@@ -46,7 +46,7 @@ def check_field(topic: str, path: list[str]) -> None:
 
 
 def test_rviz_shows_topics_of_their_types():
-    manager = yaml.safe_load((CONFIG / "gravcomp.rviz").read_text())["Visualization Manager"]
+    manager = yaml.safe_load((CONFIG / "gravcomp.rviz").read_text(encoding="utf-8"))["Visualization Manager"]
     found = {}
     for display in manager["Displays"]:
         topic = (display.get("Topic") or display.get("Description Topic") or {}).get("Value")
@@ -59,7 +59,7 @@ def test_rviz_shows_topics_of_their_types():
 
 
 def test_foxglove_shows_topics_fields_and_services_that_exist():
-    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    layout = json.loads((CONFIG / "foxglove.json").read_text(encoding="utf-8"))
     panels = layout["configById"]
     placed = re.findall(r'"(\w+!\w+)"', json.dumps(layout["layout"]))
     assert sorted(placed) == sorted(panels)
@@ -92,10 +92,10 @@ def test_plotjuggler_plots_fields_that_exist():
 
 @pytest.mark.parametrize("path", sorted(CONFIG.iterdir()), ids=lambda path: path.name)
 def test_every_layout_is_described(path):
-    assert path.name in (CONFIG.parents[1] / "src" / "doc" / "tools.md").read_text()
+    assert path.name in (CONFIG.parents[1] / "src" / "doc" / "tools.md").read_text(encoding="utf-8")
 
 
 def test_each_node_is_in_one_group_of_the_diagnostics():
-    groups = yaml.safe_load((CONFIG / "diagnostics.yaml").read_text())["/**"]["ros__parameters"]
+    groups = yaml.safe_load((CONFIG / "diagnostics.yaml").read_text(encoding="utf-8"))["/**"]["ros__parameters"]
     contained = [name for group in groups.values() if isinstance(group, dict) for name in group["contains"]]
     assert sorted(contained) == sorted(entry.executable for entry in NODES if entry.executable != "judge")

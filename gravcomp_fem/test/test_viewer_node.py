@@ -219,7 +219,7 @@ def test_the_button_records_a_bag(stand, tmp_path):
     stand.ask(Record(True))
     stand.until(lambda: stand.viewer.sender.recorder is not None, "no recorder")
     log = stand.viewer.sender.recorder.log
-    stand.until(lambda: "recording into" in log.read_text(), "the recorder does not start")
+    stand.until(lambda: "recording into" in log.read_text(encoding="utf-8"), "the recorder does not start")
     end = time.monotonic() + 2.0
     stand.until(lambda: time.monotonic() > end, "")
     stand.ask(Record(False))

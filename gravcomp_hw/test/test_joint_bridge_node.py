@@ -124,7 +124,7 @@ def test_the_joints_of_a_ros2_control_robot_wind_the_cables(bench):
 
 def test_a_killed_bridge_leaves_no_effort(tmp_path):
     robot = tmp_path / "effort.yaml"
-    robot.write_text(ROBOT.read_text().replace("command: trajectory", "command: effort"))
+    robot.write_text(ROBOT.read_text(encoding="utf-8").replace("command: trajectory", "command: effort"), encoding="utf-8")
     bridge = subprocess.Popen(
         [sys.executable, "-m", "gravcomp_hw.joint_bridge", "--ros-args", "-p", f"robot:={robot}", "-r", "__ns:=/alone"]
     )

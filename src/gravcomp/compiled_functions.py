@@ -116,7 +116,7 @@ def _sources() -> dict[str, Source]:
     """Return all modules of the package by name, remembered as long as the files do not change."""
     memory = cache_folder("numba") / f"modules-{content_key(str(PACKAGE))}.json"
     try:
-        known = {name: Source(**entry) for name, entry in json.loads(memory.read_text()).items()}
+        known = {name: Source(**entry) for name, entry in json.loads(memory.read_text(encoding="utf-8")).items()}
     except (OSError, ValueError, TypeError):
         known = {}
     current = {}

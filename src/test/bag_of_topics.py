@@ -19,7 +19,9 @@ class TopicBag:
     def __init__(self, path: Path, storage: StoragePlugin = StoragePlugin.SQLITE3):
         self._store = get_typestore(Stores.ROS2_JAZZY)
         for name in OWN:
-            self._store.register(get_types_from_msg((MESSAGES / f"{name}.msg").read_text(), f"gravcomp_msgs/msg/{name}"))
+            self._store.register(
+                get_types_from_msg((MESSAGES / f"{name}.msg").read_text(encoding="utf-8"), f"gravcomp_msgs/msg/{name}")
+            )
         self._types = {
             kind.rsplit("/", 1)[1]: made
             for kind, made in self._store.types.items()

@@ -2,7 +2,9 @@
 
 import dataclasses
 import os
+import pickle
 import signal
+import socket
 import subprocess
 import time
 
@@ -12,7 +14,8 @@ import pytest
 
 from gravcomp.description import Elements, load_robot_file
 from gravcomp.load_estimation import AnchoredModel, AnchoredProcess, AtOnce, anchored_process
-from gravcomp.load_estimation.anchored_follower import Question
+from gravcomp.load_estimation.anchored_follower import Answer, Question
+from gravcomp.load_estimation.message_pipe import framed
 from gravcomp.simulation import RobotModel
 
 ROBOT = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
@@ -62,3 +65,35 @@ def test_a_process_answers_as_one_that_computes_at_once_and_is_replaced_when_it_
     second = psutil.Process(worker.pid)
     worker.close()
     assert not first.is_running() and not second.is_running()
+
+
+def test_a_process_that_is_preempted_in_the_middle_of_an_answer_does_not_let_its_owner_wait(monkeypatch):
+    other_ends = []
+
+    def preempted(*_, pass_fds, **__):
+        other_ends.append(socket.socket(fileno=os.dup(pass_fds[0])))
+        return start(["sleep", "300"])
+
+    start = subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", preempted)
+    worker = AnchoredProcess(ROBOT)
+    (other,) = other_ends
+    try:
+        other.sendall(framed(None))
+        wide = QUESTION._replace(wound=np.zeros(100_000))  # more than the connection takes
+        assert worker.exchange(wide) == []
+        with other.makefile("rb") as questions:
+            pieces = b""
+            while len(pieces) < len(pickle.dumps((0, wide))):  # the rest goes with later calls
+                pieces += questions.read1()
+                assert worker.exchange(QUESTION) == []
+        asked, question = pickle.loads(pieces)
+        answer = framed((asked, Answer(question._replace(wound=np.zeros(6)), None)))
+        other.sendall(answer[:-1])
+        assert worker.exchange(QUESTION) == []
+        other.sendall(answer[-1:])
+        (answer,) = worker.exchange(QUESTION)
+        assert answer.found is None and answer.question.stamp == QUESTION.stamp
+    finally:
+        worker.close()
+        other.close()

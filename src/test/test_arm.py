@@ -112,7 +112,8 @@ def test_the_tour_rests_at_its_poses_and_never_jumps():
 
 def test_the_macro_takes_prefix_parent_and_origin(tmp_path):
     own = tmp_path / "own.urdf.xacro"
-    own.write_text(f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
+    own.write_text(
+        f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
     <xacro:include filename="{URDF}/soft_robot.urdf.xacro"/>
     <link name="table"/>
     <xacro:soft_robot prefix="left_" joint_prefix="left_" parent="table">
@@ -120,7 +121,9 @@ def test_the_macro_takes_prefix_parent_and_origin(tmp_path):
     </xacro:soft_robot>
     <xacro:soft_robot prefix="right_" joint_prefix="right_" parent="table">
         <origin xyz="0 -0.2 0" rpy="0 0 0"/>
-    </xacro:soft_robot></robot>""")
+    </xacro:soft_robot></robot>""",
+        encoding="utf-8",
+    )
     urdf = expanded(own)
     left, right = (Chain(urdf, f"{side}_imu_link", "table") for side in ("left", "right"))
     np.testing.assert_allclose(left.pose({})[:3, 3], [0, 0.2, 0])
@@ -138,11 +141,14 @@ def test_the_macros_joints_are_the_robots_cables():
 def test_the_macro_takes_the_robot_from_its_file_and_shows_its_shape(tmp_path, robot, cables):
     file = load_robot_file(robot)
     own = tmp_path / "own.urdf.xacro"
-    own.write_text(f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
+    own.write_text(
+        f"""<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
     <xacro:include filename="{URDF}/soft_robot.urdf.xacro"/>
     <link name="table"/>
     <xacro:soft_robot name="left" parent="table" robot_yaml="{file.source}"><origin xyz="0 0 0"/></xacro:soft_robot>
-    </robot>""")
+    </robot>""",
+        encoding="utf-8",
+    )
     urdf = expanded(own)
     assert all(f'<joint name="{cable}" type="prismatic">' in urdf for cable in cables)
     imu = Chain(urdf, "left_imu_link", "left_soft_base").pose({})
@@ -158,6 +164,8 @@ def test_the_macro_takes_the_robot_from_its_file_and_shows_its_shape(tmp_path, r
 
 def test_a_broken_xacro_is_named(tmp_path):
     bad = tmp_path / "bad.xacro"
-    bad.write_text('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${nothing}"/></robot>')
+    bad.write_text(
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${nothing}"/></robot>', encoding="utf-8"
+    )
     with pytest.raises(ConfigError, match=r"bad\.xacro"):
         expanded(bad)

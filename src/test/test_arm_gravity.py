@@ -46,7 +46,7 @@ def urdf_of(arm: str) -> str:
     package, file, arguments, _ = ARMS[arm]
     given = os.environ.get("GRAVCOMP_ARMS")
     if given and (Path(given) / f"{arm}.urdf").is_file():
-        return (Path(given) / f"{arm}.urdf").read_text()
+        return (Path(given) / f"{arm}.urdf").read_text(encoding="utf-8")
     for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(":"):
         path = Path(prefix) / "share" / package / file
         if prefix and path.exists():

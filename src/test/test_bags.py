@@ -65,7 +65,7 @@ def write(path: Path, store, definitions, count: int = 300, close: bool = True, 
 
 def test_a_bag_is_mcap_of_version_9_with_the_offered_qos_and_the_hash_of_the_type(tmp_path, store, definitions):
     path = write(tmp_path / "bag", store, definitions)
-    text = (path / "metadata.yaml").read_text()
+    text = (path / "metadata.yaml").read_text(encoding="utf-8")
     assert "version: 9" in text and "storage_identifier: mcap" in text
     assert store.hash_rihs01(IMU) in text
     with Reader(path) as bag:
@@ -93,7 +93,7 @@ def test_definitions_come_from_the_installed_files(tmp_path, store):
         package, _, message = name.split("/")
         folder = tmp_path / "share" / package / "msg"
         folder.mkdir(parents=True)
-        (folder / f"{message}.msg").write_text(text)
+        (folder / f"{message}.msg").write_text(text, encoding="utf-8")
     definition, digest = Definitions([tmp_path]).of("a_msgs/msg/Outer")
     assert "MSG: b_msgs/Inner" in definition and digest.startswith("RIHS01_")
 

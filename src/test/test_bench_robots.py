@@ -27,7 +27,7 @@ def silent(stage):
 @pytest.fixture
 def short(tmp_path):
     file = tmp_path / "short.yaml"
-    file.write_text(ROBOT)
+    file.write_text(ROBOT, encoding="utf-8")
     return str(file)
 
 
@@ -50,7 +50,9 @@ def test_the_mesh_alone_has_no_other_figures(options, words):
 
 def test_a_robot_that_fails_is_reported_and_the_others_go_on(short, tmp_path):
     broken = tmp_path / "broken.yaml"
-    broken.write_text(ROBOT.replace("short", "wedges").replace("lumen_diameter_mm: 4", "lumen_diameter_mm: 0.5"))
+    broken.write_text(
+        ROBOT.replace("short", "wedges").replace("lumen_diameter_mm: 4", "lumen_diameter_mm: 0.5"), encoding="utf-8"
+    )
     measured = robots.run(silent, files=[str(broken), "nowhere.yaml", short], figures=["rest_error_pct"])
     assert list(measured["robots"]) == ["wedges", "nowhere", "short"]
     assert "Jacobian" in measured["robots"]["wedges"]["errors"]["rest_error_pct"]
@@ -70,7 +72,7 @@ def test_what_was_measured_is_kept_until_the_robot_changes(short, tmp_path, monk
 
     assert [found(short), found(short), found(short, every=2), found(short, again=True), found(short)] == [0, 0, 1, 2, 2]
     stiffer = tmp_path / "stiffer.yaml"
-    stiffer.write_text(ROBOT.replace("youngs_modulus_mpa: 2", "youngs_modulus_mpa: 3"))
+    stiffer.write_text(ROBOT.replace("youngs_modulus_mpa: 2", "youngs_modulus_mpa: 3"), encoding="utf-8")
     assert found(str(stiffer)) == 3
 
 
@@ -131,7 +133,7 @@ def test_the_loop_has_the_worst_seed_and_goes_on_where_it_was(short, fake_parts)
     assert len(fake_parts) == 3 + 3 + 1
     again = robots.run(silent, files=[short], loop=True)["robots"]["short"]
     assert again == first and len(fake_parts) == 3 + 3 + 1 + 1  # only what failed
-    with open(short, "a") as file:
+    with open(short, "a", encoding="utf-8") as file:
         file.write("virtual_robot: {body: {damping_time_ms: 20}}\n")
     robots.run(silent, files=[short], loop=True, figures=["uncalibrated_pct"])
     assert len(fake_parts) == 3 + 3 + 1 + 1 + 3

@@ -114,7 +114,7 @@ def test_a_current_step_is_measured_and_the_current_ends_when_the_host_does(live
         with pytest.raises(ConfigError, match=r"--current is 3; allowed: 0\.05 to 1 A"):
             board_motor.examine(client, 2, 3.0)
     page = write_page(list(found.values()), "virtual", channel, tmp_path)
-    text = page.read_text()
+    text = page.read_text(encoding="utf-8")
     assert "gravcomp doctor --board" in text and "is unhooked" in text and html.escape(found["current step"].found) in text
 
 

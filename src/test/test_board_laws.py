@@ -78,7 +78,7 @@ def test_the_stiffness_of_a_law_is_that_of_the_shape_once_each_point_has_had_its
 
 
 def test_blob_and_build_count_on_the_room_that_the_firmware_has():
-    header = (firmware_folder() / STANDALONE / "model.h").read_text()
+    header = (firmware_folder() / STANDALONE / "model.h").read_text(encoding="utf-8")
     room = {name: int(number) for name, number in re.findall(r"#define GC_(\w+_MAX) (\d+)u", header)}
     assert BuildOptions().board_points == room["LAW_POINTS_MAX"]
     for name in ("MODES_MAX", "STRAINS_MAX", "PIECES_MAX", "POINTS_MAX", "LAW_POINTS_MAX", "BRANCHES_MAX"):

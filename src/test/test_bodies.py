@@ -183,7 +183,7 @@ def disk_cases():
     tips = default_folder() / "disks" / "tips.csv"
     if not tips.exists():
         return []
-    with tips.open() as file:
+    with tips.open(encoding="utf-8") as file:
         return [row for row in csv.DictReader(file) if row["model"] == "straight_between_disks"][:3]
 
 

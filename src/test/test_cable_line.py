@@ -45,13 +45,13 @@ def nylon():
 
 def load(folder, cable=None, defaults=None):
     """The article's robot with keys of its second cable and of the defaults for all."""
-    document = copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text()))
+    document = copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text(encoding="utf-8")))
     document["robot"].pop("cable_defaults", None)
     document["robot"]["cables"][1].update(cable or {})
     if defaults is not None:
         document["robot"]["cable_defaults"] = defaults
     path = folder / "robot.yaml"
-    path.write_text(yaml.safe_dump(document))
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
     return load_robot_file(path).robot
 
 

@@ -35,7 +35,7 @@ def package(tmp_path, monkeypatch):
     def write(text, name="compiled"):
         path = tmp_path / "package" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         compiled_functions._sources.cache_clear()
         return compiled_functions.module_folder(
             "gravcomp.compiled" if (tmp_path / "package/compiled.py").exists() else "gravcomp"
@@ -100,7 +100,7 @@ def test_all_that_compiled_functions_use_of_other_modules_counts():
         seen.add(name)
         contained = compiled_functions._contained(name, sources)
         waiting += contained
-        for module, imported in used_imports(ast.parse(source_file(name).read_text())):
+        for module, imported in used_imports(ast.parse(source_file(name).read_text(encoding="utf-8"))):
             if compiled_functions._origin(module, imported, sources) not in contained:
                 missed.append(f"{name} uses {imported} of {module}")
     assert not missed and len(seen) > 40

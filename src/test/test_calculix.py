@@ -11,7 +11,7 @@ import gravcomp
 from gravcomp.description import load_robot_file
 from gravcomp.simulation import Simulator
 
-ROWS = list(csv.DictReader((Path(gravcomp.__file__).parent / "references" / "calculix_h20r.csv").open()))
+ROWS = list(csv.DictReader((Path(gravcomp.__file__).parent / "references" / "calculix_h20r.csv").open(encoding="utf-8")))
 
 
 def reference_robot(law: str, youngs_modulus: float, poissons_ratio: float):

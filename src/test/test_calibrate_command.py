@@ -101,12 +101,12 @@ def check(result: dict, setup: Setup) -> None:
     assert figures["tip error at rest after, RMS"] < 0.1 * figures["tip error at rest before, RMS"]
     # Both use the modulus from rest: only the damping differs. Noise of the camera and the difference of the models remain.
     assert figures["tip error in motion after, RMS"] < 0.5 * figures["tip error in motion before, RMS"]
-    page = Path("pages/calibration.html").read_text()
+    page = Path("pages/calibration.html").read_text(encoding="utf-8")
     assert page.count("<svg") >= 2 and "Resting tips, measured and modelled" in page
     mine = load_robot_file("mine.yaml")
     written = [segment.material.youngs_modulus for segment in mine.robot.segments]
     assert written == pytest.approx([modulus["value"] * 1e6 for modulus in moduli], rel=1e-4)
-    text = Path("mine.yaml").read_text()
+    text = Path("mine.yaml").read_text(encoding="utf-8")
     assert "# Calibrated on" in text and "base: article" in text and "values_at_95_percent" in text
     assert mine.robot.segments[1].material.damping_time == pytest.approx(damping * 1e-3, rel=1e-3)
 

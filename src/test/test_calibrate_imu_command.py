@@ -79,7 +79,7 @@ def test_comments_and_the_rest_of_the_robot_stay(recorded):
     written, shipped = load_robot_file("mine.yaml"), load_robot_file("article")
     assert written.robot == shipped.robot
     assert written.section("hardware") == shipped.section("hardware")
-    assert "# the board lies flat" in Path("mine.yaml").read_text().replace("# imu_link in soft_base: ", "# ")
+    assert "# the board lies flat" in Path("mine.yaml").read_text(encoding="utf-8").replace("# imu_link in soft_base: ", "# ")
 
 
 def test_one_pose_says_what_it_does_not_show(tmp_path, monkeypatch, capsys):

@@ -65,6 +65,6 @@ def test_the_mount_is_found_and_written(bag, tmp_path, capsys):
 )
 def test_an_arm_that_does_not_fit_the_bag_is_refused(bag, tmp_path, capsys, changed, words):
     urdf = tmp_path / "arm.urdf"
-    urdf.write_text(URDF.replace(*changed))
+    urdf.write_text(URDF.replace(*changed), encoding="utf-8")
     assert main(["calibrate-mount", bag, "--urdf", str(urdf)]) == 2
     assert words in capsys.readouterr().err

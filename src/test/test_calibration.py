@@ -155,7 +155,7 @@ def test_csv_is_read_as_it_was_written(tmp_path, robot):
 def test_bad_csv_is_refused_with_what_is_wrong(tmp_path, robot, change, message):
     path = tmp_path / "tips.csv"
     write_csv(course(), path, robot.cable_names)
-    path.write_text(change(path.read_text()))
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(MeasurementError, match=message):
         read_measured(path, robot.cable_names)
 
@@ -176,7 +176,7 @@ def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
     assert mine.robot.segments[0].material.damping_time == pytest.approx(0.031)
     assert cable_compliance(mine.robot) == pytest.approx(parameters.compliance, abs=1e-6)
     assert mine.robot.cables[0].axial_stiffness == pytest.approx((0.2 + 0.05) / 0.2e-3)
-    assert "base: article" in path.read_text() and mine.robot.limits == robot.limits
+    assert "base: article" in path.read_text(encoding="utf-8") and mine.robot.limits == robot.limits
 
 
 def test_a_robot_at_rest_is_predicted_to_stay(robot, tmp_path, monkeypatch):

@@ -168,7 +168,8 @@ def test_what_is_no_number_is_named(change, message):
 def test_a_file_stands_on_another_one(tmp_path):
     (tmp_path / "mine.yaml").write_text(
         "base: article\nrobot:\n  segments:\n    - {name: distal, material: {youngs_modulus_mpa: 0.7}}\n"
-        "  cables:\n    - {name: s1c2, axial_stiffness: 500, material: null, diameter_mm: null}\n"
+        "  cables:\n    - {name: s1c2, axial_stiffness: 500, material: null, diameter_mm: null}\n",
+        encoding="utf-8",
     )
     mine, base = load_robot_file(tmp_path / "mine.yaml"), load_robot_file("article")
     assert [m.youngs_modulus for m in mine.robot.materials] == pytest.approx([0.8e6, 0.7e6])
@@ -178,20 +179,24 @@ def test_a_file_stands_on_another_one(tmp_path):
 
 def test_the_virtual_robot_of_a_base_in_another_folder_is_found(tmp_path):
     (tmp_path / "measured").mkdir()
-    (tmp_path / "measured" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n")
-    (tmp_path / "measured" / "fitted.yaml").write_text("base: first.yaml\nvirtual_robot: {description: first.yaml}\n")
-    (tmp_path / "mine.yaml").write_text("base: measured/fitted.yaml\n")
+    (tmp_path / "measured" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n", encoding="utf-8")
+    (tmp_path / "measured" / "fitted.yaml").write_text(
+        "base: first.yaml\nvirtual_robot: {description: first.yaml}\n", encoding="utf-8"
+    )
+    (tmp_path / "mine.yaml").write_text("base: measured/fitted.yaml\n", encoding="utf-8")
     assert described(load_robot_file(tmp_path / "mine.yaml")).seed == 7
 
 
 def test_a_mount_that_is_written_into_another_folder_leads_to_the_same_files(tmp_path):
     (tmp_path / "robots").mkdir()
-    (tmp_path / "robots" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n")
-    (tmp_path / "robots" / "mine.yaml").write_text("# mine\nbase: first.yaml\nvirtual_robot: {description: first.yaml}\n")
+    (tmp_path / "robots" / "first.yaml").write_text("base: article\nvirtual_robot: {seed: 7}\n", encoding="utf-8")
+    (tmp_path / "robots" / "mine.yaml").write_text(
+        "# mine\nbase: first.yaml\nvirtual_robot: {description: first.yaml}\n", encoding="utf-8"
+    )
     write_mount(tmp_path / "robots" / "mine.yaml", tmp_path / "mounted.yaml", (0.0, 0.1, 0.0))
     mounted = load_robot_file(tmp_path / "mounted.yaml")
     assert mounted.robot.imu_mount.rpy[1] == pytest.approx(0.1, abs=1e-6) and described(mounted).seed == 7
-    assert (tmp_path / "mounted.yaml").read_text().startswith("# mine")
+    assert (tmp_path / "mounted.yaml").read_text(encoding="utf-8").startswith("# mine")
 
 
 @pytest.mark.parametrize(
@@ -203,7 +208,7 @@ def test_a_mount_that_is_written_into_another_folder_leads_to_the_same_files(tmp
     ],
 )
 def test_a_base_that_is_none_is_refused(tmp_path, text, message):
-    (tmp_path / "mine.yaml").write_text(text)
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=message):
         load_robot_file(tmp_path / "mine.yaml")
 

@@ -8,14 +8,16 @@ import re
 import numpy as np
 import pytest
 
-from gravcomp.calibration import plan as planning
+from gravcomp.calibration import pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
-from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of, make_plan
+from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
+from gravcomp.calibration.planning import make_plan
+from gravcomp.calibration.pose_candidates import ORIENTATIONS
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.inverse import InverseOptions
@@ -41,7 +43,7 @@ def robot():
 def plan(robot):
     """A plan from half of the orientations, with small bends: the equilibria of neighbouring poses are near each other."""
     options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
-    return make_plan(robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[::2])
+    return make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[::2])
 
 
 def test_a_plan_keeps_to_its_time_and_to_the_limits(robot, plan):
@@ -57,8 +59,8 @@ def test_pulls_of_small_robots_are_not_rounded_away(robot, tmp_path, largest_mm,
     pose = PlannedPose(0.0, 0.0, np.array([1e-3 * largest_mm, np.nan, np.nan]), ("c0",), np.full(3, 0.1), np.zeros(3))
     assert shown in pulls(robot, pose)
     write_plan_table(Plan((pose,) * 3, (1.0,) * 3, 1.0, 1.0), robot, tmp_path / "plan.csv")
-    text = (tmp_path / "plan.csv").read_text().replace(",,,\n", ",0,0,80\n")
-    (tmp_path / "plan.csv").write_text(text)
+    text = (tmp_path / "plan.csv").read_text(encoding="utf-8").replace(",,,\n", ",0,0,80\n")
+    (tmp_path / "plan.csv").write_text(text, encoding="utf-8")
     read = read_plan_table(tmp_path / "plan.csv", robot.cable_names)
     assert read.displacement[0, 0] == pytest.approx(1e-3 * largest_mm, rel=1e-3)
 
@@ -71,13 +73,29 @@ def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, pl
 
 def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
     """A turn that takes longer than all poses may; a robot that its cables hold, but that has no equilibrium without them."""
-    orientations = planning.ORIENTATIONS[:1]
+    orientations = ORIENTATIONS[:1]
     slow = PlanOptions(budget=10.0, rate=np.radians(1.0))
     with pytest.raises(ConfigError, match=r"robot 'short': no pose of \d+ s fits into 10 s; allow more time \(--time\)"):
         make_plan(robot, PERIOD, options=slow, orientations=orientations)
     heavy = dataclasses.replace(robot, payload=dataclasses.replace(robot.payload, mass=20.0))
     with pytest.raises(ConfigError, match=r"robot 'short': .*equilibrium.* no calibration can be planned"):
         make_plan(heavy, PERIOD, orientations=orientations)
+
+
+@pytest.mark.parametrize("limits", [{"displacement_min": -1e-6, "displacement_max": 1e-6}, {"tension_max": 2e-4}])
+def test_a_plan_whose_pulls_nobody_can_see_is_refused(robot, limits):
+    weak = dataclasses.replace(robot, limits=Limits(**{"tension_max": 2.0, **limits}))
+    with pytest.raises(
+        ConfigError, match=r"displacement_max_mm: .* by more than [\d.e-]+ mm.* uncertain by 0\.16 mm and 0\.5 deg"
+    ):
+        make_plan(weak, PERIOD, orientations=ORIENTATIONS[:1])
+
+
+def test_cables_with_a_short_stroke_are_pulled_as_far_as_it_allows(robot):
+    short = dataclasses.replace(robot, limits=Limits(tension_max=2.0, displacement_max=1e-6))
+    poses = make_plan(short, PERIOD, orientations=ORIENTATIONS[:1]).poses
+    moved = [np.linalg.norm(pose.tip - poses[0].tip) for pose in poses if pose.pulled]
+    assert max(moved) > 1e-3 and max(pose.displacement.max() for pose in poses) <= 1e-6
 
 
 def test_a_plan_is_read_as_it_was_saved(plan, tmp_path):
@@ -93,9 +111,9 @@ def test_a_filled_table_becomes_windows_at_rest(robot, plan, tmp_path):
     assert is_plan_table(path)
     with pytest.raises(MeasurementError, match="0 rows have a tip"):
         read_plan_table(path, robot.cable_names)
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     filled = [lines[0], *(line.removesuffix(",,,") + ",-10.5,0.2,79" if n < 4 else line for n, line in enumerate(lines[1:]))]
-    path.write_text("\n".join(filled))
+    path.write_text("\n".join(filled), encoding="utf-8")
     windows = read_plan_table(path, robot.cable_names)
     assert len(windows.gravity) == 4
     np.testing.assert_allclose(windows.tip_position[0], [-10.5e-3, 0.2e-3, 79e-3])
@@ -158,15 +176,15 @@ def test_no_pose_is_lost_on_a_full_disk(robot, tmp_path, monkeypatch):
     session = LiveSession(robot, session_plan(), out)
     now = run(session, 0.0, 0.0, 3.5)
     assert session.finished == 1
-    first, fsync = out.read_text(), os.fsync
+    first, fsync = out.read_text(encoding="utf-8"), os.fsync
     monkeypatch.setattr(os, "fsync", full_disk)
     now = run(session, 1.0, run(session, 0.0, now, 3.5), 3.5)
     assert session.phase == Phase.DONE and not session.save()
     assert "No space left" in session.sentence() and "are kept" in session.sentence()
-    assert out.read_text() == first and [path.name for path in tmp_path.iterdir()] == ["live.csv"]
+    assert out.read_text(encoding="utf-8") == first and [path.name for path in tmp_path.iterdir()] == ["live.csv"]
     monkeypatch.setattr(os, "fsync", fsync)
     assert session.save() and session.unwritten == "" and "all 3 poses" in session.sentence()
-    assert out.read_text().startswith(first) and LiveSession(robot, session_plan(), out).finished == 3
+    assert out.read_text(encoding="utf-8").startswith(first) and LiveSession(robot, session_plan(), out).finished == 3
 
 
 def full_disk(number):
@@ -233,9 +251,7 @@ def test_a_pull_arrives_slower_and_slower_and_never_runs_past_its_goal(robot):
 def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
     """At every station, after the released robot and before single cables: so every cable is wound in to where it pulls."""
     options = PlanOptions(budget=60.0, fewest=6, most=9, bend=np.radians(15.0))
-    plan = make_plan(
-        robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[:2], inverse=InverseOptions(pretension=0.02)
-    )
+    plan = make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[:2], inverse=InverseOptions(pretension=0.02))
     for station in {pose.station for pose in plan.poses}:
         free, straight, *single = [pose for pose in plan.poses[:-1] if pose.station == station]
         assert not free.pulled and straight.pulled == robot.cable_names
@@ -249,15 +265,15 @@ def test_a_plan_holds_the_robot_straight_as_the_controller_does(robot):
     ]
     assert all(winds_in)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "held_at_rest", lambda simulator, *_: simulator.solve(GRAVITY, tension=np.full(3, 1.9)))
-        tight = make_plan(robot, PERIOD, options=options, orientations=planning.ORIENTATIONS[:1], inverse=InverseOptions())
+        patch.setattr(pose_candidates, "held_at_rest", lambda simulator, *_: simulator.solve(GRAVITY, tension=np.full(3, 1.9)))
+        tight = make_plan(robot, PERIOD, options=options, orientations=ORIENTATIONS[:1], inverse=InverseOptions())
     assert all(len(pose.pulled) <= 1 and pose.tension.max() <= 0.7 * robot.limits.tension_max for pose in tight.poses)
 
 
 def test_a_robot_without_cables_has_a_plan(robot):
     bare = dataclasses.replace(robot, cables=())
     options = PlanOptions(budget=60.0, fewest=6, most=9)
-    plan = make_plan(bare, PERIOD, options=options, orientations=planning.ORIENTATIONS[:1], inverse=InverseOptions())
+    plan = make_plan(bare, PERIOD, options=options, orientations=ORIENTATIONS[:1], inverse=InverseOptions())
     assert len(plan.poses) >= 2 and not any(pose.pulled for pose in plan.poses)
 
 

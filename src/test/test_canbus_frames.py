@@ -12,7 +12,7 @@ from gravcomp.canbus import c610, codec
 from gravcomp.canbus.imu_scales import accelerometer_scale, gyroscope_scale
 from gravcomp.description.hardware import MOTOR_IDS
 
-DBC = resources.files("gravcomp.canbus").joinpath("gravcomp.dbc").read_text()
+DBC = resources.files("gravcomp.canbus").joinpath("gravcomp.dbc").read_text(encoding="utf-8")
 DATABASE = cantools.database.load_string(DBC, "dbc")
 
 
@@ -76,7 +76,7 @@ def test_values_that_do_not_fit_are_refused(value):
 
 
 def test_every_frame_of_the_dbc_is_documented():
-    page = resources.files("gravcomp.canbus").joinpath("FRAMES.md").read_text()
+    page = resources.files("gravcomp.canbus").joinpath("FRAMES.md").read_text(encoding="utf-8")
     for message in DATABASE.messages:
         if message.name.startswith("Motor"):
             continue  # the page lists the C610's frames as ranges of ids

@@ -1,6 +1,7 @@
 """What all commands have in common: --help, --json, --quiet, exit codes, version, completion."""
 
 import argparse
+import io
 import json
 import re
 import subprocess
@@ -78,6 +79,16 @@ def test_without_json_the_result_is_for_reading(tmp_path, capsys):
     assert "gyroscope bias" in printed.out and not printed.err
 
 
+def test_what_the_terminal_cannot_show_is_replaced(monkeypatch):
+    """A robot with an umlaut in its name, in a terminal for ASCII."""
+    shown = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii"))
+    output.configure(json=False, quiet=False)
+    output.result({}, "gr\u00f6\u00dfe: 3 mm")
+    sys.stdout.flush()
+    assert shown.getvalue() == b"gr??e: 3 mm\n"
+
+
 def test_quiet_keeps_errors(capsys):
     assert main(["estimate", "nowhere.npz", "--quiet", "--json"]) == 2
     printed = capsys.readouterr()
@@ -140,16 +151,16 @@ def test_the_version_needs_no_repository(tmp_path):
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_has_the_same_version(package):
     folder = ROOT / package
-    manifest = (folder / "package.xml").read_text()
+    manifest = (folder / "package.xml").read_text(encoding="utf-8")
     assert f"<version>{__version__}</version>" in manifest
     if (folder / "setup.py").exists():
-        assert f'version="{__version__}"' in (folder / "setup.py").read_text()
+        assert f'version="{__version__}"' in (folder / "setup.py").read_text(encoding="utf-8")
 
 
 def test_citation_and_changelog_name_the_version():
-    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text()
-    assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text()
-    assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert "## [Unreleased]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_what_is_compiled_is_said_and_what_fails_is_named(monkeypatch, capsys):

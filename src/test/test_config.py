@@ -34,6 +34,8 @@ def test_edge_units_become_si_and_come_back():
     ("mapping", "words"),
     [
         ({"tubes": [{"length_mm": -5}]}, ["f.yaml", "tubes[0].length_mm", "-5", "1 to 2000 mm"]),
+        ({"tubes": [{"length_mm": 0.05}]}, ["1 to 2000 mm (looks like m: 50 mm)"]),
+        ({"tubes": [{"length_mm": 0.5}]}, ["looks like cm: 5 mm or m: 500 mm"]),
         ({"tubes": [{"lenght_mm": 5}]}, ["f.yaml", "tubes[0].lenght_mm", "did you mean 'length_mm'"]),
         ({"tubes": [{}]}, ["f.yaml", "tubes[0].length_mm", "missing"]),
         ({"tubes": 3}, ["f.yaml", "tubes", "3", "list"]),
@@ -63,7 +65,7 @@ def test_declared_parameters_list_edge_defaults():
 @pytest.mark.parametrize(("text", "words"), [("a: [1", ["line"]), ("a: 1\na: 2", ["line 2", "twice"]), ("\tb: 1", ["line 1"])])
 def test_broken_yaml_names_the_line(tmp_path, text, words):
     path = tmp_path / "robot.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as error:
         load_yaml(path)
     for word in [str(path), *words]:
@@ -74,7 +76,7 @@ def test_broken_yaml_names_the_line(tmp_path, text, words):
 def test_a_document_that_is_nested_too_deeply_is_refused(tmp_path, depth):
     """Libyaml ends the process where its stack overflows."""
     path = tmp_path / "robot.yaml"
-    path.write_text("[" * depth)
+    path.write_text("[" * depth, encoding="utf-8")
     with pytest.raises(ConfigError, match="is nested too deeply"):
         load_yaml(path)
 

@@ -45,9 +45,9 @@ def test_the_tree_of_euroc_with_its_truth(tmp_path):
     imu, truth = tmp_path / "mav0" / "imu0", tmp_path / "mav0" / "state_groundtruth_estimate0"
     imu.mkdir(parents=True)
     truth.mkdir()
-    (imu / "data.csv").write_text(lines(EUROC, rows(NS, GYRO, ACCEL)))
+    (imu / "data.csv").write_text(lines(EUROC, rows(NS, GYRO, ACCEL)), encoding="utf-8")
     turned = np.tile([0.0, 0.0, 0.0, 0.6, 0.8, 0.0, 0.0], (N, 1))
-    (truth / "data.csv").write_text(lines(EUROC_TRUTH, rows(NS[2:], turned[2:])))
+    (truth / "data.csv").write_text(lines(EUROC_TRUTH, rows(NS[2:], turned[2:])), encoding="utf-8")
     for path in (tmp_path, imu / "data.csv"):
         recording = read_recording(path)
         check(recording)
@@ -58,7 +58,7 @@ def test_the_tree_of_euroc_with_its_truth(tmp_path):
 def test_repoimu_with_two_lines_of_header(tmp_path):
     path = tmp_path / "TStick_Test02_Trial1.csv"
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (N, 1))
-    path.write_text(lines(REPO, rows(SECONDS, turned, ACCEL, GYRO, np.ones((N, 3))), ";"))
+    path.write_text(lines(REPO, rows(SECONDS, turned, ACCEL, GYRO, np.ones((N, 3))), ";"), encoding="utf-8")
     recording = read_recording(path)
     check(recording)
     assert recording.orientation[3].tolist() == [1.0, 0.0, 0.0, 0.0]
@@ -67,7 +67,7 @@ def test_repoimu_with_two_lines_of_header(tmp_path):
 def test_x_imu3_in_degrees_and_g(tmp_path):
     path = tmp_path / "inertial.csv"
     times = [1000 + 5000 * k for k in range(N)]
-    path.write_text(lines(XIMU3, rows(times, np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))))
+    path.write_text(lines(XIMU3, rows(times, np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))), encoding="utf-8")
     recording = read_recording(path)
     check(recording)
     assert "the gyroscope is in deg/s by its header: converted" in recording.notes
@@ -75,22 +75,22 @@ def test_x_imu3_in_degrees_and_g(tmp_path):
 
 def test_x_imu_needs_a_rate(tmp_path):
     path, mapping = tmp_path / "CalInertialAndMag.csv", tmp_path / "columns.yaml"
-    path.write_text(lines(XIMU, rows(range(N), np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))))
+    path.write_text(lines(XIMU, rows(range(N), np.degrees(GYRO), ACCEL / STANDARD_GRAVITY, np.ones((N, 3)))), encoding="utf-8")
     with pytest.raises(RecordingError, match=r"no column of time among Packet number.*rate"):
         read_recording(path)
     gyro, accel = (
         [f"{name} {axis} ({unit})" for axis in "XYZ"] for name, unit in (("Gyroscope", "deg/s"), ("Accelerometer", "g"))
     )
-    mapping.write_text(f"rate: 200\ngyro: {gyro}\ngyro_unit: deg/s\naccel: {accel}\naccel_unit: g\n")
+    mapping.write_text(f"rate: 200\ngyro: {gyro}\ngyro_unit: deg/s\naccel: {accel}\naccel_unit: g\n", encoding="utf-8")
     check(read_recording(path, columns=read_mapping(str(mapping))))
 
 
 def logger_files(folder, accel):
     folder.mkdir()
-    (folder / "Gyroscope.csv").write_text(lines(LOGGER, rows(NS, SECONDS, GYRO[:, ::-1])))
+    (folder / "Gyroscope.csv").write_text(lines(LOGGER, rows(NS, SECONDS, GYRO[:, ::-1])), encoding="utf-8")
     for name, values in accel.items():
-        (folder / f"{name}.csv").write_text(lines(LOGGER, rows(NS, SECONDS, values[:, ::-1])))
-    (folder / "Metadata.csv").write_text("version,device name\n3,phone\n")
+        (folder / f"{name}.csv").write_text(lines(LOGGER, rows(NS, SECONDS, values[:, ::-1])), encoding="utf-8")
+    (folder / "Metadata.csv").write_text("version,device name\n3,phone\n", encoding="utf-8")
     return folder
 
 
@@ -120,8 +120,8 @@ def test_phyphox_in_several_languages_and_with_decimal_commas(tmp_path, time, ac
     def header(name):
         return separator.join([time, *(name.format(axis) for axis in "xyz")])
 
-    (tmp_path / "Gyroscope.csv").write_text(lines(header(gyro), rows(SECONDS, GYRO), separator, comma))
-    (tmp_path / "Accelerometer.csv").write_text(lines(header(accel), rows(later, at), separator, comma))
+    (tmp_path / "Gyroscope.csv").write_text(lines(header(gyro), rows(SECONDS, GYRO), separator, comma), encoding="utf-8")
+    (tmp_path / "Accelerometer.csv").write_text(lines(header(accel), rows(later, at), separator, comma), encoding="utf-8")
     recording = read_recording(tmp_path)
     assert len(recording) == N - 1 and recording.accel[:-1] == pytest.approx(ACCEL[1:-1], abs=1e-6)
     assert recording.gyro == pytest.approx(GYRO[1:])
@@ -132,7 +132,7 @@ def test_phyphox_in_several_languages_and_with_decimal_commas(tmp_path, time, ac
 )
 @pytest.mark.parametrize("unit", [1.0, 1e3, 1e6, 1e9])
 def test_usual_names_in_any_unit_of_time(tmp_path, names, unit):
-    (tmp_path / "a.csv").write_text(lines(names, rows([round(unit * t, 6) for t in SECONDS], GYRO, ACCEL)))
+    (tmp_path / "a.csv").write_text(lines(names, rows([round(unit * t, 6) for t in SECONDS], GYRO, ACCEL)), encoding="utf-8")
     check(read_recording(tmp_path / "a.csv"))
 
 
@@ -184,13 +184,15 @@ def test_encodings_separators_and_ends_of_lines(tmp_path, encoding, separator, c
 
 def test_columns_in_another_order_with_gaps_and_a_separator_at_the_end(tmp_path):
     table = rows(ACCEL[:, ::-1], [""] * N, GYRO[:, ::-1], SECONDS, [""] * N)
-    (tmp_path / "a.csv").write_text(lines("az,ay,ax,note,gz,gy,gx,t", table))
+    (tmp_path / "a.csv").write_text(lines("az,ay,ax,note,gz,gy,gx,t", table), encoding="utf-8")
     check(read_recording(tmp_path / "a.csv"))
 
 
 @pytest.mark.parametrize("first", ["PacketID", "loggingTime(txt)", "timestamp (+0100)"])
 def test_a_column_that_is_no_usable_time_is_passed_over(tmp_path, first):
-    (tmp_path / "a.csv").write_text(lines(f"{first},elapsed (s),gx,gy,gz,ax,ay,az", rows(range(N), SECONDS, GYRO, ACCEL)))
+    (tmp_path / "a.csv").write_text(
+        lines(f"{first},elapsed (s),gx,gy,gz,ax,ay,az", rows(range(N), SECONDS, GYRO, ACCEL)), encoding="utf-8"
+    )
     check(read_recording(tmp_path / "a.csv"))
 
 
@@ -202,7 +204,7 @@ def test_a_magnetometer_is_no_accelerometer(tmp_path):
 def test_seconds_and_nanoseconds_in_two_columns(tmp_path):
     header = "header.stamp.sec,header.stamp.nanosec,gx,gy,gz,ax,ay,az"
     table = rows([t // 10**9 for t in NS], [t % 10**9 for t in NS], GYRO, ACCEL)
-    (tmp_path / "a.csv").write_text(lines(header, table))
+    (tmp_path / "a.csv").write_text(lines(header, table), encoding="utf-8")
     recording = read_recording(tmp_path / "a.csv")
     check(recording)
     assert recording.stamp_ns.tolist() == NS
@@ -210,12 +212,14 @@ def test_seconds_and_nanoseconds_in_two_columns(tmp_path):
 
 @pytest.mark.parametrize("form", ["2026-03-01 12:00:0{:.3f}", "2026-03-01T12:00:0{:.3f}Z", "12:00:0{:.3f}"])
 def test_times_of_a_clock(tmp_path, form):
-    (tmp_path / "a.csv").write_text(lines("time,gx,gy,gz,ax,ay,az", rows([form.format(t) for t in SECONDS], GYRO, ACCEL)))
+    (tmp_path / "a.csv").write_text(
+        lines("time,gx,gy,gz,ax,ay,az", rows([form.format(t) for t in SECONDS], GYRO, ACCEL)), encoding="utf-8"
+    )
     check(read_recording(tmp_path / "a.csv"))
 
 
 def test_the_last_line_may_be_cut_off(tmp_path):
-    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)) + "0.03,0.1,")
+    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)) + "0.03,0.1,", encoding="utf-8")
     check(read_recording(tmp_path / "a.csv"))
 
 
@@ -250,17 +254,17 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("text", "words"), MISTAKES)
 def test_an_unusable_file_is_refused_with_what_was_found(tmp_path, text, words):
-    (tmp_path / "bad.csv").write_text(text)
+    (tmp_path / "bad.csv").write_text(text, encoding="utf-8")
     with pytest.raises(RecordingError, match=words) as refusal:
         read_recording(tmp_path / "bad.csv")
     assert "bad.csv" in str(refusal.value)
 
 
 def test_a_mapping_with_a_wrong_name_or_unit_is_refused(tmp_path):
-    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)))
-    (tmp_path / "map.yaml").write_text("time: t\ngyro: [gx, gy, wz]\naccel: [ax, ay, az]\n")
+    (tmp_path / "a.csv").write_text(lines("t,gx,gy,gz,ax,ay,az", rows(SECONDS, GYRO, ACCEL)), encoding="utf-8")
+    (tmp_path / "map.yaml").write_text("time: t\ngyro: [gx, gy, wz]\naccel: [ax, ay, az]\n", encoding="utf-8")
     with pytest.raises(RecordingError, match="no column 'wz'; found: t, gx"):
         read_recording(tmp_path / "a.csv", columns=read_mapping(str(tmp_path / "map.yaml")))
-    (tmp_path / "map.yaml").write_text("gyro: [gx, gy, gz]\naccel: [ax, ay, az]\naccel_unit: ounces\n")
+    (tmp_path / "map.yaml").write_text("gyro: [gx, gy, gz]\naccel: [ax, ay, az]\naccel_unit: ounces\n", encoding="utf-8")
     with pytest.raises(ConfigError, match="accel_unit is 'ounces'; allowed"):
         read_mapping(str(tmp_path / "map.yaml"))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import pytest
 import yaml
@@ -31,7 +32,7 @@ def robot(tmp_path):
             "limits": limits,
         }
         path = tmp_path / "tube.yaml"
-        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}, **(hardware or {})}}))
+        path.write_text(yaml.safe_dump({"robot": body, "hardware": {"drive": drive or {}, **(hardware or {})}}), encoding="utf-8")
         return load_robot_file(path)
 
     return make
@@ -41,6 +42,27 @@ def test_a_tube_bends_by_its_weight_as_a_cantilever(robot):
     # q L^3 / (6 E I), with I / A = d^2 / 16
     expected = 1000 * 9.80665 * 0.05**3 / (6 * 2e6 * 0.004**2 / 16)
     assert bend_by_own_weight(robot(50, 4, 2.0).robot) == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_tube_from_a_file_gets_the_capstans_of_the_described_one(robot, tmp_path):
+    creation = pytest.importorskip("trimesh.creation")
+    described = robot(50, 4, 2.0)
+    section = described.sections["robot"]
+    tube = creation.cylinder(2.0, 50.0, sections=48)
+    tube.apply_translation([0.0, 0.0, 25.0])
+    tube.export(tmp_path / "tube.stl")
+
+    def capstan(file):
+        body = {"file": file, "length_mm": 50.0, "material": section["segments"][0]["material"], "axis": "auto"}
+        cables = [{"end_mm": 50.0} | {k: v for k, v in cable.items() if k != "segment"} for cable in section["cables"]]
+        path = tmp_path / "from_file.yaml"
+        path.write_text(yaml.safe_dump({"robot": {"name": "tube", "body": body, "cables": cables}}), encoding="utf-8")
+        return load_robot_file(path).hardware.drive.capstan_radius
+
+    radius = described.hardware.drive.capstan_radius
+    assert radius < 0.5 * STANDARD.capstan_radius
+    assert capstan("tube.stl") == pytest.approx(radius, rel=0.02)  # the surface has flat sides
+    assert capstan("gone.stl") == STANDARD.capstan_radius  # refused where the body is needed
 
 
 @pytest.mark.parametrize(("length", "diameter", "modulus"), [(50, 4, 2.0), (40, 8, 0.3), (120, 6, 1.0)])
@@ -99,7 +121,20 @@ def test_homing_pulls_no_more_than_the_robot_stands_or_is_refused(robot, length,
 def test_a_small_capstan_with_the_standard_homing_is_refused(robot):
     hardware = robot(40, 8, 0.3, drive={"capstan_radius_mm": 0.2}, hardware={"homing": {"current_rise": 0.06}}).hardware
     assert "54 N before it counts as taut, and 5 N are allowed" in hardware.strong_homing
-    assert "may be 0.0056 A" in hardware.strong_homing
+    assert "may be 0.0055 A" in hardware.strong_homing and "A larger capstan" in hardware.strong_homing
+
+
+@pytest.mark.parametrize("tension", [1.0, 5.0])
+def test_a_refused_homing_says_that_the_capstans_are_assumed_and_what_would_be_allowed(robot, tension):
+    motors = {"motors": MOTORS}
+    refused = robot(50, 4, 2.0, hardware=motors, tension_max=tension).hardware
+    assert "capstans of 0.27 mm are assumed" in refused.strong_homing
+    assert "the virtual robot needs no homing" in refused.strong_homing
+    rise = re.search(r"current_rise may be ([\d.]+) A", refused.strong_homing)
+    assert (rise is None) == (tension == 1.0)  # 0.0015 A is less than the key may be
+    if rise:
+        homed = robot(50, 4, 2.0, hardware=motors | {"homing": {"current_rise": float(rise[1])}}, tension_max=tension)
+        assert not homed.hardware.strong_homing
 
 
 def test_the_article_is_homed():

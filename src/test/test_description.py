@@ -12,12 +12,12 @@ from gravcomp.description import load_robot_file, shipped_robots
 
 @pytest.fixture
 def document():
-    return copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text()))
+    return copy.deepcopy(yaml.safe_load(shipped_robots()["article"].read_text(encoding="utf-8")))
 
 
 def load(document, folder):
     path = folder / "robot.yaml"
-    path.write_text(yaml.safe_dump(document))
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
     return load_robot_file(path)
 
 
@@ -49,6 +49,14 @@ def test_imu_mount_rotates_from_the_imu_into_the_base(document, tmp_path):
     document["robot"]["imu_mount"] = {"rpy_deg": [30.0, -70.0, 130.0]}
     rotation = load(document, tmp_path).robot.imu_mount.rotation
     assert rotation @ rotation.T == pytest.approx(np.eye(3)) and np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_segments_in_another_unit_than_the_cables_are_named(document, tmp_path):
+    for segment in document["robot"]["segments"]:
+        segment["length_mm"] /= 10.0
+    document["robot"]["cables"] = [{"name": "c", "angle_deg": 0.0, "radius_mm": 3.0, "end_mm": 95.0}]
+    with pytest.raises(ConfigError, match=r"ends at 95 mm.* length 10 mm; the segments look like cm: they would be 100 mm long"):
+        load(document, tmp_path)
 
 
 def change(path, value):

@@ -36,7 +36,7 @@ def test_what_only_tests_need_is_not_in_the_locks_of_the_product():
 
 def test_locks_agree_on_the_versions_of_common_packages():
     def versions(lock):
-        lines = [line.split() for line in (ROOT / lock).read_text().splitlines()]
+        lines = [line.split() for line in (ROOT / lock).read_text(encoding="utf-8").splitlines()]
         found = {}
         for words in lines:
             if words and "==" in words[0] and not words[0].startswith(("#", "-")):
@@ -52,7 +52,7 @@ def test_locks_agree_on_the_versions_of_common_packages():
 
 def test_no_lock_names_an_index():
     for lock in ROOT.glob("requirements*.lock"):
-        assert "://" not in lock.read_text(), lock.name
+        assert "://" not in lock.read_text(encoding="utf-8"), lock.name
 
 
 @pytest.mark.parametrize("same", [True, False])

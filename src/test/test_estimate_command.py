@@ -35,7 +35,7 @@ def test_a_trial_is_judged_and_written(tmp_path, capsys):
 
 
 def test_a_file_that_cannot_be_used_is_one_sentence_and_code_2(tmp_path, capsys):
-    (tmp_path / "bad.npz").write_text("nothing")
+    (tmp_path / "bad.npz").write_text("nothing", encoding="utf-8")
     assert run(tmp_path / "bad.npz") == 2
     assert "bad.npz: is not an .npz file" in capsys.readouterr().err
 

@@ -53,4 +53,4 @@ def test_an_own_robot_is_read_varied_and_compensated():
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_every_example_is_run(path):
-    assert f'output_of("{path.name}")' in Path(__file__).read_text()
+    assert f'output_of("{path.name}")' in Path(__file__).read_text(encoding="utf-8")

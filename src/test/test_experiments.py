@@ -117,14 +117,14 @@ def test_a_page_is_self_contained_and_says_reached_and_missed_beside_the_figures
         parts=[Table("T", ("a", "b"), [("x", 1.23456)]), Plot("P", "<svg></svg>")],
         parameters={"array": np.arange(2)},
     )
-    page = write_report(result, tmp_path).read_text()
+    page = write_report(result, tmp_path).read_text(encoding="utf-8")
     assert page.count("badge reached") == 1 + page.count(".badge reached") and page.count('class="badge missed"') == 2
     assert "A &lt;sample&gt;" in page and "src=" not in page and "http" not in page
-    document = json.loads((tmp_path / "sample.json").read_text())
+    document = json.loads((tmp_path / "sample.json").read_text(encoding="utf-8"))
     assert document["reached"] is False
     assert [f["reached"] for f in document["figures"]] == [True, False, False]
     assert document["figures"][2]["value"] is None
-    assert "1 of 3 figures" in write_index([result], tmp_path).read_text()
+    assert "1 of 3 figures" in write_index([result], tmp_path).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -42,10 +42,10 @@ def test_a_missed_limit_is_said():
 
 def test_only_the_command_s_own_table_is_renewed(tmp_path):
     path = tmp_path / "figures.md"
-    path.write_text(DOCUMENT)
+    path.write_text(DOCUMENT, encoding="utf-8")
     for value in (1.0, 2.0):  # the second time over the first's
         renew(path, "bench engine", [Figure("error", value, "mm")])
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert "| error | 2.00 mm |" in text and "1.00" not in text and "old" not in text
     assert text.startswith("before\n<!-- figures bench engine -->\n") and text.endswith("kept\n<!-- end -->\n")
 
@@ -54,7 +54,7 @@ def test_a_document_without_a_place_is_refused_before_anything_is_measured(tmp_p
     path = tmp_path / "figures.md"
     with pytest.raises(ConfigError, match="cannot be read"):
         check_place(path, "bench engine")
-    path.write_text(DOCUMENT)
+    path.write_text(DOCUMENT, encoding="utf-8")
     check_place(path, "bench engine")
     with pytest.raises(ConfigError, match="<!-- figures bench soak -->"):
         check_place(path, "bench soak")

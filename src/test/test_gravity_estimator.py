@@ -140,7 +140,7 @@ def test_a_file_that_is_no_bias_model_is_refused_by_name(tmp_path):
     path = tmp_path / "bias.json"
     assert BiasTemperatureModel.load(path).span is None
     for text in ("not json", '{"format": "other", "bins": []}', '{"format": "gravcomp bias over temperature 1", "bins": [{}]}'):
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         with pytest.raises(BiasModelError, match=r"bias\.json"):
             BiasTemperatureModel.load(path)
 

@@ -315,7 +315,7 @@ def test_a_guard_that_was_killed_or_hangs_is_replaced(driven, hardware, bus):
 def is_connected(hardware):
     """Return whether the guard listens and a bridge is admitted: two sockets have this name."""
     address = GuardSettings(dataclasses.asdict(hardware.can), [], 1.0).address.replace("\0", "@")
-    return Path("/proc/net/unix").read_text().count(address) == 2
+    return Path("/proc/net/unix").read_text(encoding="utf-8").count(address) == 2
 
 
 def drain_now(bus):

@@ -188,7 +188,7 @@ MICRO = {
 
 def test_info_prints_and_draws_the_answer(tmp_path, capsys):
     file, picture = tmp_path / "rod.yaml", tmp_path / "sphere.png"
-    file.write_text(FILE.replace("LIMIT", "0.5"))
+    file.write_text(FILE.replace("LIMIT", "0.5"), encoding="utf-8")
     assert main(["model", "info", str(file), "--directions", "4", "--picture", str(picture), "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     hold = figures["hold"]
@@ -208,7 +208,7 @@ def test_backlash_leaves_more_than_the_sag_of_a_robot_that_hardly_sags_unless_ca
     plays = []
     for drive in ({"capstan_radius_mm": 5.0}, {}):
         path = tmp_path / "micro.yaml"
-        path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive}}))
+        path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive}}), encoding="utf-8")
         file = load_robot_file(path)
         sag = Simulator(file.robot, reduced=False).solve(np.array([-9.81, 0.0, 0.0]))
         plays.append(play_of(file.hardware, sag.response, np.array([0.0, 0.0, 1.0]), abs(sag.tip_position[0])))
@@ -222,7 +222,7 @@ def test_backlash_leaves_more_than_the_sag_of_a_robot_that_hardly_sags_unless_ca
 
 def test_info_leaves_it_out_on_demand(tmp_path, capsys):
     file = tmp_path / "rod.yaml"
-    file.write_text(FILE.replace("LIMIT", "0.5"))
+    file.write_text(FILE.replace("LIMIT", "0.5"), encoding="utf-8")
     assert main(["model", "info", str(file), "--no-hold", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["hold"] is None and figures["motors"]["tension_n"] > 0.5 and figures["motors"]["advice"] == ""
@@ -236,7 +236,7 @@ def test_motors_that_are_weaker_than_the_limit_of_tension_are_named(tmp_path):
     motors = [{"cable": "a", "can_id": 1, "also": {"b": -2.0}}, {"cable": "c", "can_id": 2}]
     drive = {"capstan_radius_mm": 3.0, "current_limit": 0.05}
     path = tmp_path / "weak.yaml"
-    path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive, "motors": motors}}))
+    path.write_text(yaml.safe_dump({"robot": MICRO, "hardware": {"drive": drive, "motors": motors}}), encoding="utf-8")
     hardware = load_robot_file(path).hardware
     assert hardware.weakest_tension == pytest.approx(0.05 * 0.18 / 3e-3 / 2.0)
     assert weak_motors(hardware, Limits(tension_max=1.4)) == ""

@@ -159,7 +159,7 @@ def test_relaxing_pays_the_cables_out_at_the_allowed_rate():
 
 def test_codes_are_those_of_the_message():
     names = {code.name: code.value for code in ControllerCode}
-    message = (arc_robot_root() / "gravcomp_msgs" / "msg" / "ControllerStatus.msg").read_text()
+    message = (arc_robot_root() / "gravcomp_msgs" / "msg" / "ControllerStatus.msg").read_text(encoding="utf-8")
     lines = [line.split("#")[0].removeprefix("uint8 ") for line in message.splitlines()]
     constants = dict(line.split("=") for line in lines if "=" in line)
     assert {k.strip(): int(v) for k, v in constants.items()} == names

@@ -128,9 +128,9 @@ def test_a_robot_without_cables_has_samples():
 
 
 def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):
-    shipped = Path(load_robot_file("article").source).read_text()
+    shipped = Path(load_robot_file("article").source).read_text(encoding="utf-8")
     described = re.sub(r"(?m)^  elements: .*$", "  elements: {around: 4, along: 4}", shipped)
-    (tmp_path / "robot.yaml").write_text(described)
+    (tmp_path / "robot.yaml").write_text(described, encoding="utf-8")
     assert load_robot_file(str(tmp_path / "robot.yaml")).robot == robot
     stamp = store(robot, built).stat().st_mtime_ns
     command = [sys.executable, "-m", "gravcomp.training.background", str(tmp_path / "robot.yaml")]
@@ -144,8 +144,8 @@ def test_a_second_builder_finds_the_model_of_the_first(robot, built, tmp_path):
 def test_no_builder_is_started_for_a_model_that_is_known_to_be_stored(tmp_path, monkeypatch):
     file, robot, other, started = tmp_path / "model.npz", tmp_path / "robot.yaml", tmp_path / "other.yaml", []
     file.touch()
-    robot.write_text(Path(load_robot_file("article").source).read_text())
-    other.write_text(robot.read_text().replace("grading: 16.0", "grading: 8.0"))
+    robot.write_text(Path(load_robot_file("article").source).read_text(encoding="utf-8"), encoding="utf-8")
+    other.write_text(robot.read_text(encoding="utf-8").replace("grading: 16.0", "grading: 8.0"), encoding="utf-8")
 
     def start(name: str, output: int) -> subprocess.Popen:
         line = f"{file.stat().st_mtime_ns} {file}"

@@ -91,6 +91,6 @@ ROWS = "\n".join(f"{k},{1.0 + 1.0 / k}" for k in range(1, 20))
 )
 def test_tables_that_are_no_test_are_refused(tmp_path, text, found):
     table = tmp_path / "test.csv"
-    table.write_text(text)
+    table.write_text(text, encoding="utf-8")
     with pytest.raises(MeasurementError, match=found):
         read_material_recording(table)

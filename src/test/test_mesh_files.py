@@ -120,6 +120,27 @@ def test_inches_are_named_as_a_possibility(tmp_path):
     assert placed(inches(tmp_path), unit=25.4e-3).length == pytest.approx(0.08)
 
 
+@pytest.mark.parametrize(
+    ("in_mm", "file_unit", "end", "message"),
+    [
+        (0.1, None, 0.070, r"looks like cm: with body\.file_unit_mm: 10 the body is 80 mm long"),
+        (1 / 25.4, 1e-3, 0.080, r"looks like inch: with body\.file_unit_mm: 25\.4 the body is 80 mm long"),
+        (
+            1e-3,
+            1e-3,
+            0.080,
+            r"0\.08 mm long with the unit mm, as declared; allowed: 1 to .*m \(80 mm\): file_unit_mm: 1000",
+        ),
+        (0.1, None, 0.008, r"it must lie inside \(the file: unit mm, guessed.*: 8 mm long\)"),
+    ],
+)
+def test_a_unit_that_does_not_suit_the_cables_is_named(tmp_path, in_mm, file_unit, end, message):
+    nodes, cells = cone()
+    body = MeshBody(write(tmp_path / "cone.vtk", in_mm * nodes, cells), file_unit=file_unit)
+    with pytest.raises(ValueError, match=message):
+        RobotModel(Robot("cone", body=body, cables=(Cable("c", angle=0.0, radius=2.2e-3, end=end),)))
+
+
 def test_a_length_that_is_a_little_off_is_put_right(tmp_path):
     with pytest.raises(MeshError, match="write length_mm: 80, or leave it out"):
         placed(write(tmp_path / "cone.vtk", *cone()), length=0.0805)
@@ -225,7 +246,7 @@ def test_two_bodies_are_refused(tmp_path):
 )  # fmt: skip
 def test_ten_million_elements_are_refused_before_they_are_read(tmp_path, name, head):
     path = tmp_path / name
-    path.write_text(head)
+    path.write_text(head, encoding="utf-8")
     refused(path, "10000000 cells; body.elements_max allows 20000")
 
 
@@ -285,7 +306,7 @@ def test_a_body_off_the_base_is_refused(tmp_path):
     ("name", "words"), [("a.3ds", "'.3ds' is not read"), ("a.vtk", "not what '.vtk' stands for"), ("a.stl", "a.stl")]
 )
 def test_what_is_no_mesh_is_refused(tmp_path, name, words):
-    (tmp_path / name).write_text("no mesh")
+    (tmp_path / name).write_text("no mesh", encoding="utf-8")
     refused(tmp_path / name, words)
     refused(tmp_path / "missing.vtk", "does not exist")
 
@@ -294,7 +315,8 @@ def robot_file(folder, body: str) -> str:
     write(folder / "cone.vtk", *cone())
     (folder / "robot.yaml").write_text(
         f"robot:\n  name: cone\n  body: {{file: cone.vtk, {body}}}\n"
-        "  cables: [{name: a, angle_deg: 0.0, radius_mm: 2.2, end_mm: 80.0}]\n"
+        "  cables: [{name: a, angle_deg: 0.0, radius_mm: 2.2, end_mm: 80.0}]\n",
+        encoding="utf-8",
     )
     return str(folder / "robot.yaml")
 

@@ -100,7 +100,7 @@ def test_without_gmsh_the_line_that_installs_it_is_named(tmp_path, own_cache, mo
     path = stl(tmp_path, *surface())
     if suffix == ".step":
         path = str(tmp_path / "body.step")
-        (tmp_path / "body.step").write_text("ISO-10303-21;")
+        (tmp_path / "body.step").write_text("ISO-10303-21;", encoding="utf-8")
     with pytest.raises(MeshError, match=r"Gmsh, .*is not installed; run: \./gravcomp mesh install$"):
         body_mesh(Robot("tube", body=MeshBody(path, element_size=3e-3)))
 

@@ -22,7 +22,7 @@ def test_solve_prints_the_shape(capsys):
 
 def test_solve_reaches_a_target(tmp_path, capsys):
     coarse = tmp_path / "coarse.yaml"
-    coarse.write_text("base: article\nrobot:\n  elements: {around: 4, along: 4}\n")
+    coarse.write_text("base: article\nrobot:\n  elements: {around: 4, along: 4}\n", encoding="utf-8")
     arguments = [str(coarse), "--gravity", "-9.81", "0", "0", "--target", "0", "0", "99", "--full", "--json"]
     assert main(["model", "solve", *arguments]) == 0
     figures = json.loads(capsys.readouterr().out)
@@ -36,7 +36,7 @@ def test_view_writes_a_picture(tmp_path, capsys):
 
 def test_info_tells_masses_modes_and_reach(tmp_path, capsys):
     weak = tmp_path / "weak.yaml"  # far from the bends at which its equilibria take many steps
-    weak.write_text("base: mesh_body\nrobot:\n  limits: {tension_max: 0.3}\n")
+    weak.write_text("base: mesh_body\nrobot:\n  limits: {tension_max: 0.3}\n", encoding="utf-8")
     assert main(["model", "info", str(weak), "--directions", "4", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["mass_g"] == pytest.approx(3.44, abs=0.05) and figures["mesh"]["kind"] == "tet10"
@@ -56,7 +56,7 @@ def test_a_mesh_that_has_to_be_chosen_is_announced(command, monkeypatch, tmp_pat
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
     monkeypatch.setattr(mesh_choice, "chosen_mesh", choice)
     rod = tmp_path / "rod.yaml"
-    rod.write_text("robot:\n  name: rod\n  segments: [{name: a, length_mm: 150, outer_diameter_mm: 10}]\n")
+    rod.write_text("robot:\n  name: rod\n  segments: [{name: a, length_mm: 150, outer_diameter_mm: 10}]\n", encoding="utf-8")
     assert main(["model", command[0], str(rod), *command[1:]]) == 2
     assert "no choice in a test" in capsys.readouterr().err
 

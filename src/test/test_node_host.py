@@ -68,7 +68,7 @@ def executable(tmp_path, monkeypatch):
 
     def install(text: str, name: str = "node", interpreter: str = sys.executable) -> Path:
         path = package / name
-        path.write_text(f"#!{interpreter}\n{text}")
+        path.write_text(f"#!{interpreter}\n{text}", encoding="utf-8")
         path.chmod(0o755)
         return path
 
@@ -79,14 +79,14 @@ def run(host: NodeHost, path: Path, *arguments: str) -> tuple[int, str]:
     """Run an executable to its end. Return its exit code and its output."""
     log = path.with_suffix(".log")
     pid = host.start([str(path), *arguments], log, {})
-    return until(lambda: host.exit_code(pid) is not None and (host.exit_code(pid), log.read_text()))
+    return until(lambda: host.exit_code(pid) is not None and (host.exit_code(pid), log.read_text(encoding="utf-8")))
 
 
 def test_a_node_finds_itself_as_in_a_process_of_its_own(shared_host, executable, tmp_path):
     path = executable(REPORT)
     pid = shared_host.start([str(path), "--ros-args", "-p", "a:=1"], tmp_path / "log", {"VALUE": "7"})
     assert until(lambda: shared_host.exit_code(pid) is not None) and shared_host.exit_code(pid) == 0
-    found = json.loads((tmp_path / "log").read_text())
+    found = json.loads((tmp_path / "log").read_text(encoding="utf-8"))
     assert found["argv"] == [str(path), "--ros-args", "-p", "a:=1"]
     assert (found["name"], found["path"], found["value"]) == ("__main__", str(path.parent), "7")
     assert found["pid"] == found["session"] == pid
@@ -134,7 +134,7 @@ _become(["/node"], os.open(os.devnull, os.O_WRONLY), {}, os.getppid(), os.pipe()
 def test_the_command_line_and_the_mark_of_a_node_are_visible(shared_host, executable, tmp_path):
     path = executable(WAIT, "long_wait")
     pid = shared_host.start([str(path), "-p", "a:=1"], tmp_path / "log", {})
-    until(lambda: "ready" in (tmp_path / "log").read_text())
+    until(lambda: "ready" in (tmp_path / "log").read_text(encoding="utf-8"))
     words = Path(f"/proc/{pid}/cmdline").read_bytes().rstrip(b"\0").split(b"\0")
     assert [word.decode() for word in words[1:]] == [str(path), "-p", "a:=1"]
     assert psutil.Process(pid).name() == "long_wait"
@@ -148,13 +148,13 @@ def test_the_nodes_of_a_killed_host_get_sigint_and_are_named(own_host, executabl
     with Graph([NodeSpec("tiny", "node")], tmp_path, host=own_host) as graph:
         graph.start()
         process = graph.processes["node"]
-        until(lambda: "ready" in process.log.read_text())
+        until(lambda: "ready" in process.log.read_text(encoding="utf-8"))
         os.kill(own_host.pid, signal.SIGKILL)
         until(graph.dead)
         with pytest.raises(NodeDied, match=r"node ended with the node host \(process \d+\), which was ended by SIGKILL"):
             graph.check()
         until(lambda: process.has_ended)
-        assert "zero" in process.log.read_text()
+        assert "zero" in process.log.read_text(encoding="utf-8")
         with pytest.raises(HostError, match="SIGKILL"):
             own_host.start(["node"], tmp_path / "log", {})
 

@@ -211,13 +211,13 @@ TABLE = "case,gx,gy,gz,pull_n,weight_g,m_x_mm,m_y_mm,m_z_mm\nfirst,0,-9.81,0,1.5
 @pytest.fixture
 def mapping(tmp_path) -> Mapping:
     path = tmp_path / "mapping.yaml"
-    path.write_text(MAPPING)
+    path.write_text(MAPPING, encoding="utf-8")
     return load_mapping(path)
 
 
 def read(tmp_path, mapping: Mapping, table: str) -> Poses:
     path = tmp_path / "poses.csv"
-    path.write_text(table)
+    path.write_text(table, encoding="utf-8")
     return read_poses(path, mapping, ("c",))
 
 
@@ -319,20 +319,21 @@ def test_calibrate_fits_a_table_and_writes_the_robot(tmp_path, capsys, monkeypat
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robot.yaml").write_text(
         "robot:\n  name: bar\n  segments:\n    - {name: a, length_mm: 100, outer_diameter_mm: 12, material: {law: neo_hookean,"
-        " youngs_modulus_mpa: 0.5, density: 1100}}\n  elements: {around: 4, along: 8, grading: 1, equal_stiffness: true}\n"
+        " youngs_modulus_mpa: 0.5, density: 1100}}\n  elements: {around: 4, along: 8, grading: 1, equal_stiffness: true}\n",
+        encoding="utf-8",
     )
     (tmp_path / "mapping.yaml").write_text(
-        "gravity: [-9.81, 0, 0]\nmarkers: [{name: m, at_mm: [0, 0, 100], columns: [x_mm, y_mm, z_mm]}]\n"
+        "gravity: [-9.81, 0, 0]\nmarkers: [{name: m, at_mm: [0, 0, 100], columns: [x_mm, y_mm, z_mm]}]\n", encoding="utf-8"
     )
     bare = dataclasses.replace(ROBOT, cables=())
     tip = 1e3 * Simulator(bare.with_material(youngs_modulus=0.4e6), reduced=False).solve(GRAVITY).tip_position
-    (tmp_path / "poses.csv").write_text(f"x_mm,y_mm,z_mm\n{tip[0]},{tip[1]},{tip[2]}\n")
+    (tmp_path / "poses.csv").write_text(f"x_mm,y_mm,z_mm\n{tip[0]},{tip[1]},{tip[2]}\n", encoding="utf-8")
     assert (
         main(["calibrate", "poses.csv", "--mapping", "mapping.yaml", "--robot", "robot.yaml", "--write", "out.yaml", "--json"])
         == 0
     )
     assert "written" in capsys.readouterr().out
-    (segment,) = yaml.safe_load((tmp_path / "out.yaml").read_text())["robot"]["segments"]
+    (segment,) = yaml.safe_load((tmp_path / "out.yaml").read_text(encoding="utf-8"))["robot"]["segments"]
     assert segment["material"]["youngs_modulus_mpa"] == pytest.approx(0.4, rel=0.02)
 
 

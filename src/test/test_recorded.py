@@ -80,14 +80,14 @@ def test_a_recorded_robot_is_evaluated_released_and_held(here, held_bag, capsys)
     assert figures["largest tilt of the tip at rest, held"] == pytest.approx(0.0, abs=1e-6)
     # A model that is off by the same everywhere correlates fully.
     assert figures["recovery rate r at rest"] == pytest.approx(1.0, abs=1e-9)
-    page = (here / "pages" / "static-recorded.html").read_text()
+    page = (here / "pages" / "static-recorded.html").read_text(encoding="utf-8")
     assert "target shape" in page and "<svg" in page and "the robot" in page
 
 
 def test_a_report_says_when_the_tip_is_a_virtual_robots(here, capsys):
     held_and_released(here / "bag", "/truth/tip")
     reproduce(capsys, "arm")
-    assert "the virtual robot" in (here / "pages" / "arm-recorded.html").read_text()
+    assert "the virtual robot" in (here / "pages" / "arm-recorded.html").read_text(encoding="utf-8")
 
 
 def test_the_tip_may_be_on_a_topic_of_any_name(here, capsys):

@@ -56,11 +56,11 @@ def test_an_unusable_npz_is_refused_with_what_was_found(tmp_path, changes, words
 
 
 def test_files_of_other_kinds_are_refused(tmp_path):
-    (tmp_path / "text.npz").write_text("hello")
+    (tmp_path / "text.npz").write_text("hello", encoding="utf-8")
     (tmp_path / "folder").mkdir()
-    (tmp_path / "a.csv").write_text("1,2")
-    (tmp_path / "a.jpg").write_text("")
-    (tmp_path / "old.bag").write_text("#ROSBAG V2.0")
+    (tmp_path / "a.csv").write_text("1,2", encoding="utf-8")
+    (tmp_path / "a.jpg").write_text("", encoding="utf-8")
+    (tmp_path / "old.bag").write_text("#ROSBAG V2.0", encoding="utf-8")
     for name, words in (
         ("text.npz", "is not an .npz"),
         ("folder", "is not a bag"),

@@ -37,9 +37,9 @@ def here(tmp_path, monkeypatch):
     """A folder with what is not fit for use; each test begins without the options of another's command."""
     monkeypatch.chdir(tmp_path)
     Path("folder").mkdir()
-    Path("empty.yaml").write_text("")
+    Path("empty.yaml").write_text("", encoding="utf-8")
     Path("binary.yaml").write_bytes(b"\xff\xfe\x00" * 50)
-    Path("DATA").write_text("time,x\n")
+    Path("DATA").write_text("time,x\n", encoding="utf-8")
     write_trial(Path("TRIAL.npz"))
     yield tmp_path
     output.configure(json=False, quiet=False)
@@ -152,9 +152,9 @@ def test_the_global_namespace_and_a_slash_at_the_end_are_allowed():
 
 
 def test_a_board_of_a_real_robot_gets_no_motors_that_nobody_described(capsys, tmp_path):
-    text = Path(load_robot_file("catheter").source).read_text()
+    text = Path(load_robot_file("catheter").source).read_text(encoding="utf-8")
     path = tmp_path / "mine.yaml"
-    path.write_text(text.split("\nhardware:")[0])
+    path.write_text(text.split("\nhardware:")[0], encoding="utf-8")
     refused(
         capsys, f"firmware parameters {path} --interface socketcan --channel can9", f"{path}: key 'hardware.motors' is missing"
     )
@@ -165,7 +165,7 @@ def test_a_body_that_cannot_be_meshed_is_named_with_its_file(capsys, monkeypatch
         raise MeshError("elements are flat")
 
     path = tmp_path / "mine.yaml"
-    path.write_text("robot: {}")
+    path.write_text("robot: {}", encoding="utf-8")
     monkeypatch.setattr(reproduce, "run", run)
     refused(capsys, f"reproduce static --robot {path}", f"gravcomp reproduce: {path}: robot: elements are flat")
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gravcomp.evaluation import run_figures
+from gravcomp.evaluation.overload import overload
 from gravcomp.evaluation.track import Track
 
 STRAIGHT, UP = np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 1.0])
@@ -66,3 +67,22 @@ def test_a_share_counts_the_samples_of_its_time_alone():
         flags.add(stamp, flag)
     assert run_figures.share(flags, 1.0, 5.0) == pytest.approx(50.0)
     assert run_figures.share(flags, 6.0, 9.0) is None
+
+
+@pytest.mark.parametrize(
+    ("rates", "delay", "words"),
+    [
+        ((100.0, 60.4), 0.004, ["commands came at 60 Hz in place of 100"]),
+        ((80.0, 80.0), 0.031, ["IMU samples came at 80 Hz", "commands came at 80 Hz", "later than 31 ms"]),
+        ((100.0, 99.0), 0.012, ["later than 12 ms, and samples come every 10 ms"]),
+        ((70.0, None), None, ["IMU samples came at 70 Hz"]),
+    ],
+)
+def test_a_machine_that_does_not_keep_up_is_named_with_rate_and_delay(rates, delay, words):
+    found = overload(*rates, delay)
+    assert all(word in found for word in [*words, "overloaded machine"]) and found.count("; ") == len(words)
+
+
+@pytest.mark.parametrize(("rates", "delay"), [((100.0, 98.0), 0.004), ((99.7, None), None), ((None, None), None)])
+def test_a_machine_that_keeps_up_is_not_blamed(rates, delay):
+    assert overload(*rates, delay) is None

@@ -166,6 +166,6 @@ def test_a_surface_is_checked(tmp_path, ball):
 def test_a_surface_in_metres_is_named(tmp_path, ball):
     name = written(tmp_path, ball.apply_scale(1e-3))
     document = load_robot_file("article").sections | {"scene": {"meshes": [{"file": name}]}}
-    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(document))
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(document), encoding="utf-8")
     with pytest.raises(ConfigError, match="file_unit_mm: 1000"):
         _ = load_robot_file(tmp_path / "robot.yaml").scene

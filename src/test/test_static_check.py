@@ -28,5 +28,5 @@ def test_what_clang_tidy_has_found_is_kept_until_the_code_or_its_checks_change(t
     odd = ["gravcomp_hw/firmware/core/a.c:1:2: warning: odd [a-check]"]
     assert [static_check.findings() for _ in range(2)] == [odd, odd] and len(ran) == 1
     for count, changed in enumerate((sources(CORE)[0], folder / ".clang-tidy"), start=2):
-        changed.write_text(changed.read_text() + "\n")
+        changed.write_text(changed.read_text(encoding="utf-8") + "\n", encoding="utf-8")
         assert static_check.findings() == odd and len(ran) == count

@@ -112,7 +112,7 @@ def test_other_tables_of_the_folder_are_predicted_by_the_fit_to_the_first(tmp_pa
     kept = simulated(("seg3_dir0", "pair13_opp_dir60"), seed=8)
     write(tmp_path / "tdcr" / "train.csv", simulated(LABELS))
     write(tmp_path / "tdcr" / "kept.csv", kept, np.random.default_rng(2).permutation(len(kept.tip)))
-    (tmp_path / "tdcr" / "columns.csv").write_text("column,unit\ntip_x,mm\n")  # a table of something else
+    (tmp_path / "tdcr" / "columns.csv").write_text("column,unit\ntip_x,mm\n", encoding="utf-8")  # a table of something else
     part = tdcr.evaluate(tmp_path / "tdcr", lambda stage: None, False)
     assert list(part.data["tdcr_other_tables_mm"]) == ["kept.csv"]
     assert part.data["tdcr_other_tables_mm"]["kept.csv"] < 1e-3

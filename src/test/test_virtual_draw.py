@@ -34,7 +34,7 @@ def stranger(tmp_path):
 
     def make(name="stranger", robot=ROBOT, **virtual):
         path = tmp_path / f"{name}.yaml"
-        path.write_text(yaml.safe_dump({"robot": robot, "virtual_robot": virtual}))
+        path.write_text(yaml.safe_dump({"robot": robot, "virtual_robot": virtual}), encoding="utf-8")
         return load_robot_file(path)
 
     return make
@@ -137,10 +137,20 @@ def test_a_calibrated_file_has_the_virtual_robot_of_its_origin(stranger):
     assert setup.nominal == origin.robot
 
 
+def test_a_single_number_stands_for_a_list_with_it(stranger):
+    def bodies(**body):
+        return described(stranger(body=body)).draw()
+
+    one, listed = bodies(modulus_ratio=1.1), bodies(modulus_ratio=[1.1])
+    assert one.robot == listed.robot and moduli(one) == pytest.approx([1.1e6, 66e6])
+    assert bodies(creep_ratio=0.1, creep_time=3).materials[0].creep_time == (3.0,)
+
+
 @pytest.mark.parametrize(
     ("section", "message"),
     [
         ({"body": {"modulus_ratio": [1.0, 0.9, 0.8]}}, r"modulus_ratio has 3 entries.*2 segments"),
+        ({"body": {"modulus_ratio": 200.0}}, r"body\.modulus_ratio is 200.*0.01 to 100"),
         ({"body": {"modulus_ratio": [0.9], "youngs_modulus_mpa": 1.0}}, "both given"),
         ({"body": {"modulus_ratio": [0.0]}}, r"modulus_ratio\[0\] is 0.*0.01 to 100"),
         ({"body": {"creep_ratio": [0.1]}}, "creep_ratio and creep_time belong together"),

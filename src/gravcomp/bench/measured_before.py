@@ -27,7 +27,7 @@ def measured_before(path: Path, measure: Callable[[], dict[str, Any]], *, again:
     A result with the key `error` is not kept: it may lie in what the path does not stand for, as an installed library.
     """
     if path.exists() and not again:
-        known: dict[str, Any] = json.loads(path.read_text())
+        known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return known
     found = measure()
     if "error" not in found:

@@ -96,7 +96,7 @@ def _demo(clone: Path, environment: dict[str, str], begin: float, patience: floa
     port = _free_port()
     log = clone.parent / "demo.log"
     command = [str(clone / "gravcomp"), "demo", "--no-open", "--duration", "60", "--port", str(port)]
-    with open(log, "w") as output:
+    with open(log, "w", encoding="utf-8") as output:
         process = subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
     times: dict[str, float] = {}
     try:
@@ -111,7 +111,7 @@ def _demo(clone: Path, environment: dict[str, str], begin: float, patience: floa
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60.0)
-    text = log.read_text(errors="replace")
+    text = log.read_text(errors="replace", encoding="utf-8")
     if len(times) < 2:
         raise TimeoutError(f"the demo's loop was not closed within {patience:.0f} s; its last lines:\n{text[-1000:]}")
     return times, text

@@ -48,6 +48,11 @@ def route_cables(robot: Robot, mesh: Mesh) -> list[Route]:
     return [_route(robot, mesh, cable, guided, sections) for cable in robot.cables]
 
 
+def _unit(robot: Robot) -> str:
+    """Return the unit of a body from a file, with the reason: a wrong one lets cables leave it."""
+    return f" (the file: {robot.body.placed().unit_reason})" if robot.body is not None else ""
+
+
 def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: dict[float, np.ndarray | None]) -> Route:
     """The route of one cable; guided (d,): the heights of the disks; known: what `_add_sections` found for other cables."""
     points, at_disk = _via_points(robot, cable, mesh.stations, guided)
@@ -66,11 +71,13 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: di
         try:
             inside = embed(mesh, mesh.axis.points(points if from_file else points[~at_section]))
         except MeshError as error:
-            raise MeshError(f"cable '{cable.name}' leaves the body: {error}") from error
+            raise MeshError(f"cable '{cable.name}' leaves the body: {error}{_unit(robot)}") from error
         worst = int(np.argmax(inside.outside))
         if from_file and inside.outside[worst] > _TOLERANCE:
             x, y, z = points[worst] * 1e3
-            raise MeshError(f"cable '{cable.name}' leaves the body at ({x:.3g}, {y:.3g}, {z:.3g}) mm; it must run inside")
+            raise MeshError(
+                f"cable '{cable.name}' leaves the body at ({x:.3g}, {y:.3g}, {z:.3g}) mm; it must run inside{_unit(robot)}"
+            )
         if from_file:
             inside = inside.of(~at_section)
     parts = []

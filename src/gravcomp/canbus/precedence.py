@@ -14,7 +14,7 @@ def take_precedence() -> None:
     (autogroups), and the niceness of threads only within a session; the launcher starts each node in its own session. So both
     are set.
     """
-    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w") as autogroup:
+    with contextlib.suppress(OSError), open("/proc/self/autogroup", "w", encoding="utf-8") as autogroup:
         autogroup.write(str(_NICENESS))
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)

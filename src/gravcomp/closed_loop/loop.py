@@ -23,31 +23,28 @@ from scipy.spatial.transform import Rotation
 from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuSample, ImuStream
 from gravcomp.closed_loop.bridged_joints import BridgedJoints
+from gravcomp.closed_loop.load_finding import LoadFinding
 from gravcomp.closed_loop.loop_failed import LoopFailed
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
+from gravcomp.closed_loop.warm_board import true_thermal, with_warm_board
 from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware import requests
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
-from gravcomp.full_model.wrench import Wrench
 from gravcomp.graph.parameters.virtual_load_cells import VirtualLoadCellParameters
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import Command, InverseController, Target
 from gravcomp.inverse.limits import within_limits
-from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions, LoadObserver, at_once
-from gravcomp.mechanics.block_matrix import NotPositiveDefinite
+from gravcomp.load_estimation import LoadEstimate, LoadEstimationOptions
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.state import DRIVING
 from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.simulation import Shape, Simulator
 from gravcomp.thermal import HeaterControl
-from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.tip_observer import TipObserver
-from gravcomp.virtual.load_cells import VirtualLoadCells
 from gravcomp.virtual.motion import BaseMotion
-from gravcomp.virtual.parameters import VirtualRobotParameters
 from gravcomp.virtual.robot import VirtualRobot
 from gravcomp.virtual.tracker import VirtualTracker
 from gravcomp.virtual.truth import Truth
@@ -56,7 +53,6 @@ SAMPLE_PERIOD = 0.010  # s
 _BUS_STEP = 0.002  # s: the motors' feedback
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
 _HEATER_PERIOD = 0.1  # s
-_COMPLIANCE_STEPS = 50  # bus steps between two computations of the tip's compliance
 _STANDALONE = "standalone"  # the board on which the firmware's loop runs
 _IDLE = 4e-4  # of the largest tension, below which a cable counts as idle
 _RELEASE_SLACK = 0.05
@@ -90,7 +86,7 @@ class ClosedLoop:
         """
         self.setup = setup
         self._virtual = VirtualRobot(
-            _truth(setup, warm and heating),
+            with_warm_board(setup) if warm and heating else setup.truth,
             setup.nominal,
             setup.virtual_hardware,
             seed=setup.seed,
@@ -107,7 +103,7 @@ class ClosedLoop:
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
         # The first reading of a board that starts warm is not the ambient temperature.
-        ambient = _thermal(setup).ambient if warm else setup.estimator.heater.ambient
+        ambient = true_thermal(setup).ambient if warm else setup.estimator.heater.ambient
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot, scene=setup.modelled_scene)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
@@ -118,13 +114,7 @@ class ClosedLoop:
         )
         self._tracker = None if tracker is None else VirtualTracker(tracker, setup.robot.length, setup.seed)
         self.observer = TipObserver(setup.robot, setup.controller.tracker)
-        limits = setup.robot.limits
-        self._cells = None if cells is None else VirtualLoadCells(cells, limits.tension_max, setup.seed)
-        self._load = None
-        if load is not None:
-            kind = load.kind if tracker is not None else "none"
-            self._load = LoadObserver(setup.robot, load, at_once(self._simulator.model, kind, setup.modelled_scene))
-        self._tip_compliance: np.ndarray | None = None
+        self._load = None if load is None else LoadFinding(setup, self._simulator, load, cells, tracker is not None)
         self._target: Target | None = None
         self._weightless = False
         self._release_slack = _RELEASE_SLACK * setup.robot.length  # m
@@ -168,13 +158,13 @@ class ClosedLoop:
     def zero_load(self) -> None:
         """Begin to learn the errors of model and sensors: the robot carries no unknown load. The loop has a load to find."""
         assert self._load is not None
-        self._load.zero(self.time)
+        self._load.observer.zero(self.time)
 
     @property
     def load(self) -> LoadEstimate:
         """The estimated load. The loop has a load to find."""
         assert self._load is not None
-        return self._load.estimate(self._gravity, self.time)
+        return self._load.observer.estimate(self._gravity, self.time)
 
     def release(self) -> None:
         """Pay the cables out: the robot is without compensation. A board that has held by itself lets go of the motors."""
@@ -247,10 +237,11 @@ class ClosedLoop:
                 gravity = gravity + self._turn.acceleration(sample.stamp)
         # The model starts at rest and relaxed, and creeps from then on.
         elapsed = None if self.shape is None else SAMPLE_PERIOD
-        carried = None if self._load is None else self._load.wrench(gravity, self.time)
+        carried = None if self._load is None else self._load.observer.wrench(gravity, self.time)
         cables = None if released else self._cables
         self.shape = shape = self._simulator.step(gravity, cables, duration=elapsed, wrench=carried)
-        self._observe_load(shape, carried, cables)
+        if self._load is not None:
+            self._load.observe(self.time, shape, carried, cables, self._virtual.truth)
         target = self._observed(shape)
         self._cables, tension = self._released(shape) if target is None else self._compensated(shape, target)
         self._sent = self._idle_released(tension) if self._weightless and not released else self._cables
@@ -273,29 +264,8 @@ class ClosedLoop:
         for measured in self._tracker.observe(self._virtual.truth):
             self.observer.measure(measured.time, now, "soft_base", measured.position)
             if self._load is not None:
-                self._load.measure_tip(measured.time, measured.position)
+                self._load.observer.measure_tip(measured.time, measured.position)
         return None if self._target is None else self.observer.corrected(self._target, now)
-
-    def _observe_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
-        """Pass the shape, its wrench, the winches' displacements (m,) and the load cells' tensions to the observer."""
-        if self._load is None:
-            return
-        if not self._load.follow(self.time, shape, wound) and shape.is_equilibrium:
-            self._predict_load(shape, carried, wound)
-        measured = None if self._cells is None else self._cells.observe(self._virtual.truth)
-        if measured is not None:
-            self._load.measure_tensions(self.time, measured)
-
-    def _predict_load(self, shape: Shape, carried: Wrench | None, wound: np.ndarray | None) -> None:
-        """Let the observer expect tip and tensions of the simulator's shape."""
-        assert self._load is not None
-        if self._tip_compliance is None or self._steps % _COMPLIANCE_STEPS < SAMPLE_PERIOD / _BUS_STEP:
-            try:
-                self._tip_compliance = self._simulator.tip_compliance()
-            except NotPositiveDefinite:  # the next shape may be stable
-                return
-        force = np.zeros(3) if carried is None else carried.force
-        self._load.predict(self.time, shape, self._tip_compliance, force, wound)
 
     def _released(self, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
         free = shape.response.displacement_free - self._release_slack
@@ -352,18 +322,3 @@ class ClosedLoop:
 def _parameters(setup: Setup) -> LoopParameters:
     """Return what the loop on the board takes from the setup."""
     return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn)
-
-
-def _truth(setup: Setup, warm: bool) -> VirtualRobotParameters:
-    """Return the parameters of the virtual robot; `warm`: the board starts at the target temperature of the heater."""
-    truth = setup.truth
-    if not warm:
-        return truth
-    heater, thermal = setup.estimator.heater, _thermal(setup)
-    target = thermal.ambient + heater.rise if heater.target is None else heater.target
-    thermal = dataclasses.replace(thermal, start=target)
-    return dataclasses.replace(truth, board=dataclasses.replace(truth.board, thermal=thermal))
-
-
-def _thermal(setup: Setup) -> ThermalPlantOptions:
-    return setup.true_robot.board.thermal or ThermalPlantOptions()

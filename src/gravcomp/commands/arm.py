@@ -139,7 +139,7 @@ def _follow(processes: "Graph", result: Path) -> dict[str, Any]:
         # Read before the file: the player writes its result before it ends.
         dead = processes.dead()
         try:
-            state = json.loads(result.read_text())
+            state = json.loads(result.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             state = {"phase": "starting"}
         if state["phase"] == "done":

@@ -159,7 +159,7 @@ def _plan(args: argparse.Namespace, file: "RobotFile") -> int:
 
 def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     """Return the plan of the robot. Raises ConfigError, and MeshError for a body that cannot be meshed."""
-    from gravcomp.calibration.plan import make_plan
+    from gravcomp.calibration.planning import make_plan
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.full_model.modes import first_period
 

@@ -86,7 +86,7 @@ def _kept(check: Check) -> Iterator[list[str]]:
     from gravcomp.cache import cache_folder
 
     folder = cache_folder(check.tool)
-    with open(folder / "lock", "w") as lock:
+    with open(folder / "lock", "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield ["--cache-dir", str(folder)]
 

@@ -127,16 +127,20 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
             problem = pictures.take(address) if pictures else ""
             figures = {
                 **state["figures"],
+                "overloaded": _overloaded(state["figures"]),
                 "nodes": state["nodes"],
                 "board": args.board,
                 "seed": described(load_robot_file(args.robot), args.seed).seed,
                 "source": (args.imu and Path(args.imu).name) or "scenario: sag, compensate, tilt",
             }
     output.result(figures, _summary(figures))
+    if figures["overloaded"]:
+        output.note(figures["overloaded"])
     if unfinished and figures["full_model_pct"]:
         output.note(
             f"The full model served {figures['full_model_pct']:g} % of the evaluated time, more slowly, because the reduced model"
-            f" is not built yet. Next time: ./gravcomp model build {args.robot}, which goes on from here, then the demo again"
+            " is not built yet. Its build in the background ended with the demo, and what it has computed is kept. Next time:"
+            f" ./gravcomp model build {args.robot}, which goes on from there, then the demo again"
         )
     if problem:
         raise ConfigError(problem)
@@ -222,7 +226,7 @@ def _begin_of_motion(path: str) -> float:
 
 def _read(path: Path) -> dict:
     try:
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
 
@@ -262,6 +266,14 @@ def _follow(
             if time.monotonic() > deadline:
                 raise TimeoutError(f"the run did not end; the nodes' output is in {processes.logs}")
             time.sleep(0.2)
+
+
+def _overloaded(figures: dict[str, Any]) -> str | None:
+    """Return why the judge's figures are those of an overloaded machine; None where it kept up."""
+    from gravcomp.evaluation.overload import overload
+
+    delay = figures["delay_ms"] and 1e-3 * figures["delay_ms"]["median"]
+    return overload(figures["imu_rate_hz"], figures["command_rate_hz"], delay)
 
 
 def _summary(figures: dict[str, Any]) -> "Table":

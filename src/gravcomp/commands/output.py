@@ -5,6 +5,7 @@ With --json the result is exactly one line on stdout, a JSON object. With --quie
 
 import argparse
 import contextlib
+import io
 import json
 import os
 import sys
@@ -22,6 +23,8 @@ _options = argparse.Namespace(json=False, quiet=False)
 def configure(*, json: bool, quiet: bool) -> None:
     """Set what --json and --quiet ask for; once per process, before the command runs."""
     _options.json, _options.quiet = json, quiet
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal for ASCII shows ? for what it does not have
 
 
 def note(text: str) -> None:

@@ -141,7 +141,7 @@ def _follow(processes: "Graph", replay: str, duration: float, speed: float) -> N
             others = {name: why for name, why in processes.dead().items() if name != replay}
             if others:
                 processes.check()
-            if started is None and "playing" in log.read_text(errors="replace"):
+            if started is None and "playing" in log.read_text(errors="replace", encoding="utf-8"):
                 started = time.monotonic()
                 progress.update(task, description="playing")
             if started is not None:

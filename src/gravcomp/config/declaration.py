@@ -29,6 +29,9 @@ EDGE_UNITS = {
     "g": ("_g", 1e-3, "kg"),
 }
 
+# Edge unit -> units that are taken for it, with their size in edge units.
+_TAKEN_FOR = {"mm": {"cm": 10.0, "m": 1e3}, "mm/s": {"cm/s": 10.0, "m/s": 1e3}, "MPa": {"kPa": 1e-3, "Pa": 1e-6}}
+
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
@@ -80,6 +83,18 @@ class Parameter:
         if self.maximum is not None:
             return f"at most {self.maximum:g}{unit}"
         return f"any value{' in' + unit if unit else ''}"
+
+    def likely_units(self, value: float) -> str:
+        """Return the units in which a value out of the range would be in it, as words; empty where there is none.
+
+        Only such units as are larger where the value is too small, and smaller where it is too large.
+        """
+        found = [
+            f"{unit}: {size * value:g} {self.edge}"
+            for unit, size in _TAKEN_FOR.get(self.edge or "", {}).items()
+            if (self.minimum is None or size * value >= self.minimum) and (self.maximum is None or size * value <= self.maximum)
+        ]
+        return f" (looks like {' or '.join(found)})" if found else ""
 
 
 def parameter(

@@ -77,6 +77,7 @@ def _with_present_names(cls: type, mapping: dict, source: str, key: str) -> dict
 def convert(value: Any, kind: Any, declared: Parameter | None, *, source: str, key: str) -> Any:
     """Check one edge value and convert it to the SI value of type `kind`.
 
+    A single number or string stands for a list with it, where a list of any length is declared.
     Raises ConfigError, with `source` and `key`, when the type is wrong or the value is out of range.
     """
     declared = declared or Parameter("")
@@ -89,10 +90,13 @@ def convert(value: Any, kind: Any, declared: Parameter | None, *, source: str, k
     if isinstance(kind, type) and dataclasses.is_dataclass(kind):
         return from_mapping(kind, value, source=source, key=key)
     if origin is tuple:
+        members = typing.get_args(kind)
+        any_length = len(members) == 2 and members[1] is Ellipsis
+        if any_length and members[0] in (float, int, str) and isinstance(value, (float, int, str)):  # one for all
+            return (convert(value, members[0], declared, source=source, key=key),)
         if not isinstance(value, (list, tuple)):
             raise ConfigError(f"{source}: {key} is {_show(value)}; a list is needed")
-        members = typing.get_args(kind)
-        if len(members) == 2 and members[1] is Ellipsis:
+        if any_length:
             members = (members[0],) * len(value)
         if len(members) != len(value):
             raise ConfigError(f"{source}: {key} has {len(value)} entries; {len(members)} are needed")
@@ -138,7 +142,8 @@ def _scalar(value: Any, kind: type, declared: Parameter, *, source: str, key: st
     below = declared.minimum is not None and kind in (int, float) and value < declared.minimum
     above = declared.maximum is not None and kind in (int, float) and value > declared.maximum
     if below or above or (declared.choices is not None and value not in declared.choices):
-        raise ConfigError(f"{source}: {key} is {_show(value)}; allowed: {declared.allowed()}")
+        likely = declared.likely_units(value) if below or above else ""
+        raise ConfigError(f"{source}: {key} is {_show(value)}; allowed: {declared.allowed()}{likely}")
     return value * declared.factor if kind is float else value
 
 

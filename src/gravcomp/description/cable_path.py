@@ -31,10 +31,17 @@ class CableRun:
         return self.cable.start if self.cable.via_points is None else self.cable.via_points[0][2]
 
 
-def check_path(key: str, run: CableRun, pieces: Sequence[Piece], segments: Sequence[Segment], length: float) -> None:
-    """Raise ValueError, naming `key`, when the cable leaves the robot's length, the wall of a segment or its disks."""
+def check_path(
+    key: str, run: CableRun, pieces: Sequence[Piece], segments: Sequence[Segment], length: float, hint: Callable[[float], str]
+) -> None:
+    """Raise ValueError, naming `key`, when the cable leaves the robot's length, the wall of a segment or its disks.
+
+    hint: returns what may be wrong with the length, after the end of a cable that is beyond it.
+    """
     if run.end > length * (1 + 1e-9):
-        raise ValueError(f"{key} ends at {run.end * 1e3:g} mm; allowed: up to the robot's length {length * 1e3:g} mm")
+        raise ValueError(
+            f"{key} ends at {run.end * 1e3:g} mm; allowed: up to the robot's length {length * 1e3:g} mm{hint(run.end)}"
+        )
     if run.cable.via_points is None and run.start >= run.end:
         raise ValueError(f"{key}.start_mm is {run.start * 1e3:g}; allowed: below its end at {run.end * 1e3:g}")
     for piece in pieces:

@@ -8,6 +8,9 @@ from gravcomp.config import parameter
 COUNTS_PER_TURN = 8192
 """Counts of the C610's rotor angle per turn, 0..8191."""
 
+LEAST_RISE = 0.005
+"""Least rise of the current in A by which homing can be told to take a cable as taut."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
@@ -84,7 +87,7 @@ class Homing:
     current_rise: float = parameter(
         0.06,
         unit="A",
-        minimum=0.005,
+        minimum=LEAST_RISE,
         maximum=5,
         description="rise above the running current of the slack cable at which the cable is taut",
     )

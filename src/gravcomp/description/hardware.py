@@ -19,6 +19,7 @@ Cable displacement [m] is positive when pulled in:  displacement = direction x r
 
 import dataclasses
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,7 +27,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping, parameter
 from gravcomp.description.can_buses import CanBus, CanInterface
-from gravcomp.description.drive import COUNTS_PER_TURN, Drive, Homing, Watchdog
+from gravcomp.description.drive import COUNTS_PER_TURN, LEAST_RISE, Drive, Homing, Watchdog
 from gravcomp.description.joint_motors import Joints
 from gravcomp.description.motor import MOTOR_IDS, CableMotor, Motor
 from gravcomp.description.transmission import Transmission
@@ -130,11 +131,17 @@ class Hardware:
         pull = homing.current_rise * self.drive.tension_per_ampere / ratio
         if homing.tension_max is None or pull <= homing.tension_max:
             return ""
+        rise = math.floor(1e4 * homing.current_rise * homing.tension_max / pull) * 1e-4
+        larger = f"; hardware.homing.current_rise may be {rise:.2g} A at most" if rise >= LEAST_RISE else ""
+        capstan = "A larger capstan lets the current show smaller tensions"
+        if self.drive.capstan_assumed:
+            capstan = (
+                f"The capstans of {1e3 * self.drive.capstan_radius:.3g} mm are assumed: give the radius of yours"
+                " (hardware.drive.capstan_radius_mm); the virtual robot needs no homing"
+            )
         return (
             f"no homing: it would pull a cable with {pull:.3g} N before it counts as taut, and {homing.tension_max:g} N are"
-            f" allowed; hardware.homing.current_rise may be {homing.current_rise * homing.tension_max / pull:.2g} A at most. A"
-            " larger capstan lets the current show smaller tensions; or hold the robot straight with its cables just taut and"
-            " start with zero: start"
+            f" allowed{larger}. {capstan}; or hold the robot straight with its cables just taut and start with zero: start"
         )
 
     @property

@@ -5,6 +5,7 @@ import dataclasses
 from gravcomp.config import parameter
 from gravcomp.description.body import Material
 from gravcomp.mesh_files import PlacedBody, Placement, placed_body
+from gravcomp.mesh_files.units import LENGTHS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,8 +33,8 @@ class MeshBody:
     length: float | None = parameter(
         None,
         edge="mm",
-        minimum=1.0,
-        maximum=5000.0,
+        minimum=1e3 * LENGTHS[0],
+        maximum=1e3 * LENGTHS[1],
         description="length along the axis, settles the unit; that of the file if not given",
     )
     file_unit: float | None = parameter(

@@ -4,7 +4,11 @@ import math
 
 import numpy as np
 
+from gravcomp.description.body import Material
+from gravcomp.description.body_sections import body_sections
 from gravcomp.description.robot import Robot
+from gravcomp.description.section_moments import SectionMoments
+from gravcomp.mesh_files import MeshError
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 _PARTS = 40  # of the length
@@ -14,21 +18,27 @@ def bend_by_own_weight(robot: Robot) -> float | None:
     """Return the turn in rad of the tip of the released robot, straight and held horizontally, with its payload.
 
     With the mass m per length and the bending stiffness E I of each section, theta = int g int_s^L m (x - s) dx / (E I) ds. Each
-    section bends about its weakest axis. None for a body from a file, whose sections nobody has described.
+    section bends about its weakest axis. None for a file that describes no body, which is refused where the body is needed.
     """
-    if not robot.pieces:
+    try:
+        step = robot.length / _PARTS
+        station = step * (np.arange(_PARTS) + 0.5)
+        sections = _sections(robot, station)
+    except MeshError:
         return None
-    step = robot.length / _PARTS
-    station = step * (np.arange(_PARTS) + 0.5)
-    mass, flexibility = np.zeros(_PARTS), np.zeros(_PARTS)
-    for k, s in enumerate(station):
-        piece = robot.piece_at(float(s))
-        section = piece.moments(float(s))
-        mass[k] = piece.material.density * section.area * step
-        flexibility[k] = 1.0 / (piece.material.youngs_modulus * min(section.xx, section.yy))
+    mass = np.array([material.density * section.area * step for material, section in sections])
+    flexibility = np.array([1.0 / (material.youngs_modulus * min(section.xx, section.yy)) for material, section in sections])
     arm = np.maximum(station[None, :] - station[:, None], 0.0)
     moment = STANDARD_GRAVITY * (arm @ mass + robot.payload.mass * (robot.length - station))
     return float((moment * flexibility).sum() * step)
+
+
+def _sections(robot: Robot, stations: np.ndarray) -> list[tuple[Material, SectionMoments]]:
+    """Return material and section at stations (k,) in m along the axis. Raises MeshError."""
+    if robot.body is not None:
+        return [(robot.body.material, section) for section in body_sections(robot.body, stations)]
+    pieces = [robot.piece_at(float(s)) for s in stations]
+    return [(piece.material, piece.moments(float(s))) for piece, s in zip(pieces, stations)]
 
 
 def largest_pitch_radius(robot: Robot) -> float:

@@ -17,6 +17,7 @@ from gravcomp.description.cable import Cable
 from gravcomp.description.cable_line import CableLine
 from gravcomp.description.cable_path import CableRun, check_crossings, check_path
 from gravcomp.description.imu_mount import ImuMount
+from gravcomp.description.likely_unit import likely_unit
 from gravcomp.description.limits import Limits
 from gravcomp.description.max_wrench import MaxWrench
 from gravcomp.description.mesh_body import MeshBody
@@ -88,9 +89,23 @@ class Robot:
                 allowed = ", ".join(segment_names) or "none (the robot has a body)"
                 raise ValueError(f"{key}.segment is '{cable.segment}'; allowed: {allowed}")
             runs.append(CableRun(cable, self.cable_end(cable), functools.partial(self.cable_place, cable)))
-            check_path(key, runs[-1], self.pieces, self.segments, self.length)
+            check_path(key, runs[-1], self.pieces, self.segments, self.length, self._unit_hint)
         if self.body is None:
             check_crossings(runs, self.pieces)
+
+    def _unit_hint(self, reached: float) -> str:
+        """Return the unit in which the body would be as long as a cable reaches (m), as a sentence; empty where there is none."""
+        unit = likely_unit(self.length, reached)
+        if unit is None:
+            return ""
+        name, size = unit
+        length = f"{1e3 * size * self.length:.4g} mm long"
+        if self.body is None:
+            return f"; the segments look like {name}: they would be {length}"
+        if self.body.length is not None:
+            return f"; body.length_mm looks like {name}: the body would be {length}"
+        file_unit = 1e3 * size * self.body.placed().unit
+        return f"; the file looks like {name}: with body.file_unit_mm: {file_unit:g} the body is {length}"
 
     def _fill_cables(self) -> None:
         """Give each cable what `cable_defaults` has and it does not, and empty them: a changed cable is not filled again."""

@@ -44,8 +44,9 @@ def capstan_radius(section: dict[str, Any], robot: Robot) -> float:
         0.0 if drive.get("backlash_deg") == 0 else math.radians(number(drive, "backlash_deg", math.degrees(standard.backlash)))
     )
     largest = standard.capstan_radius
-    bend, pitch = bend_by_own_weight(robot), largest_pitch_radius(robot)
-    if bend is not None and pitch > 0.0 and backlash > 0.0:
+    bend = bend_by_own_weight(robot) if backlash > 0.0 else None
+    pitch = 0.0 if bend is None else largest_pitch_radius(robot)
+    if bend is not None and pitch > 0.0:
         largest = min(largest, _PLAY * bend * pitch / (backlash * _largest_ratio(section)))
     if has_motors(section):
         current = number(drive, "current_limit", standard.current_limit)

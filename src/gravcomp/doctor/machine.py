@@ -60,8 +60,8 @@ def _executables() -> list[Finding]:
 def _can() -> Finding:
     devices = []
     for kind in Path("/sys/class/net").glob("*/type"):
-        if kind.read_text().strip() == _CAN_DEVICE:
-            devices.append(f"{kind.parent.name} ({(kind.parent / 'operstate').read_text().strip()})")
+        if kind.read_text(encoding="utf-8").strip() == _CAN_DEVICE:
+            devices.append(f"{kind.parent.name} ({(kind.parent / 'operstate').read_text(encoding='utf-8').strip()})")
     if devices:
         return Finding("ok", "CAN", ", ".join(sorted(devices)))
     return Finding(

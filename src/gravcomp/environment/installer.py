@@ -42,7 +42,7 @@ def install(root: Path, inner: Path, lock: Path, title: str, target: "Path | Non
 
 def names(lock: Path) -> "list[str]":
     """Names of the packages in a lock file; a package with several versions is named once for each."""
-    found = (re.match(r"[A-Za-z0-9][A-Za-z0-9._-]*", line) for line in lock.read_text().splitlines())
+    found = (re.match(r"[A-Za-z0-9][A-Za-z0-9._-]*", line) for line in lock.read_text(encoding="utf-8").splitlines())
     return [match.group() for match in found if match]
 
 

@@ -95,7 +95,7 @@ def provide_lock(root: Path, lock: str, title: str, stamp: Path, target: Path | 
     if is_provided(root, lock, stamp):
         return
     stamp.parent.mkdir(parents=True, exist_ok=True)
-    with open(stamp.parent / "lock", "w") as alone:
+    with open(stamp.parent / "lock", "w", encoding="utf-8") as alone:
         fcntl.flock(alone, fcntl.LOCK_EX)
         if is_provided(root, lock, stamp):  # installed by another process meanwhile
             return
@@ -103,7 +103,7 @@ def provide_lock(root: Path, lock: str, title: str, stamp: Path, target: Path | 
             note(notice)
         install(root, Path(sys.executable), root / lock, title, target=target)
         importlib.invalidate_caches()
-        stamp.write_text(_key(root / lock))
+        stamp.write_text(_key(root / lock), encoding="utf-8")
 
 
 def _key(lock: Path) -> str:
@@ -111,7 +111,7 @@ def _key(lock: Path) -> str:
 
 
 def _read(path: Path) -> str:
-    return path.read_text() if path.exists() else ""
+    return path.read_text(encoding="utf-8") if path.exists() else ""
 
 
 def _usable(inner: Path, python: Interpreter) -> bool:
@@ -120,8 +120,12 @@ def _usable(inner: Path, python: Interpreter) -> bool:
         return False
     probe = "import sys, pip; print(sys.version_info[:2] == {!r}, sys.prefix)".format(python.version)
     answer = subprocess.run([str(inner), "-c", probe], capture_output=True, text=True)
-    pip = (inner.parent / "pip").read_text(errors="replace").splitlines()[:1] if (inner.parent / "pip").exists() else []
-    shares = "include-system-site-packages = true" in (inner.parent.parent / "pyvenv.cfg").read_text()
+    pip = (
+        (inner.parent / "pip").read_text(errors="replace", encoding="utf-8").splitlines()[:1]
+        if (inner.parent / "pip").exists()
+        else []
+    )
+    shares = "include-system-site-packages = true" in (inner.parent.parent / "pyvenv.cfg").read_text(encoding="utf-8")
     whole = answer.stdout.split() == ["True", str(inner.parent.parent)] and bool(pip) and str(inner.parent) in pip[0]
     return whole and shares == bool(python.ros)
 
@@ -131,14 +135,14 @@ def _repair_cmake_paths(venv: Path, inner: Path) -> None:
     probe = "import numpy, sysconfig; print(sysconfig.get_paths()['include']); print(numpy.get_include())"
     python_include, numpy_include = _run([str(inner), "-c", probe], "NumPy cannot be imported").splitlines()
     for path in (venv / "share").rglob("*.cmake"):
-        text = path.read_text(errors="surrogateescape")
+        text = path.read_text(errors="surrogateescape", encoding="utf-8")
         if "/opt/python/" not in text:
             continue
         text = re.sub(r"/opt/python/[^/;\"]+/lib/python[0-9.]+/site-packages/numpy/_core/include", numpy_include, text)
         text = re.sub(r"/opt/python/[^/;\"]+/include/python[0-9.]+", python_include, text)
         # A new file: the installer may have linked the old one from its cache.
         replacement = path.with_suffix(".repaired")
-        replacement.write_text(text, errors="surrogateescape")
+        replacement.write_text(text, errors="surrogateescape", encoding="utf-8")
         os.replace(replacement, path)
 
 

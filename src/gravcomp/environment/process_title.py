@@ -19,7 +19,7 @@ def set_title(name: str, command: list[str]) -> None:
     """Show `command` as the command line of this process, and `name` (15 bytes at most) as its name."""
     _LIBC.prctl(_PR_SET_NAME, ctypes.c_char_p(name.encode()[:15]), 0, 0, 0)
     # The process's name in the second field may contain spaces; the third field follows the last parenthesis.
-    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    fields = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     begin, end = int(fields[45]), int(fields[46])
     if 0 < begin < end:
         text = b"".join(word.encode() + b"\0" for word in command)[: end - begin - 1]

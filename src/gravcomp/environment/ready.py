@@ -66,7 +66,7 @@ def environment(root: Path, paths: "dict[str, str]") -> "dict[str, str]":
 
 def _ready(root: Path) -> "dict | None":
     try:
-        state = json.loads((root / ".workspace" / "ready.json").read_text())
+        state = json.loads((root / ".workspace" / "ready.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     if state.get("key") != _key(root, state.get("ros", "")) or not os.access(state.get("python", ""), os.X_OK):
@@ -88,14 +88,14 @@ def _make(root: Path) -> dict:
             digest.update(lock.read_bytes())
         packages_key = digest.hexdigest()
         tools = python.ros or packages.tools_folder(root).is_dir()
-        if not (tools and stamp.exists() and stamp.read_text() == packages_key):
+        if not (tools and stamp.exists() and stamp.read_text(encoding="utf-8") == packages_key):
             inner = packages.build(root, python)
-            stamp.write_text(packages_key)
+            stamp.write_text(packages_key, encoding="utf-8")
         _start_compiling(root, inner)
         paths = workspace.build(root, python, inner)
         state = {"key": _key(root, python.ros), "ros": python.ros, "python": str(inner), "paths": paths}
         partial = root / ".workspace" / "ready.json.partial"
-        partial.write_text(json.dumps(state, indent=1))
+        partial.write_text(json.dumps(state, indent=1), encoding="utf-8")
         partial.replace(partial.with_suffix(""))
         return state
 
@@ -142,7 +142,7 @@ def _is_built(path: Path) -> bool:
 @contextlib.contextmanager
 def _alone(root: Path) -> "Iterator[None]":
     (root / ".workspace").mkdir(exist_ok=True)
-    with open(root / ".workspace" / "lock", "w") as lock:
+    with open(root / ".workspace" / "lock", "w", encoding="utf-8") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

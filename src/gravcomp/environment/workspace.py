@@ -57,10 +57,10 @@ def build(root: Path, python: Interpreter, inner: Path) -> "dict[str, str]":
 def _forget_other_maker(base: Path, maker: str) -> None:
     """What another Python, another ROS or another place built does not fit: CMake keeps their paths."""
     note = base / "maker"
-    if not note.exists() or note.read_text() != maker:
+    if not note.exists() or note.read_text(encoding="utf-8") != maker:
         for name in ("build", "install"):
             shutil.rmtree(base / name, ignore_errors=True)
-        note.write_text(maker)
+        note.write_text(maker, encoding="utf-8")
 
 
 def _search_paths(root: Path, python: Interpreter, inner: Path, environment: dict) -> "dict[str, str]":

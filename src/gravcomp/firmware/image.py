@@ -64,7 +64,7 @@ def build_image(*, standalone: bool = False, fresh: bool = False) -> Image:
     elf = read_elf(path.read_bytes())
     boot, code = elf.flash(BOOT_START), elf.flash(CODE_START)
     frames: dict[str, int] = {}
-    for name, size in (line.split() for line in usage.read_text().splitlines()):
+    for name, size in (line.split() for line in usage.read_text(encoding="utf-8").splitlines()):
         frames[name] = max(int(size), frames.get(name, 0))
     return Image(path, boot, code, elf.size("gc_data_start", "gc_bss_end"), elf.size("gc_ccm_start", "gc_ccm_end"), frames)
 
@@ -85,14 +85,14 @@ def _build(parts: list[str], standalone: bool, path: Path, usage: Path) -> None:
                   "-c", str(source), "-o", str(target)], own)  # fmt: skip
             objects.append(str(target))
         for report in sorted((scratch / "cache").rglob("*.su")):
-            frames += [_frame(line) for line in report.read_text().splitlines()]
+            frames += [_frame(line) for line in report.read_text(encoding="utf-8").splitlines()]
         linked = scratch / "image.elf"
         script = folder / CHIP / "image.ld"
         _run([*command, *_TARGET, "-static", "-nostdlib", "-T", str(script), "-Wl,--gc-sections", *objects,
               "-o", str(linked)], environment)  # fmt: skip
         partial = path.with_suffix(f".{os.getpid()}")
         partial.write_bytes(_with_header(linked.read_bytes()))
-        usage.write_text("".join(f"{name} {size}\n" for name, size in sorted(frames)))
+        usage.write_text("".join(f"{name} {size}\n" for name, size in sorted(frames)), encoding="utf-8")
         partial.replace(path)
 
 

@@ -66,7 +66,7 @@ BETWEEN = 1
 @functools.cache
 def keys() -> dict[str, int]:
     """Return the keys of the parameters by name. Raises ConfigError without the folder of the firmware."""
-    text = (firmware_folder() / CORE / "parameters.h").read_text()
+    text = (firmware_folder() / CORE / "parameters.h").read_text(encoding="utf-8")
     body = text[text.index("enum {") : text.index("GC_PARAMETER_COUNT")]
     return {name.lower(): key for key, name in enumerate(re.findall(r"^ +GC_(\w+),", body, re.MULTILINE))}
 

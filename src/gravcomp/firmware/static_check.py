@@ -32,7 +32,7 @@ def findings() -> list[str]:
         "firmware", content_key(*contents(*_PARTS), checks, metadata.version("clang-tidy"), " ".join(_OPTIONS)), ".findings"
     )
     if kept.exists():
-        return list(json.loads(kept.read_text()))
+        return list(json.loads(kept.read_text(encoding="utf-8")))
     files = sources(*_PARTS)
     done = subprocess.run([str(program), "--quiet", *map(str, files), "--", *_OPTIONS], capture_output=True, text=True)
     found = [line.removeprefix(f"{root}/") for line in done.stdout.splitlines() if ": error: " in line or ": warning: " in line]

@@ -76,7 +76,7 @@ def chosen_mesh(robot: Robot) -> MeshChoice:
     rounded = _rounded(robot)
     path = _place_of(rounded)
     if path.exists():
-        stored = json.loads(path.read_text())
+        stored = json.loads(path.read_text(encoding="utf-8"))
         return MeshChoice(Elements(**stored["elements"]), stored["error"])
     choice, left_out = _choose(rounded)
     if left_out:

@@ -63,7 +63,7 @@ def main(root: Path) -> None:
     """Update the tables of all DOCUMENTS below `root`."""
     for name in DOCUMENTS:
         path = root / name
-        path.write_text(renewed(path.read_text()))
+        path.write_text(renewed(path.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

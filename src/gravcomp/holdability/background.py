@@ -90,7 +90,7 @@ class HoldProcess:
 
     def _closed(self) -> str:
         """Close the pipe; return what was in it."""
-        with os.fdopen(self._answer) as stream:
+        with os.fdopen(self._answer, encoding="utf-8") as stream:
             self._answer = -1
             return stream.read()
 

@@ -7,12 +7,10 @@ the result. The model takes the displacements with the next sample of gravity, s
 """
 
 import dataclasses
-import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 
 from gravcomp.contact.contacts import ObstacleForces
 from gravcomp.description import Robot
@@ -20,13 +18,13 @@ from gravcomp.description.transmission import Transmission
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.damping import StepDamping
 from gravcomp.inverse.errors import backbone_missed, tip_errors
-from gravcomp.inverse.limits import within_limits
+from gravcomp.inverse.limits import tip_over_cable, within_limits
 from gravcomp.inverse.options import InverseOptions
 from gravcomp.inverse.outcome import outcome
 from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.release import Release, ReleaseErrors
 from gravcomp.inverse.retreat import Move, Retreat
-from gravcomp.inverse.scaling import NO_BOUND, UNCOUPLED, Couplings
+from gravcomp.inverse.rigging import Rigging
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.status import ControllerCode, evaluate
 from gravcomp.inverse.surroundings import Surroundings, rows_of
@@ -67,11 +65,7 @@ class InverseController:
         self.robot = robot
         self._surroundings = Surroundings(robot, scene, zones)
         self.options = options or InverseOptions()
-        self._transmission = None if transmission is None or transmission.direct else transmission
-        self._couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
-        rows = self._couplings.rows
-        self._coupled = rows.any(axis=0) if len(rows) else np.zeros(len(robot.cables), bool)  # (m,)
-        self._least: tuple[float, np.ndarray] | None = None  # the option `pretension`, and the bounds that follow from it
+        self._rigging = Rigging(robot, transmission)
         self._names = robot.cable_names
         self._solver = ProgrammeSolver()
         self._retreat = Retreat(robot.length, robot.limits.tension_max, rest_tip(robot)[0])
@@ -134,10 +128,10 @@ class InverseController:
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
         last = previous
-        if self._coupled.any():
+        if self._rigging.coupled.any():
             # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
             path = response.compliance_aa @ tension + response.displacement_free
-            previous = np.where(self._coupled, np.maximum(previous, path), previous)
+            previous = np.where(self._rigging.coupled, np.maximum(previous, path), previous)
         interval = min(max(interval, 0.0), self._longest_interval(response))
         move = self._retreat.move(followed, target, _tip(response, tension), tension)
         if followed:
@@ -158,8 +152,8 @@ class InverseController:
                 interval=interval,
                 damping=self._damping.factor,
                 options=self._options_at(release is None and (len(forces) > 0 or self._held)),
-                least_tension=self._least_tension(),
-                couplings=self._couplings,
+                least_tension=self._rigging.least_tension(options.pretension),
+                couplings=self._rigging.couplings,
                 around=rows_of(demands),
                 release=release,
             )
@@ -188,7 +182,7 @@ class InverseController:
             target.tip_position,
             target.direction_or_zeros,
         )
-        displacement = self._possible(result.displacement, result.tension)
+        displacement = self._rigging.possible(result.displacement, result.tension)
         errors = result.errors
         self._damping.observe(result.along, result.lengths)
         around = self._surroundings.met(demands, result.tension - tension)
@@ -262,28 +256,8 @@ class InverseController:
 
     def _longest_interval(self, response: "Response") -> float:
         """Return the time in s in which no winch alone moves the tip farther than `_FARTHEST` of the length."""
-        speed = self.robot.limits.displacement_rate * _tip_over_cable(response.compliance_ea, response.compliance_aa)
+        speed = self.robot.limits.displacement_rate * tip_over_cable(response.compliance_ea, response.compliance_aa)
         return _FARTHEST * self.robot.length / speed if speed > 0.0 else _LONGEST_INTERVAL
-
-    def _paid_out(self, free: np.ndarray, previous: np.ndarray, interval: float) -> np.ndarray:
-        """Return displacements (m,) on the way from `previous` (m,) to slack cables; free (m,): displacements of their paths."""
-        slack = within_limits(free - self._slack, previous, self.robot.limits, interval)
-        return self._possible(slack, np.zeros(len(free)))
-
-    def _possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:
-        """Return displacements (m,) that the motors can make, nearest for the cables with the largest tensions (m,)."""
-        return displacement if self._transmission is None else self._transmission.possible(displacement, tension)
-
-    def _least_tension(self) -> np.ndarray:
-        """Return the lower bounds (m,) of the tensions in N.
-
-        A cable's own pretension counts before the option. Cables that share a motor have none but that of the preload.
-        """
-        option = self.options.pretension
-        if self._least is None or self._least[0] != option:
-            own = [option if cable.pretension is None else cable.pretension for cable in self.robot.cables]
-            self._least = option, np.where(self._coupled, 0.0, np.maximum(own, self.robot.limits.tension_min))
-        return self._least[1]
 
     def _recovery_command(
         self,
@@ -301,7 +275,7 @@ class InverseController:
             # Back to the present shape, whichever command it belongs to: the model may be one sample behind.
             path = response.compliance_aa @ tension + response.displacement_free
             shape = np.where(tension > 0.0, path, path - self._slack)
-            displacement = self._possible(within_limits(shape, previous, self.robot.limits, interval), tension)
+            displacement = self._rigging.possible(within_limits(shape, previous, self.robot.limits, interval), tension)
             code, message = (
                 ControllerCode.UNREACHABLE,
                 "the model finds no equilibrium on the way to the target: the last shape is kept",
@@ -310,7 +284,7 @@ class InverseController:
             # Near a limit point the linear response is a poor estimate of the free displacements; on the straight robot they
             # are 0.
             free = response.displacement_free if followed else np.minimum(response.displacement_free, 0.0)
-            displacement = self._paid_out(free, previous, interval)
+            displacement = self._rigging.paid_out(free - self._slack, previous, interval)
             code = ControllerCode.RELAXING
             if followed:
                 message = "the target cannot be approached from here: paying the cables out to try again nearer to rest"
@@ -334,11 +308,11 @@ class InverseController:
         free = response.displacement_free
         previous = free - self._slack if self._displacement is None else self._displacement
         interval = min(max(interval, 0.0), _LONGEST_INTERVAL)
-        displacement = self._paid_out(free, previous, interval)
+        displacement = self._rigging.paid_out(free - self._slack, previous, interval)
         self.reset(displacement)
         # Antagonists cannot both be paid out: they are as slack as they can be where their motor no longer moves.
         at_rest = bool(np.abs(displacement - previous).max(initial=0.0) < 1e-6)
-        relaxed = bool(np.all(displacement <= free - self._slack + 1e-6)) or (self._transmission is not None and at_rest)
+        relaxed = bool(np.all(displacement <= free - self._slack + 1e-6)) or (self._rigging.shared and at_rest)
         return Command(
             displacement=displacement,
             tension=np.zeros(free.size),
@@ -346,25 +320,6 @@ class InverseController:
             message="the cables are paid out" if relaxed else "paying the cables out",
             solve_time=time.perf_counter() - started,
         )
-
-
-@njit(cache=True)
-def _tip_over_cable(compliance_ea: np.ndarray, compliance_aa: np.ndarray) -> float:
-    """Return the largest motion of the tip over that of the cable which moves it, from the compliances (e, m) and (m, m)."""
-    largest = 0.0
-    for k in range(compliance_aa.shape[0]):
-        if not compliance_aa[k, k] > 0.0:
-            continue
-        moved = math.sqrt(compliance_ea[0, k] ** 2 + compliance_ea[1, k] ** 2 + compliance_ea[2, k] ** 2)
-        largest = max(largest, moved / compliance_aa[k, k])
-    return largest
-
-
-def _couplings(transmission: Transmission) -> Couplings:
-    """Return what the motors' transmission demands of the paths."""
-    rows, antagonists = transmission.couplings()
-    least = rows @ transmission.preload
-    return Couplings(rows, least, np.where(antagonists, NO_BOUND, least))
 
 
 def _tip(response: "Response", tension: np.ndarray) -> np.ndarray:

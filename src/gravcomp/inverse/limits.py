@@ -7,6 +7,7 @@ cable merely becomes slack, so that bound is never tighter than the present path
 tensions.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,18 @@ def step_bounds(
         np.maximum(lowest, held - change),
         np.minimum(highest, held + change),
     )
+
+
+@njit(cache=True)
+def tip_over_cable(compliance_ea: np.ndarray, compliance_aa: np.ndarray) -> float:
+    """Return the largest motion of the tip over that of the cable which moves it, from the compliances (e, m) and (m, m)."""
+    largest = 0.0
+    for k in range(compliance_aa.shape[0]):
+        if not compliance_aa[k, k] > 0.0:
+            continue
+        moved = math.sqrt(compliance_ea[0, k] ** 2 + compliance_ea[1, k] ** 2 + compliance_ea[2, k] ** 2)
+        largest = max(largest, moved / compliance_aa[k, k])
+    return largest
 
 
 def within_limits(displacement: np.ndarray, previous: np.ndarray, limits: Limits, interval: float) -> np.ndarray:

@@ -58,7 +58,7 @@ def compile_part(part: str) -> None:
     """Compile one part, unless it is compiled; wait when another process compiles it."""
     folder = compiled_folder()
     mark = _mark(folder, part)
-    with open(folder / f"{part}.lock", "w") as lock:
+    with open(folder / f"{part}.lock", "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not mark.exists():
             run_part(part)

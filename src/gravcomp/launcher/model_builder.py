@@ -77,7 +77,7 @@ def note_of(robot: str) -> Path | None:
 def is_stored(note: Path | None) -> bool:
     """Return whether a note names a file as it is there."""
     try:
-        written, path = note.read_text().split(" ", 1) if note else ("", "")
+        written, path = note.read_text(encoding="utf-8").split(" ", 1) if note else ("", "")
         return bool(path) and Path(path).stat().st_mtime_ns == int(written)
     except (OSError, ValueError):
         return False

@@ -159,7 +159,7 @@ class NodeProcess:
         stop_together([self])
 
     def _last_words(self) -> str:
-        lines = self.log.read_text(errors="replace").splitlines() if self.log.exists() else []
+        lines = self.log.read_text(errors="replace", encoding="utf-8").splitlines() if self.log.exists() else []
         lines = [line.strip() for line in lines if line.strip()]
         sentences = [line for line in lines if line.startswith(f"{self.spec.executable}: ")]
         return (sentences or lines or [""])[-1].removeprefix(f"{self.spec.executable}: ")

@@ -14,7 +14,7 @@ def wait_for_page(processes: Graph, timeout: float = _START_TIMEOUT) -> str:
     found: list[str] = []
 
     def is_served() -> bool:
-        found.extend(_PAGE.findall(log.read_text(errors="replace")))
+        found.extend(_PAGE.findall(log.read_text(errors="replace", encoding="utf-8")))
         return bool(found)
 
     processes.wait(is_served, timeout, "the start of the viewer")

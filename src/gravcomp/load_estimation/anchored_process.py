@@ -1,20 +1,21 @@
 """The anchored model in a process of its own, with low priority: a step of it may take longer than the time between samples.
 
 While a question is computed, newer ones are left out: the next one that is asked after the answer is that of the newest sample.
-So the owner never waits, and what lies in the connection stays small.
+So the owner never waits, not even for a process that is preempted in the middle of an answer or of its end, and what lies in the
+connection stays small.
 """
 
-import multiprocessing
 import pickle
+import socket
 import subprocess
 import sys
 import tempfile
 import time
-from multiprocessing.connection import Connection
 
 from gravcomp.description import Robot
 from gravcomp.environment.give_way import give_way
 from gravcomp.load_estimation.anchored_follower import Answer, Question
+from gravcomp.load_estimation.message_pipe import PatientEnd
 from gravcomp.scene.scene import Scene
 
 _PAUSE = 5.0  # s between two starts: a process that dies at once must not take the machine's time
@@ -44,8 +45,7 @@ class AnchoredProcess:
                 self.sentence = f"the process of the second model does not start: {error}"
                 return answers
         try:
-            while self._connection.poll():
-                received = self._connection.recv()
+            for received in self._connection.received():
                 self._busy = False
                 self.sentence = ""
                 if received is not None and received[0] == self._generation:
@@ -64,37 +64,43 @@ class AnchoredProcess:
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
-            self._end(self._process)
+            self._connection.close()
+            self._process.kill()
+            self._process.wait()
+            self._process = None
 
     @property
     def pid(self) -> int | None:
         """Number of the process; None while there is none."""
         return None if self._process is None else self._process.pid
 
-    def _start(self) -> tuple[subprocess.Popen | None, Connection]:
+    def _start(self) -> tuple[subprocess.Popen | None, PatientEnd]:
         """Start the process, which answers None when it is ready; return it and the connection to it."""
         self._started, self._generation, self._busy = time.monotonic(), 0, True
-        ours, theirs = multiprocessing.Pipe()
-        with theirs, tempfile.TemporaryFile() as described:  # a pipe would let this process wait for the other's imports
-            described.write(self._described)
-            described.seek(0)
-            process = subprocess.Popen(
-                [sys.executable, "-m", "gravcomp.load_estimation.anchored_worker", str(theirs.fileno())],
-                stdin=described,
-                stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,  # Ctrl-C reaches its owner alone
-                preexec_fn=give_way,
-            )
-        return process, ours
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs, tempfile.TemporaryFile() as described:  # a pipe would let this process wait for the other's imports
+                described.write(self._described)
+                described.seek(0)
+                process = subprocess.Popen(
+                    [sys.executable, "-m", "gravcomp.load_estimation.anchored_worker", str(theirs.fileno())],
+                    stdin=described,
+                    stdout=subprocess.DEVNULL,
+                    pass_fds=[theirs.fileno()],
+                    start_new_session=True,  # Ctrl-C reaches its owner alone
+                )
+        except OSError:
+            ours.close()
+            raise
+        give_way(process=process.pid)  # not before it runs: this process would wait for one of low priority
+        return process, PatientEnd(ours)
 
     def _give_up(self) -> None:
+        """Let go of a process that has ended, or is about to: its exit code may be known at a later call only."""
         assert self._process is not None
-        code = self._end(self._process)
-        self.sentence = f"the process of the second model has ended (exit code {code}); it is started again"
-
-    def _end(self, process: subprocess.Popen) -> int:
         self._connection.close()
-        process.kill()
-        self._process = None
-        return process.wait()
+        self._process.kill()
+        code = self._process.poll()
+        if code is not None:
+            self._process = None
+            self.sentence = f"the process of the second model has ended (exit code {code}); it is started again"

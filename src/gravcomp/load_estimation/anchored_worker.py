@@ -9,31 +9,32 @@ connection is closed, also by the death of its owner.
 import contextlib
 import pickle
 import signal
+import socket
 import sys
-from multiprocessing.connection import Connection
 from typing import BinaryIO
 
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.load_estimation.anchored_follower import AtOnce
 from gravcomp.load_estimation.anchored_model import AnchoredModel
+from gravcomp.load_estimation.message_pipe import framed
 
 
-def serve(connection: Connection, described: BinaryIO) -> None:
+def serve(connection: socket.socket, described: BinaryIO) -> None:
     """Answer the questions that come over a connection, about the pickled robot and scene of a file, until it is closed."""
     robot, scene = pickle.load(described)
     model = AtOnce(AnchoredModel(RobotModel(robot), scene))
     generation = 0
-    with contextlib.suppress(EOFError, OSError):
-        connection.send(None)
+    with contextlib.suppress(EOFError, OSError), connection.makefile("rb") as questions:
+        connection.sendall(framed(None))
         while True:
-            asked, question = connection.recv()
+            asked, question = pickle.load(questions)
             if asked != generation:
                 model.reset()
                 generation = asked
             (answer,) = model.exchange(question)
-            connection.send((asked, answer))
+            connection.sendall(framed((asked, answer)))
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    serve(Connection(int(sys.argv[1])), sys.stdin.buffer)
+    serve(socket.socket(fileno=int(sys.argv[1])), sys.stdin.buffer)

@@ -44,7 +44,8 @@ class Placement:
 class PlacedBody:
     """A surface (kind tri3, facing outward) or a volume (tet4, tet10, hex20) in soft_base.
 
-    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; notes: sentences on what was found and repaired.
+    nodes (n, 3) in m; cells (k, c); length in m along the axis at rest `axis`; unit: of the file, in m, with the reason and the
+    length in words; notes: sentences on what was found and repaired.
     """
 
     kind: str
@@ -52,6 +53,8 @@ class PlacedBody:
     cells: np.ndarray
     length: float
     axis: RestAxis
+    unit: float
+    unit_reason: str
     notes: tuple[str, ...]
 
 
@@ -94,7 +97,8 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
         turn = np.degrees(np.arccos(axis.frames(np.array([length]))[1][0, 2, 2]))
         notes.append(f"the body is bent at rest: its axis turns by {turn:.0f} deg; lengths run along it")
     unit, why = _unit(mesh.unit, nodes, length, placement, name)
-    notes.append(f"{why}: {length * unit * 1e3:.6g} mm long")
+    why = f"{why}: {length * unit * 1e3:.6g} mm long"
+    notes.append(why)
     if axis.bent and any(placement.move):
         raise MeshError(f"{name}: transform.move_mm cannot move a body that is bent at rest: its axis begins inside its base")
     nodes, length = unit * nodes + np.array(placement.move), unit * length
@@ -106,7 +110,7 @@ def _placed(path: Path, _: object, placement: Placement) -> PlacedBody:
         _check_base(nodes, length, name)
     for plane in (0.0, length) if not axis.bent else (0.0,):
         nodes[np.abs(nodes[:, 2] - plane) < _PLANE * length, 2] = plane
-    return PlacedBody(mesh.kind, nodes, mesh.cells, length, axis, tuple(notes))
+    return PlacedBody(mesh.kind, nodes, mesh.cells, length, axis, unit, why, tuple(notes))
 
 
 def _unit(fixed: float | None, nodes: np.ndarray, length: float, placement: Placement, name: str) -> tuple[float, str]:

@@ -4,6 +4,8 @@ from gravcomp.mesh_files.errors import MeshError
 
 SLENDER = 5e-3, 2.0
 """Shortest and longest robot (m) whose unit is taken from the size alone."""
+LENGTHS = 1e-3, 5.0
+"""Shortest and longest robot (m)."""
 LENGTH_TOLERANCE = 1e-3
 """Largest difference between the length of the file and the declared one, of the length: rounding."""
 
@@ -24,6 +26,11 @@ def unit_of(size: float, declared: float | None, fixed: float | None, length: fl
         source = "as declared" if declared else "fixed by the format"
         if length is not None and not _fits(size * given, length):
             raise MeshError(_contradiction(size, given, length, name))
+        if not LENGTHS[0] <= size * given <= LENGTHS[1]:
+            raise MeshError(
+                f"{name}: the body is {size * given * 1e3:.6g} mm long with the unit {_text(given)}, {source}; allowed:"
+                f" {LENGTHS[0] * 1e3:g} to {LENGTHS[1] * 1e3:g} mm. Possible: {_possible(size)}"
+            )
         return given, f"unit {_text(given)}, {source}"
     if length is not None:
         for unit_name, unit in _TAKEN.items():
@@ -33,15 +40,20 @@ def unit_of(size: float, declared: float | None, fixed: float | None, length: fl
     for unit_name, unit in _TAKEN.items():
         if SLENDER[0] <= size * unit <= SLENDER[1]:
             return unit, f"unit {unit_name}, guessed from the size; length_mm or file_unit_mm would make it sure"
+    raise MeshError(
+        f"{name}: the body is {size:.4g} units long, which is {SLENDER[0] * 1e3:g} mm to {SLENDER[1]:g} m neither in mm nor in m;"
+        f" give the unit. Possible: {_possible(size)}"
+    )
+
+
+def _possible(size: float) -> str:
+    """Return the units in which a body of this size has the length of a robot, with the keys that declare them."""
     fitting = [
         f"{unit_name} ({size * unit * 1e3:.4g} mm): file_unit_mm: {unit * 1e3:g}"
         for unit_name, unit in (_NAMED | _TAKEN).items()
         if 0.2 * SLENDER[0] <= size * unit <= 5.0 * SLENDER[1]
     ]
-    raise MeshError(
-        f"{name}: the body is {size:.4g} units long, which is {SLENDER[0] * 1e3:g} mm to {SLENDER[1]:g} m neither in mm nor in m;"
-        f" give the unit. Possible: {'; '.join(fitting) or 'file_unit_mm: the length of one unit'}"
-    )
+    return "; ".join(fitting) or "file_unit_mm: the length of one unit"
 
 
 def _contradiction(size: float, unit: float | None, length: float, name: str) -> str:

@@ -36,7 +36,7 @@ class Row:
 
 def stored_rows() -> list[Row]:
     """Return the stored table."""
-    text = (resources.files("gravcomp.references") / "calculix_h20r.csv").read_text()
+    text = (resources.files("gravcomp.references") / "calculix_h20r.csv").read_text(encoding="utf-8")
     return [
         Row(
             line["material"],
@@ -73,7 +73,7 @@ def printed(text: str) -> str:
         output = Path(folder) / "case.dat"
         if done.returncode != 0 or not output.exists():
             raise RuntimeError(f"CalculiX ended with code {done.returncode}: {done.stdout.strip()[-200:]}")
-        return output.read_text()
+        return output.read_text(encoding="utf-8")
 
 
 def end_face(mesh: Mesh, output: str) -> np.ndarray:

@@ -64,7 +64,7 @@ def robot_of(name: str, law: str) -> Robot:
 
 def stored_cases() -> list[Case]:
     """Return the stored table."""
-    text = (resources.files("gravcomp.references") / "calculix_cases.csv").read_text()
+    text = (resources.files("gravcomp.references") / "calculix_cases.csv").read_text(encoding="utf-8")
     return [
         Case(
             line["case"],

@@ -44,7 +44,7 @@ def cylinder() -> Robot:
 
 def stored_rests() -> list[Rest]:
     """Return the stored table."""
-    text = (resources.files("gravcomp.references") / "calculix_contact.csv").read_text()
+    text = (resources.files("gravcomp.references") / "calculix_contact.csv").read_text(encoding="utf-8")
     return [
         Rest(
             1e-3 * float(line["gap_mm"]),

@@ -156,7 +156,7 @@ def evenly(rows: np.ndarray, count: int) -> np.ndarray:
 @contextlib.contextmanager
 def alone(model: RobotModel, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
     """Context in which no other process builds the same reduction. waiting: called when another process has to end first."""
-    with open(path_of(model).with_suffix(".lock"), "w") as lock:
+    with open(path_of(model).with_suffix(".lock"), "w", encoding="utf-8") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

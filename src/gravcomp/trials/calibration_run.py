@@ -17,7 +17,9 @@ from gravcomp.calibration.approach import approached
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
-from gravcomp.calibration.plan import ORIENTATIONS, Plan, PlanOptions, creep_times, make_plan
+from gravcomp.calibration.plan import Plan, PlanOptions, creep_times
+from gravcomp.calibration.planning import make_plan
+from gravcomp.calibration.pose_candidates import ORIENTATIONS
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuStream
 from gravcomp.closed_loop.loop_failed import LoopFailed

@@ -19,7 +19,8 @@ from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
 from gravcomp.calibration.measured import History, Start, StillWindows
 from gravcomp.calibration.parameters import StaticParameters, creep_in_branches, starting_parameters
-from gravcomp.calibration.plan import Plan, creep_times, make_plan
+from gravcomp.calibration.plan import Plan, creep_times
+from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import GROUPS
 from gravcomp.closed_loop.setup import Setup

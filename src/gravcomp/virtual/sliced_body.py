@@ -9,6 +9,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Material, MeshBody
 from gravcomp.mesh.elements import edges, faces, reference_nodes, shape_values
 from gravcomp.mesh.mesh import MeshError
+from gravcomp.mesh_files.level_cut import level_cut
 from gravcomp.rest_axis import straightened
 from gravcomp.virtual.cross_section import CrossSection, sliced_section
 
@@ -20,8 +21,8 @@ _DIVISIONS = 4  # of the edges of a curved face
 def slice_of(body: MeshBody, part: float) -> CrossSection:
     """Return the section constants at `part` of the length. Raises ConfigError for a body without a section there."""
     segments, height = _slice(body, part)
-    section = sliced_section(segments) if len(segments) > 2 else None
-    if section is None or section.area <= 0.0:
+    section = sliced_section(segments)
+    if section is None:
         raise _missing(body, height)
     return section
 
@@ -38,7 +39,7 @@ def _slice(body: MeshBody, part: float) -> tuple[np.ndarray, float]:
     """Boundary (k, 2, 2) and height, in m, of the section at `part` of the length."""
     triangles, length = _surface(dataclasses.replace(body, material=Material()))
     height = length * min(max(part, 10 * _OFF_NODES), 1.0 - 10 * _OFF_NODES) + _OFF_NODES * length
-    return _cut(triangles, height), height
+    return level_cut(triangles, height), height
 
 
 def _missing(body: MeshBody, height: float) -> ConfigError:
@@ -94,17 +95,3 @@ def _divided(corners: int, parts: int) -> tuple[np.ndarray, np.ndarray]:
             if all(corner in place for corner in cell):
                 triangles.append([place[corner] for corner in cell])
     return np.array(weights), np.array(triangles)
-
-
-def _cut(triangles: np.ndarray, height: float) -> np.ndarray:
-    """Segments (k, 2, 2) in m where the plane z = height cuts the surface, with the body on their left."""
-    above = triangles[:, :, 2] > height
-    crossing = above.any(axis=1) & ~above.all(axis=1)
-    triangles, above = triangles[crossing], above[crossing]
-    # The corner that is alone on its side comes first; the order of the corners, and so the outside, is kept.
-    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
-    a, b, c = (triangles[np.arange(len(triangles)), (lone + k) % 3] for k in range(3))
-    part = ((height - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None], ((height - a[:, 2]) / (c[:, 2] - a[:, 2]))[:, None]
-    one, other = a[:, :2] + part[0] * (b - a)[:, :2], a[:, :2] + part[1] * (c - a)[:, :2]
-    upper = above[np.arange(len(above)), lone]
-    return np.stack([np.where(upper[:, None], one, other), np.where(upper[:, None], other, one)], axis=1)

@@ -48,7 +48,7 @@ class Definitions:
         for prefix in self._prefixes:
             path = prefix / "share" / package / "msg" / f"{message}.msg"
             if path.is_file():
-                return path.read_text()
+                return path.read_text(encoding="utf-8")
         raise BagError(f"the type {name} is not installed: no share/{package}/msg/{message}.msg in any of AMENT_PREFIX_PATH")
 
 

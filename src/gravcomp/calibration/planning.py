@@ -1,0 +1,174 @@
+"""Planning a calibration: the poses that tell most about the robot, in the time that it may take.
+
+The model gives the derivatives J_k of the tip by all unknowns of the fit (`unknowns`) in each candidate (`pose_candidates`).
+Poses are chosen one by one so that they add most to
+
+    log det (P + sum_k J_k^T W J_k)
+
+for the time that they take (a turn of the base takes longer than a pull), with the prior P and the noise W of `fit`. This greedy
+choice is D-optimal up to a constant factor, because the determinant's logarithm is submodular (Nemhauser, Wolsey and Fisher,
+Math. Programming 14, 1978; for designs: Pukelsheim, Optimal Design of Experiments, 1993).
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from gravcomp.calibration.approach import APPROACH
+from gravcomp.calibration.fit import TipNoise
+from gravcomp.calibration.measured import StillWindows
+from gravcomp.calibration.parameters import starting_parameters
+from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions
+from gravcomp.calibration.pose_candidates import ORIENTATIONS, pose_candidates
+from gravcomp.calibration.statics import StaticPredictor
+from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
+from gravcomp.config import ConfigError
+from gravcomp.description import Robot
+from gravcomp.description.transmission import Transmission
+from gravcomp.inverse import InverseOptions
+from gravcomp.mesh.coarse import with_coarse_elements
+
+_MEAN_TURN = math.radians(80.0)  # of the base from station to station
+_LEAST_REST = 0.3  # of the longest time that a pose may take
+_MOST_OF_REST = 0.5  # is left out where turns take longer than was expected
+_WIDEST = 0.5  # deviation of the logarithm of all moduli together before the measurement
+
+
+def make_plan(
+    robot: Robot,
+    period: float,
+    transmission: Transmission | None = None,
+    options: PlanOptions | None = None,
+    progress: Callable[[str], None] = lambda sentence: None,
+    orientations: tuple[tuple[float, float], ...] = ORIENTATIONS,
+    inverse: InverseOptions | None = None,
+) -> Plan:
+    """Return the plan for a robot with the first period `period` in s.
+
+    Raises ConfigError where the limits allow no pose, and where no pull that they allow shows in a measured tip.
+
+    orientations: candidates, inclination and roll of the base in rad; inverse: of the controller, to hold the robot in its shape
+    at rest in some of the poses; None: only one cable at a time is pulled, as by hand.
+    """
+    options, priors, noise = options or PlanOptions(), Priors(), TipNoise()
+    robot = with_coarse_elements(robot)
+    candidates, usual, shapes = pose_candidates(robot, transmission, options, noise, progress, orientations, inverse)
+    if not candidates:
+        raise ConfigError(
+            f"robot '{robot.name}': in none of {len(orientations)} orientations has the released robot an equilibrium within"
+            " the limits of its cables; no calibration can be planned"
+        )
+    windows = StillWindows(
+        np.array([pose.gravity for pose in candidates]),
+        np.array([pose.displacement for pose in candidates]),
+        np.zeros((len(candidates), 3)),
+        np.tile([0.0, 0.0, 1.0], (len(candidates), 1)),
+    )
+    predictor = StaticPredictor(robot, windows, near=shapes)
+    initial = starting_parameters(robot, ())
+    try:
+        predicted = predictor.predict(initial)
+    except RuntimeError as error:  # an equilibrium that a search finds may not be reached from the other poses
+        raise ConfigError(f"robot '{robot.name}': {error}; no calibration can be planned") from None
+    unknowns = unknowns_of(robot, predicted, initial, None, priors)
+    progress(f"planning: sensitivities of {len(candidates)} poses")
+    derivatives = predictor.differentiate(initial, {unknown.kind for unknown in unknowns})
+    scale = 1.0 / np.repeat([noise.position_share * robot.length, noise.direction], 3)
+    rows = np.stack([unknown.derivative(derivatives) for unknown in unknowns], axis=2) * scale[:, None]
+    prior = np.vstack([prior_rows(unknowns, priors), [(u.kind == "modulus") / _WIDEST for u in unknowns]])
+    longest = options.budget / options.fewest
+    wanted = float(np.clip(options.periods * period, options.budget / options.most, longest))
+    pull = _pull_time(candidates, robot)
+    rest = max(wanted - pull, _LEAST_REST * longest)
+    held = rest + pull
+    chosen = _chosen(candidates, usual, rows, prior, held, options)
+    if not chosen:
+        raise ConfigError(
+            f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
+        )
+    poses = _ordered([candidates[k] for k in chosen])
+    free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
+    poses.append(free)  # let go at the end, it swings: the damping
+    plan = Plan(tuple(poses), (held,) * len(poses), rest, options.rate)
+    # Turns were estimated while poses were chosen.
+    less = min(max(plan.duration - options.budget, 0.0) / len(poses), _MOST_OF_REST * rest)
+    return dataclasses.replace(plan, times=(held - less,) * len(poses), rest=rest - less)
+
+
+def _chosen(
+    candidates: list[PlannedPose],
+    usual: list[bool],
+    rows: np.ndarray,
+    prior: np.ndarray,
+    held: float,
+    options: PlanOptions,
+) -> list[int]:
+    """Return the chosen candidates.
+
+    usual: which are measured at every station that is visited: the released robot, which no error of a cable disturbs, and the
+    one that is held at rest; rows (k, 6, u): derivatives over the noise; held: time in s of each pose.
+    """
+    information = prior.T @ prior
+    always: dict[tuple[float, float], list[int]] = {}
+    for k, pose in enumerate(candidates):
+        always.setdefault(pose.station, []).extend([k] * usual[k])
+    chosen: list[int] = []
+    turn = _MEAN_TURN / options.rate
+    spent, stations = held, set()  # the last pose, released
+    while True:
+        factor = np.linalg.inv(information)
+        gain = np.linalg.slogdet(np.eye(6) + np.einsum("kiu,uv,kjv->kij", rows, factor, rows))[1]
+        new = [[k] if pose.station in stations else sorted({k, *always[pose.station]}) for k, pose in enumerate(candidates)]
+        cost = held * np.array([len(poses) for poses in new])
+        cost = cost + np.array([0.0 if pose.station in stations else turn for pose in candidates])
+        gain = gain / cost
+        gain[chosen] = -np.inf
+        gain[spent + cost > options.budget] = -np.inf
+        best = int(np.argmax(gain))
+        if not gain[best] > 0.0:
+            return chosen
+        spent += float(cost[best])
+        for k in new[best]:
+            information = information + rows[k].T @ rows[k]
+        chosen += new[best]
+        stations.add(candidates[best].station)
+
+
+def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:
+    """Return the time in s of the largest move of the cables."""
+    moves = np.ptp(np.array([pose.displacement for pose in candidates]), axis=0).max(initial=0.0)
+    return float(moves / robot.limits.displacement_rate) + APPROACH
+
+
+def _ordered(poses: list[PlannedPose]) -> list[PlannedPose]:
+    """Return the poses station by station, each next to the one before.
+
+    Released first, then held at rest, then cable by cable: so the cables are wound in to where they pull. After the held robot
+    comes a cable that has to be pulled further than it is there, where there is one.
+    """
+    left, ordered = list(poses), []
+    here = min(left, key=lambda pose: (bool(pose.pulled), abs(pose.inclination), pose.roll))
+    while left:
+        station = [pose for pose in left if pose.station == here.station]
+        back = _paid_out_from_held(station)
+        ordered += sorted(
+            station,
+            key=lambda pose: (
+                bool(pose.pulled), -len(pose.pulled), pose.pulled in back, pose.pulled, float(pose.tension.sum())
+            ),
+        )  # fmt: skip
+        left = [pose for pose in left if not any(pose is one for one in station)]
+        if left:
+            here = max(left, key=lambda pose: float(pose.gravity @ ordered[-1].gravity))
+    return ordered
+
+
+def _paid_out_from_held(station: list[PlannedPose]) -> set[tuple[str, ...]]:
+    """Return the cables, as they are pulled alone, that are farther out in some such pose than in that of the held robot."""
+    held = max(station, key=lambda pose: len(pose.pulled))
+    if len(held.pulled) < 2:
+        return set()
+    single = [pose for pose in station if len(pose.pulled) == 1]
+    return {pose.pulled for pose in single if (pose.displacement < held.displacement)[pose.tension > 0.0].any()}
