@@ -26,7 +26,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _COMMANDS = Path(__file__).parent / "test"
 _SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
-# A graph takes up to 0.9 of a processor: beside the other tests two of them starve on two.
+# A graph takes up to 0.9 of a processor: next to the other tests two of them starve on two.
 _ONE_GRAPH = (os.cpu_count() or 1) < 4
 # Modules that begin first among their kind, in this order: those that take longest. pytest-xdist gives a process that has at most
 # two tests left its next module at once, so a short one comes behind each that has a single long test.
