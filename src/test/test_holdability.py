@@ -13,12 +13,14 @@ import yaml
 from gravcomp.commands.__main__ import main
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.holdability import Binding, HoldOptions, background, holdability
+from gravcomp.holdability import Binding, HoldOptions, background, holdability, path
+from gravcomp.holdability.as_json import as_json
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.motor_tension import weak_motors
 from gravcomp.holdability.play import play_of
 from gravcomp.holdability.search import HoldSearch
+from gravcomp.holdability.text import lines, sentence
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.simulation import Simulator
 
@@ -285,3 +287,38 @@ def test_a_process_that_hangs_or_cannot_be_started_has_no_answer(monkeypatch):
     monkeypatch.setattr(os, "fork", fail)
     refused = HoldProcess(*question)
     assert not refused.running and refused.poll() is None
+
+
+@pytest.fixture(scope="module")
+def soft():
+    """A rod of 500 mm that would sag by 60 lengths: no 2 % of gravity lead from one of its equilibria to the next."""
+    material = Material(youngs_modulus=0.05e6, poissons_ratio=0.45, density=1070.0)
+    segment = Segment("s", length=0.5, outer_diameter=30e-3, material=material)
+    cables = tuple(Cable(f"c{k}", angle=np.radians(120 * k), radius=12e-3, segment="s") for k in range(3))
+    limits = Limits(tension_max=20.0, displacement_max=0.3, displacement_min=-0.3)
+    return HoldSearch(
+        RobotModel(Robot("soft", segments=(segment,), cables=cables, limits=limits, elements=Elements(around=8, along=5)))
+    )
+
+
+def test_the_path_of_a_long_soft_robot_is_followed_until_its_cables_do_not_hold_it(soft):
+    found = soft.answer(np.array([-0.5, 0.0, np.sqrt(0.75)]))
+    assert found.known and found.binding == Binding.CABLES and 0.03 < found.share < 0.1
+    hanging = soft.answer(np.array([0.0, 0.0, 1.0]))
+    assert hanging.held and hanging.lateral < soft.tolerance
+
+
+def test_a_search_that_ends_is_no_answer(soft, monkeypatch):
+    """Neither yes nor no, in the sentence, the lines and the mapping; another direction that is refuted says no."""
+    monkeypatch.setattr(path, "_MOST_STEPS", 2)
+    lost = holdability(soft.model, directions=[[-0.5, 0.0, np.sqrt(0.75)]], with_needed=False)
+    assert not lost.directions[0].known and not lost.held and not lost.refuted
+    assert lines(soft.robot, lost)[0].startswith("can it be held: not found; whether the cables hold the tip")
+    assert "the search ended at 4 % of gravity" in sentence(soft.robot, lost)
+    assert as_json(soft.robot, lost)["known"] is False and as_json(soft.robot, lost)["directions"][0]["known"] is False
+    refuted = dataclasses.replace(lost.directions[0], binding=Binding.BUCKLING)
+    both = dataclasses.replace(lost, directions=(lost.directions[0], refuted), worst=1)
+    assert refuted.severity > lost.directions[0].severity > 1.0
+    assert lines(soft.robot, both)[0].startswith("can it be held: no;") and "not found in 1 directions" in sentence(
+        soft.robot, both
+    )

@@ -19,7 +19,7 @@ class Binding(enum.StrEnum):
     BUCKLING = "buckling"
     """The tangent stiffness is no longer positive definite at constant tension."""
     EQUILIBRIUM = "equilibrium"
-    """The path of equilibria ends, for instance because the material softens."""
+    """The path of equilibria ends because the material softens; or the search ends, and nothing is known beyond: see `known`."""
     TARGET = "target"
     """The weightless robot does not reach the target."""
 
@@ -52,11 +52,16 @@ class DirectionAnswer:
     cause: str = ""
 
     @property
+    def known(self) -> bool:
+        """Whether the answer is known: a search that ends without a cause says nothing about what lies beyond."""
+        return self.held or self.binding != Binding.EQUILIBRIUM or bool(self.cause)
+
+    @property
     def severity(self) -> float:
-        """Order of the directions: larger is worse. At most 1 where the tip is held within the limits."""
+        """Order of the directions: larger is worse. At most 1 where the tip is held within the limits, 2 where it is not known."""
         if self.held:
             return min(1.0, self.demand or 0.0)
-        return 1.0 / max(self.share, 1e-3)
+        return 2.0 - min(self.share, 1.0) if not self.known else 1.0 + 1.0 / max(self.share, 1e-3)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +87,7 @@ class Holdability:
 
     tolerance in m; directions, in the order of the sphere; worst: index of the worst direction; released: lateral error in m of
     the released robot in that direction, None where no equilibrium was found; buckling: factor of gravity at which a held robot
-    buckles first, None: not up to `overload`; buckling_direction (3,); needed: None where the robot is held; tension_max in N
+    buckles first, None: not up to `overload`, which is 1 where no larger load was looked at; buckling_direction (3,); needed: None where the robot is held; tension_max in N
     and displacement_min and displacement_max in m: the limits; radius (m,): of the cables in m, NaN for those with via points.
     """
 
@@ -105,9 +110,19 @@ class Holdability:
         return all(answer.held for answer in self.directions)
 
     @property
+    def refuted(self) -> bool:
+        """Whether there is a direction in which the tip is known not to be held."""
+        return any(answer.known and not answer.held for answer in self.directions)
+
+    @property
+    def unknown(self) -> tuple[DirectionAnswer, ...]:
+        """The directions for which the search ended without an answer."""
+        return tuple(answer for answer in self.directions if not answer.known)
+
+    @property
     def ended(self) -> bool:
         """Whether a path of equilibria ends before the whole gravity acts."""
-        return any(answer.end is not None for answer in self.directions)
+        return any(answer.end is not None and answer.known for answer in self.directions)
 
     @property
     def held_share(self) -> float:

@@ -16,6 +16,7 @@ def as_json(robot: Robot, answer: Holdability) -> dict[str, Any]:
     return {
         "held": answer.held,
         "held_share": answer.held_share,
+        "known": answer.held or answer.refuted,
         "sentence": sentence(robot, answer),
         "model": answer.model,
         "tolerance_mm": 1e3 * answer.tolerance,
@@ -45,6 +46,7 @@ def _direction(answer: DirectionAnswer) -> dict[str, Any]:
         "inclination_deg": inclination,
         "azimuth_deg": azimuth,
         "held": answer.held,
+        "known": answer.known,
         "share": answer.share,
         "binding": answer.binding.value,
         "cable": answer.cable,

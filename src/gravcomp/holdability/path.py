@@ -3,6 +3,8 @@
 At each share of gravity the tensions solve the inverse problem of `gravcomp.inverse` at the model's equilibrium, without rates:
 programme and Newton's method in turn, until nothing changes. The next share starts from the tensions that the last two predict.
 A step that does not lead to an equilibrium with a positive definite tangent is halved; the path ends where that does not help.
+Of a robot that would sag by many lengths the steps are a share of those of others (`StaticSolver.share_of_steps`): its tensions
+have to follow gravity closely.
 """
 
 import dataclasses
@@ -14,6 +16,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.linear_response import observed
 from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.tracking import StaticTracker
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.tangent import Eigenvalues, Tangent
@@ -24,6 +27,7 @@ from gravcomp.inverse.programme import build_programme
 from gravcomp.inverse.scaling import unscaled
 from gravcomp.inverse.solver import ProgrammeSolver, SolverFailed
 from gravcomp.inverse.target import Target
+from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 # The question is whether the tip can be held laterally, at the cost of any shortening. The proximal term only makes steps settle;
 # with less of it, tensions of equal effect are found sooner.
@@ -33,6 +37,8 @@ _PROGRAMMES = 20
 # Changes of the cables below which a point has settled: of the robot's length, and of the largest tension.
 _SETTLED, _SETTLED_TENSION = 2e-5, 5e-3
 _UNDAMPED = 4.0
+# Steps of a path, with those that fail, after which its search ends: a few seconds.
+_MOST_STEPS = 60
 # Steps toward the programme's tensions are halved at most this many times.
 _HALVINGS = 3
 
@@ -56,7 +62,7 @@ class PathPoint:
 class HoldPath:
     """Follows the equilibria of a model that keep its tip on a target. The same calls give the same result.
 
-    Attributes: model; target; options; linear_answer of the robot at rest (see `Tangent.answer`).
+    Attributes: model; target; options; linear_answer of the robot at rest (see `Tangent.answer`); least_step: over gravity.
     """
 
     def __init__(self, model: RobotModel, target: Target, options: HoldOptions):
@@ -65,17 +71,32 @@ class HoldPath:
         self._tangent = Tangent(model)
         self._solver = ProgrammeSolver()
         self.linear_answer = self._tangent.answer
+        solver = StaticSolver(model)
+        self._share = min(solver.share_of_steps(STANDARD_GRAVITY * across) for across in np.eye(3)[:2])
+        self.least_step = self._share * options.least_step
 
     @property
     def displacements(self) -> np.ndarray:
         """Displacements (nodes, 3) in m at the last point of the last path."""
         return self._tracker.state.u
 
-    def follow(self, gravity: np.ndarray, limits: Limits, first: np.ndarray, most: float = 1.0) -> list[PathPoint]:
+    @property
+    def leaves(self) -> bool:
+        """Whether paths may be left where the tip is no longer held: those of a soft robot take many steps."""
+        return self._share < 1.0
+
+    def has_left(self, point: PathPoint) -> bool:
+        """Return whether a path that may be left is left at this point: the tip is no longer held."""
+        return self.leaves and point.lateral > self.options.tolerance * self.model.length
+
+    def follow(
+        self, gravity: np.ndarray, limits: Limits, first: np.ndarray, most: float = 1.0, *, may_leave: bool = False
+    ) -> list[PathPoint]:
         """Return the points of the path from no gravity to `most` times gravity (3,) in m/s^2, or to where it ends.
 
         limits: of tension and displacement, without rates (`limits.unlimited_rates`). first (m,): tensions in N that hold about
-        the whole gravity, of a linear estimate. No point at all: the target is out of reach of the weightless robot.
+        the whole gravity, of a linear estimate. may_leave: the path also ends where it `has_left`. No point at all: no shape of the
+        weightless robot is found.
         """
         self._tracker.reset()
         self._solver.reset()
@@ -83,8 +104,10 @@ class HoldPath:
         if start is None:
             return []
         points = [self._point(0.0, start)]
-        step = self.options.first_step
-        while points[-1].share < most:
+        step = self._share * self.options.first_step
+        for _ in range(_MOST_STEPS):
+            if points[-1].share >= most or (may_leave and self.has_left(points[-1])):
+                break
             share = min(most, points[-1].share + step)
             before, sliding = self._tracker.state, self._tracker.sliding
             guess = np.clip(_predicted(points, share, first), limits.tension_min, limits.tension_max)
@@ -96,7 +119,7 @@ class HoldPath:
                 continue
             self._tracker.state, self._tracker.sliding = before, sliding
             step /= 2.0
-            if step < self.options.least_step * max(1.0, points[-1].share):
+            if step < self.least_step * max(1.0, points[-1].share):
                 break
         return points
 

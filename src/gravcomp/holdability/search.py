@@ -46,11 +46,11 @@ class HoldSearch:
         """Return the answer for a direction (3,) of gravity, a unit vector."""
         gravity = STANDARD_GRAVITY * direction
         first, _ = self.linear.tension(gravity)
-        points = self.path.follow(gravity, self.wide, first)
+        points = self.path.follow(gravity, self.wide, first, may_leave=True)
         if not points or points[0].lateral > self.tolerance:
             return self._unreached(direction, points)
         last = points[-1]
-        complete = last.share >= 1.0
+        complete, left = last.share >= 1.0, self.path.has_left(last)
         share, binding, cable = self._first_violation(points)
         cause = "" if complete else beyond_range(self.model, self.path.displacements, _NEARLY)
         possible = complete and last.lateral <= self.tolerance
@@ -73,7 +73,7 @@ class HoldSearch:
             lateral=lateral,
             eigenvalue=last.eigenvalues.free,
             eigenvalue_held=last.eigenvalues.held,
-            end=None if complete else last.share,
+            end=None if complete or left else last.share,
             cause=cause if binding == Binding.EQUILIBRIUM else "",
         )
 
@@ -114,13 +114,12 @@ class HoldSearch:
         if last.eigenvalues.free < _LITTLE or len(points) == 1:
             return last.eigenvalues.free < _LITTLE
         slope = (last.eigenvalues.free - points[-2].eigenvalues.free) / (last.share - points[-2].share)
-        return last.eigenvalues.free + _NEAR * self.options.least_step * slope <= 0.0
+        return last.eigenvalues.free + _NEAR * self.path.least_step * slope <= 0.0
 
     def _unreached(self, direction: np.ndarray, points: list[PathPoint]) -> DirectionAnswer:
-        """Return the answer where the weightless robot does not reach the target."""
-        return DirectionAnswer(
-            direction, False, 0.0, Binding.TARGET, None, None, None, None, points[0].lateral if points else None, 0.0, 0.0, 0.0
-        )
+        """Return the answer where the weightless robot does not reach the target, or no shape of it is found."""
+        binding, lateral = (Binding.TARGET, points[0].lateral) if points else (Binding.EQUILIBRIUM, None)
+        return DirectionAnswer(direction, False, 0.0, binding, None, None, None, None, lateral, 0.0, 0.0, 0.0)
 
 
 def _over(value: float, limit: float) -> float:

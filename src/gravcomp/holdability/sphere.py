@@ -83,7 +83,7 @@ def _summary(search: HoldSearch, answers: tuple[DirectionAnswer, ...], with_need
     """Return the whole answer; with_needed: as in `holdability`."""
     worst = int(np.argmax([answer.severity for answer in answers]))
     answer, limits = answers[worst], search.limits
-    buckling, where = _buckling(search, answers) if with_needed else (None, None)
+    overload, buckling, where = _buckling(search, answers) if with_needed else (search.options.overload, None, None)
     return Holdability(
         model=f"full model, {search.model.pattern.n} unknowns",
         tolerance=search.tolerance,
@@ -92,7 +92,7 @@ def _summary(search: HoldSearch, answers: tuple[DirectionAnswer, ...], with_need
         released=_released(search, answer.direction) if with_needed else None,
         buckling=buckling,
         buckling_direction=where,
-        overload=search.options.overload,
+        overload=overload,
         needed=None if answer.held or not with_needed else needed(search, answer),
         tension_max=limits.tension_max,
         displacement_min=limits.displacement_min,
@@ -100,20 +100,21 @@ def _summary(search: HoldSearch, answers: tuple[DirectionAnswer, ...], with_need
     )
 
 
-def _buckling(search: HoldSearch, answers: tuple[DirectionAnswer, ...]) -> tuple[float | None, np.ndarray | None]:
-    """Return the least factor of gravity at which a held robot buckles, and the direction (3,)."""
+def _buckling(search: HoldSearch, answers: tuple[DirectionAnswer, ...]) -> tuple[float, float | None, np.ndarray | None]:
+    """Return the factor of gravity up to which was looked, the least at which a held robot buckles, and the direction (3,)."""
     followed = [answer for answer in answers if answer.binding != Binding.TARGET]
-    ended = [answer for answer in followed if answer.end is not None]
+    ended = [answer for answer in followed if answer.end is not None and answer.known]
     if ended:
         first = min(ended, key=lambda answer: answer.end or 0.0)
-        return first.end, first.direction
-    if not followed:
-        return None, None
+        return search.options.overload, first.end, first.direction
+    # Where a search has ended, or a path was left, a larger load has not been looked at.
+    if not followed or search.path.leaves or not all(answer.known for answer in followed):
+        return 1.0, None, None
     weakest = min(followed, key=lambda answer: answer.eigenvalue)
     gravity, most = STANDARD_GRAVITY * weakest.direction, search.options.overload
     first_tension, _ = search.linear.tension(gravity)
     last = search.path.follow(gravity, search.wide, first_tension, most=most)[-1].share
-    return (last, weakest.direction) if last < most else (None, None)
+    return most, *((last, weakest.direction) if last < most else (None, None))
 
 
 def _released(search: HoldSearch, direction: np.ndarray) -> float | None:

@@ -16,11 +16,14 @@ def sentence(robot: Robot, answer: Holdability) -> str:
         )
         return f"{start}; the largest load is {load(answer, worst)}, {toward(worst)}"
     if len(answer.directions) == 1:
+        if not worst.known:
+            return f"whether the cables hold the tip {toward(worst)} is not found: {reason(answer, worst)}"
         return f"the cables do not hold the tip {toward(worst)}: {reason(answer, worst)}"
-    return (
+    found = (
         f"the cables hold the tip in {100 * answer.held_share:.0f} % of the directions of gravity;"
         f" worst {toward(worst)}: {reason(answer, worst)}"
     )
+    return found + (f"; not found in {len(answer.unknown)} directions" if answer.unknown and worst.known else "")
 
 
 def reason(answer: Holdability, direction: DirectionAnswer) -> str:
@@ -42,9 +45,9 @@ def reason(answer: Holdability, direction: DirectionAnswer) -> str:
         case Binding.BUCKLING:
             return f"the robot buckles at {share}"
         case Binding.EQUILIBRIUM:
-            return f"no equilibrium that keeps the tip is found beyond {share}" + (
-                f": {direction.cause}" if direction.cause else ""
-            )
+            if direction.known:
+                return f"no equilibrium that keeps the tip is found beyond {share}: {direction.cause}"
+            return f"the search ended at {share}, which is no answer for more"
         case Binding.TARGET:
             return "the target is out of reach, even without gravity"
 
@@ -72,7 +75,8 @@ def toward(direction: DirectionAnswer) -> str:
 def lines(robot: Robot, answer: Holdability) -> list[str]:
     """Return the whole answer as lines."""
     worst = answer.directions[answer.worst]
-    found = [f"can it be held: {'yes' if answer.held else 'no'}; {sentence(robot, answer)}"]
+    short = "yes" if answer.held else "no" if answer.refuted else "not found"
+    found = [f"can it be held: {short}; {sentence(robot, answer)}"]
     remaining = "not known within the limits" if worst.lateral is None else f"{1e3 * worst.lateral:.2f} mm with the cables pulled"
     released = "not known" if answer.released is None else f"{1e3 * answer.released:.1f} mm"
     found.append(

@@ -23,7 +23,7 @@ _NOT_HELD = {
     Binding.DISPLACEMENT: ("#e9c46a", "displacement limit"),
     Binding.CABLES: ("#9d8189", "no cable brings it nearer"),
     Binding.BUCKLING: ("#c8553d", "buckles"),
-    Binding.EQUILIBRIUM: ("#8c2f39", "no equilibrium found"),
+    Binding.EQUILIBRIUM: ("#8c2f39", "equilibrium ends, or search ended"),
     Binding.TARGET: ("#6c757d", "target out of reach"),
 }
 _CELLS = 2.0  # deg: size of the cells that are drawn
