@@ -180,6 +180,31 @@ def test_spikes_are_found_in_motion_that_changes_as_fast_as_they_do(all_axes):
     assert np.abs(reviewed(spiky) - signal).max() < 0.35  # 20 deg/s
 
 
+def test_spikes_are_found_in_vibration_which_no_curve_follows():
+    random = np.random.default_rng(3)
+    signal = 0.2 * np.sin(np.arange(2000)[:, None] * [2.9, 2.7, 2.5])  # 11 deg/s, at 0.46 to 0.4 of the sample rate
+    hit = random.random((2000, 1)) < 0.02
+    spiky = signal + hit * random.choice([-1.0, 1.0], (2000, 3)) * random.uniform(2.2, 4.0, (2000, 3))
+    settled = slice(100, -AHEAD)
+    assert (reviewed(signal)[settled] == signal[settled]).all()
+    assert np.abs(reviewed(spiky) - signal)[settled].max() < 1.0
+
+
+@pytest.mark.parametrize("hz", [1.0, 3.0, 4.0, 5.0])
+def test_motion_that_begins_after_a_rest_is_no_spike(hz):
+    time = 0.0105 * np.arange(-150, 300)[:, None]
+    signal = np.where(time > 0.0, 5.0 * np.sin(2.0 * np.pi * hz * time) * np.array([1.0, -0.5, 0.8]), 0.0)  # 290 deg/s
+    assert (reviewed(signal) == signal).all()
+
+
+@pytest.mark.parametrize("places", [(0,), (0, 1, 3), (0, 2, 3), (0, 1, 2)])
+def test_as_many_as_three_spikes_in_slow_motion_leave_nothing(places):
+    signal = 0.3 * np.sin(0.03 * np.arange(300)[:, None] + np.arange(3.0))
+    spiky = signal.copy()
+    spiky[[150 + place for place in places]] += [0.14, 4.0, -3.0]  # the part of 8 deg/s alone would end a rest
+    assert np.abs(reviewed(spiky) - signal).max() < math.radians(1.5)
+
+
 @pytest.mark.parametrize(("floor_deg_s", "removed"), [(20.0, True), (2000.0, False)])
 def test_means_of_samples_are_made_without_spikes_of_the_rate(floor_deg_s, removed):
     time, place = np.arange(400) / 100.0, 201

@@ -7,6 +7,8 @@
 #define GC_SURE 2.0f
 #define GC_WITH_IT 0.25f
 #define GC_LEFT_OUT 0.1f
+#define GC_STRAIGHT 0.1f
+#define GC_AROUND 8u  // neighbours whose median counts: four on each side
 // Weights of six neighbours and the sample between them: its distance from the polynomial of degree five through them.
 #define GC_NEAR 0.75f
 #define GC_FAR (-0.3f)
@@ -31,9 +33,50 @@ typedef struct {
   float off;
 } gc_axis_review;
 
+// How far the sample in question is from the curve and from the median of its neighbours, on the axis where it is farthest; by how
+// much a cubic is nearer to a sample that is decided than the mean of its neighbours; and the median (3,).
+typedef struct {
+  float distance, off, bend, median[3];
+} gc_look;
+
 void gc_spike_review_reset(gc_spike_review *review) {
   review->count = 0;
   review->mean = 0.0f;
+  review->mean_from_median = 0.0f;
+  review->bend = review->floor;  // a curve, as long as nothing is known
+}
+
+static float median_around(const gc_spike_review *review, uint32_t axis) {
+  float sorted[GC_AROUND];
+  for (uint32_t k = 0; k < GC_AROUND; ++k) {
+    const uint32_t at = FIRST - GC_AROUND / 2u + k;
+    const float value = review->samples[at < FIRST ? at : at + 1u][axis];
+    uint32_t place = k;
+    for (; place > 0u && sorted[place - 1u] > value; --place) {
+      sorted[place] = sorted[place - 1u];
+    }
+    sorted[place] = value;
+  }
+  return 0.5f * (sorted[GC_AROUND / 2u - 1u] + sorted[GC_AROUND / 2u]);
+}
+
+static gc_look look(const gc_spike_review *review) {
+  const float(*at)[3] = (const float(*)[3])review->samples + FIRST;
+  const float(*before)[3] = (const float(*)[3])review->samples + FIRST - 3;
+  gc_look found = {0};
+  float from_mean = 0.0f, from_cubic = 0.0f;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    const float near = GC_NEAR * (at[-1][i] + at[1][i]), far = GC_FAR * (at[-2][i] + at[2][i]);
+    const float farthest = GC_FARTHEST * (at[-3][i] + at[3][i]);
+    found.distance = gc_max(found.distance, gc_abs(((at[0][i] - near) - far) - farthest));
+    found.median[i] = median_around(review, i);
+    found.off = gc_max(found.off, gc_abs(at[0][i] - found.median[i]));
+    const float next = before[-1][i] + before[1][i], second = before[-2][i] + before[2][i];
+    from_mean = gc_max(from_mean, gc_abs(before[0][i] - 0.25f * (next + second)));
+    from_cubic = gc_max(from_cubic, gc_abs(before[0][i] - (4.0f * next - second) / 6.0f));
+  }
+  found.bend = from_mean - from_cubic;
+  return found;
 }
 
 // Return the review of an axis, where each sample that is left out costs `cost`.
@@ -71,8 +114,9 @@ static gc_axis_review review_of(const gc_spike_review *review, uint32_t axis, fl
   return (gc_axis_review){best > others, off};
 }
 
-// Write what counts for the sample in question: on each axis itself, or the curve where it is a spike.
-static void decide(const gc_spike_review *review, float threshold, float *counted) {
+// Put the curve in place of the sample in question on each axis on which that is a spike.
+static void decide(gc_spike_review *review, float threshold) {
+  float *ours = review->samples[FIRST];
   const float cost = GC_LEFT_OUT * (RESIDUAL[0][FIRST] / SCALE) * (threshold * threshold);
   gc_axis_review axes[3];
   bool any = false;
@@ -83,8 +127,19 @@ static void decide(const gc_spike_review *review, float threshold, float *counte
   }
   for (uint32_t i = 0; i < 3u; ++i) {
     const bool spike = axes[i].left_out || (any && gc_abs(axes[i].off) > GC_WITH_IT * threshold);
-    counted[i] = review->samples[FIRST][i] - (spike ? axes[i].off : 0.0f);
+    ours[i] -= spike ? axes[i].off : 0.0f;
   }
+}
+
+// Return whether most samples after the one in question are far from the median, too: that is motion which begins.
+static bool goes_on(const gc_spike_review *review, const float *median, float least) {
+  uint32_t far = 0;
+  for (uint32_t k = FIRST + 1u; k < GC_REVIEW_SAMPLES; ++k) {
+    const float *after = review->samples[k];
+    const float x = gc_abs(after[0] - median[0]), y = gc_abs(after[1] - median[1]), z = gc_abs(after[2] - median[2]);
+    far += gc_max(gc_max(x, y), z) > least ? 1u : 0u;
+  }
+  return 2u * far > GC_REVIEW_AHEAD;
 }
 
 bool gc_spike_review_take(gc_spike_review *review, const gc_settings *settings, float dt, const float *value, float *counted) {
@@ -98,20 +153,24 @@ bool gc_spike_review_take(gc_spike_review *review, const gc_settings *settings, 
   if (review->count < GC_REVIEW_SAMPLES) {
     return false;
   }
-  const float(*at)[3] = (const float(*)[3])review->samples + FIRST;
-  float distance = 0.0f;
-  for (uint32_t i = 0; i < 3u; ++i) {
-    const float near = GC_NEAR * (at[-1][i] + at[1][i]), far = GC_FAR * (at[-2][i] + at[2][i]);
-    const float farthest = GC_FARTHEST * (at[-3][i] + at[3][i]);
-    distance = gc_max(distance, gc_abs(((at[0][i] - near) - far) - farthest));
+  float *ours = review->samples[FIRST];
+  const gc_look found = look(review);
+  const float floor = review->floor;
+  const float threshold = gc_max(floor, settings->spike_ratio * review->mean);
+  const float from_median = gc_max(floor, settings->spike_ratio * review->mean_from_median);
+  const float part = dt / (settings->spike_time_constant + dt);
+  review->mean += part * (gc_min(found.distance, GC_BOUND * threshold) - review->mean);
+  review->mean_from_median += part * (gc_min(found.off, GC_BOUND * from_median) - review->mean_from_median);
+  review->bend += part * (gc_max(-floor, found.bend) - review->bend);
+  const float least = GC_SURE * from_median;
+  const bool is_far = found.off > least && found.distance > floor;
+  if (review->bend > GC_STRAIGHT * floor || (is_far && goes_on(review, found.median, least))) {
+    if (found.distance > threshold) {
+      decide(review, GC_SURE * threshold);
+    }
+  } else if (is_far) {
+    gc_copy(ours, found.median, sizeof(float[3]));  // on all axes: a rest would end at what is left of the spike
   }
-  const float threshold = gc_max(review->floor, settings->spike_ratio * review->mean);
-  review->mean += dt / (settings->spike_time_constant + dt) * (gc_min(distance, GC_BOUND * threshold) - review->mean);
-  if (distance <= threshold) {
-    gc_copy(counted, at[0], sizeof(float[3]));
-  } else {
-    decide(review, GC_SURE * threshold, counted);
-    gc_copy(review->samples[FIRST], counted, sizeof(float[3]));
-  }
+  gc_copy(counted, ours, sizeof(float[3]));
   return true;
 }

@@ -16,7 +16,7 @@ typedef struct {
   float floor;  // a smaller distance from the curve is no spike
   uint32_t count;
   float samples[GC_REVIEW_SAMPLES][3];
-  float mean;
+  float mean, mean_from_median, bend;
 } gc_spike_review;
 
 // Forget the samples: what follows is no continuation of them.

@@ -5,6 +5,10 @@ sample to sample. With the samples after it the same motion is a smooth curve, t
 least squares to the sample in question and its neighbours, once with all of them and once without each one or two that may be
 spikes. The fit counts that has the smallest squared residual, where each sample that is left out costs a constant (a truncated
 quadratic: A. Blake, A. Zisserman, Visual Reconstruction, MIT Press 1987, ch. 3). Each axis has its own fit.
+
+Slow motion and vibration are no such curve. There the median of the neighbours is nearer, and three spikes among them do not
+move it, while a polynomial swings with the vibration, and three spikes bend it. So the median counts as long as a curve was not
+nearer to the last samples than the mean of their neighbours.
 """
 
 import itertools
@@ -19,6 +23,7 @@ BEFORE, AHEAD = 5, 4  # samples of the fit before and after the one in question
 DEGREE = 4
 SURE = 2.0  # of the threshold: an angle lacks for good what a wrong spike removes
 WITH_IT = 0.25  # of that: where one axis has a spike, the others are likely to have one
+STRAIGHT = 0.1  # of the floor: by how much a curve may be nearer to the last samples than their mean where the median counts
 _LEFT_OUT = 0.1  # cost of a sample that is left out, in squared thresholds times the residual's share of a single spike
 _MOST = 2  # spikes among the samples of a fit
 # Weights of six neighbours and the sample between them: its distance from the polynomial of degree five through them.
@@ -52,12 +57,13 @@ class SpikeReview:
         """floor: a smaller distance from the curve is no spike."""
         self._floor, self._options = floor, options
         self._samples: deque[Vector] = deque(maxlen=BEFORE + 1 + AHEAD)
-        self._mean = 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Forget the samples: what follows is no continuation of them."""
         self._samples.clear()
-        self._mean = 0.0
+        self._mean = self._mean_from_median = 0.0
+        self._bend = self._floor  # a curve, as long as nothing is known
 
     def take(self, dt: float, value: Vector) -> Vector | None:
         """Take the value (3,) of a sample `dt` s after the last one; return what counts for the one AHEAD samples before it.
@@ -68,19 +74,57 @@ class SpikeReview:
         samples.append(value)
         if len(samples) <= BEFORE + AHEAD:
             return None
-        a, b, c, ours, d, e, f = itertools.islice(samples, BEFORE - 3, BEFORE + 4)
-        distance = 0.0
-        for i in (0, 1, 2):
-            off = abs(ours[i] - _NEAR * (c[i] + d[i]) - _FAR * (b[i] + e[i]) - _FARTHEST * (a[i] + f[i]))
-            distance = off if off > distance else distance
-        threshold = self._options.ratio * self._mean
-        threshold = self._floor if self._floor > threshold else threshold
-        self._mean += dt / (self._options.time_constant + dt) * (min(distance, BOUND * threshold) - self._mean)
-        if distance <= threshold:
+        ours = samples[BEFORE]
+        distance, off, bend, middle = self._look()
+        threshold, from_median = self._threshold(self._mean), self._threshold(self._mean_from_median)
+        part = dt / (self._options.time_constant + dt)
+        self._mean += part * (min(distance, BOUND * threshold) - self._mean)
+        self._mean_from_median += part * (min(off, BOUND * from_median) - self._mean_from_median)
+        self._bend += part * (max(-self._floor, bend) - self._bend)
+        least = SURE * from_median
+        is_far = off > least and distance > self._floor
+        if self._bend <= STRAIGHT * self._floor and not (is_far and self._goes_on(middle, least)):
+            if not is_far:
+                return ours
+            decided = middle  # on all axes: a rest would end at what is left of the spike
+        elif distance <= threshold:
             return ours
-        decided = self._decided(SURE * threshold)
+        else:
+            decided = self._decided(SURE * threshold)
         samples[BEFORE] = decided
         return decided
+
+    def _threshold(self, mean: float) -> float:
+        threshold = self._options.ratio * mean
+        return self._floor if self._floor > threshold else threshold
+
+    def _goes_on(self, middle: Vector, least: float) -> bool:
+        """Return whether most samples after the one in question are far from the median, too: that is motion which begins."""
+        after = itertools.islice(self._samples, BEFORE + 1, None)
+        return 2 * sum(max(abs(v - m) for v, m in zip(sample, middle)) > least for sample in after) > AHEAD
+
+    def _look(self) -> tuple[float, float, float, Vector]:
+        """Return how far the sample in question is from the curve and from the median, the bend, and the median (3,).
+
+        Bend: by how much a cubic through four samples that are decided is nearer to the one between them than their mean is.
+        """
+        distance = off = from_mean = from_cubic = 0.0
+        middle = []
+        for a, b, c, d, e, ours, f, g, h, i in zip(*self._samples):
+            away = abs(ours - _NEAR * (e + f) - _FAR * (d + g) - _FARTHEST * (c + h))
+            distance = away if away > distance else distance
+            around = sorted((b, c, d, e, f, g, h, i))
+            median = 0.5 * (around[3] + around[4])
+            middle.append(median)
+            away = abs(ours - median)
+            off = away if away > off else off
+            near, far = b + d, a + e
+            away = abs(c - 0.25 * (near + far))
+            from_mean = away if away > from_mean else from_mean
+            away = abs(c - (4.0 * near - far) / 6.0)
+            from_cubic = away if away > from_cubic else from_cubic
+        x, y, z = middle
+        return distance, off, from_mean - from_cubic, (x, y, z)
 
     def _decided(self, threshold: float) -> Vector:
         """Return what counts for the sample in question: on each axis itself, or the curve where it is a spike."""
