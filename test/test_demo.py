@@ -52,9 +52,9 @@ def check_compensation(figures: dict) -> None:
     assert set(figures["nodes"]) == set(LOOP) and set(figures["nodes"].values()) == {"active"}
     assert figures["sag_mm"] > 20.0
     assert figures["residual_lateral_mm"] < figures["sag_mm"] / 5.0
-    # One command a sample. A loop that leaves out every second sample has half the rate, one on a loaded machine a little less;
-    # `bench graph` measures the rate.
-    assert 0.7 * figures["imu_rate_hz"] < figures["command_rate_hz"] < 1.02 * figures["imu_rate_hz"]
+    # One command a sample. A loop that leaves out every second sample has half the rate, one on a slow machine a little less than
+    # all; `bench graph` measures the rate.
+    assert 0.6 * figures["imu_rate_hz"] < figures["command_rate_hz"] < 1.02 * figures["imu_rate_hz"]
     assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.1)
     assert figures["gravity_error_deg"] < 2.0
     assert figures["delay_ms"]["median"] > 0.0
