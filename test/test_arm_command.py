@@ -20,9 +20,9 @@ def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcom
     figures = answer.json
     assert figures["inclination_deg"] == [135.0, 90.0, 45.0, 0.0, -45.0]
     assert figures["tip_error_released_rms_mm"] > 15.0 and figures["ratio"] >= 5.0
-    # The mount is known and the URDF is right: what remains, at worst, is the filter's error and the time between two messages.
-    # A wrong axis is 45 deg or more off in these poses.
-    assert figures["arm_and_imu_disagree_by_deg"] < 10.0
+    # The mount is known and the URDF is right: what remains, at worst, is the filter's error and the time between two messages in
+    # the fast motion, which a slow machine makes longer. A wrong axis is 45 deg or more off in these poses.
+    assert figures["arm_and_imu_disagree_by_deg"] < 22.5
 
 
 @pytest.mark.graph
