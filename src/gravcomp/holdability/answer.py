@@ -58,7 +58,7 @@ class DirectionAnswer:
 
     @property
     def severity(self) -> float:
-        """Order of the directions: larger is worse. At most 1 where the tip is held within the limits, 2 where it is not known."""
+        """Order of the directions: larger is worse. At most 1 where the tip is held within the limits, 2 where it is unknown."""
         if self.held:
             return min(1.0, self.demand or 0.0)
         return 2.0 - min(self.share, 1.0) if not self.known else 1.0 + 1.0 / max(self.share, 1e-3)
@@ -87,8 +87,9 @@ class Holdability:
 
     tolerance in m; directions, in the order of the sphere; worst: index of the worst direction; released: lateral error in m of
     the released robot in that direction, None where no equilibrium was found; buckling: factor of gravity at which a held robot
-    buckles first, None: not up to `overload`, which is 1 where no larger load was looked at; buckling_direction (3,); needed: None where the robot is held; tension_max in N
-    and displacement_min and displacement_max in m: the limits; radius (m,): of the cables in m, NaN for those with via points.
+    buckles first, None: not up to `overload`, which is 1 where no larger load was looked at; buckling_direction (3,); needed:
+    None where the robot is held; tension_max in N and displacement_min and displacement_max in m: the limits; radius (m,): of the
+    cables in m, NaN for those with via points.
     """
 
     model: str

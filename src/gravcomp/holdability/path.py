@@ -95,8 +95,8 @@ class HoldPath:
         """Return the points of the path from no gravity to `most` times gravity (3,) in m/s^2, or to where it ends.
 
         limits: of tension and displacement, without rates (`limits.unlimited_rates`). first (m,): tensions in N that hold about
-        the whole gravity, of a linear estimate. may_leave: the path also ends where it `has_left`. No point at all: no shape of the
-        weightless robot is found.
+        the whole gravity, of a linear estimate. may_leave: the path also ends where it `has_left`. No point at all: no shape of
+        the weightless robot is found.
         """
         self._tracker.reset()
         self._solver.reset()
