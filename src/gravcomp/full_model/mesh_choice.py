@@ -47,7 +47,8 @@ _START_ALONG = 8
 # The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
 _SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
-# The most multiplications in factors that a choice may take, about twenty seconds of one core; those of a load on one mesh.
+# The most multiplications in factors that a choice may take, about twenty seconds of one core where shapes are
+# found from those of the mesh before, and the factors of a load on one mesh.
 _MOST_WORK, _FACTORS = 1e11, 12
 # The most cells through the wall, of those around: with more they are flat, and the estimate of both directions is wrong. What
 # more cells through the wall change is then measured on the mesh with the next number around.
