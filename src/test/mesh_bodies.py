@@ -1,20 +1,21 @@
-"""Small bodies for tests, in mm, along z from the origin: the shipped tapered tube and its surface."""
+"""Small bodies for tests, in mm, along z from the origin: a tapered tube of tetrahedra and its surface."""
+
+from pathlib import Path
 
 import numpy as np
 
-from gravcomp.description import load_robot_file
 from gravcomp.mesh_files.repair_volume import boundary_triangles
 
 LENGTH = 80.0
+TAPERED_TUBE = Path(__file__).with_name("tapered_tube.vtk")
+"""Quadratic tetrahedra, twelve layers that grow from 3 to 12 mm: the tube of the shipped `mesh_body`, more coarsely."""
 
 
 def cone() -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) and linear tetrahedra (k, 4) of a tube, 9 mm wide at the base, 6 mm at the tip, 80 mm long, lumen 3 mm."""
     import meshio
 
-    body = load_robot_file("mesh_body").robot.body
-    assert body is not None
-    content = meshio.read(body.file)
+    content = meshio.read(TAPERED_TUBE)
     used, corners = np.unique(content.cells_dict["tetra10"][:, :4], return_inverse=True)
     return np.array(content.points[used], dtype=float), corners.reshape(-1, 4)
 

@@ -70,7 +70,7 @@ def test_friction_follows_the_capstan_equation():
 def test_a_cable_outside_the_body_is_refused():
     robot = load_robot_file("mesh_body").robot
     outside = Cable("far", angle=0.0, radius=4.2e-3, end=0.08)
-    with pytest.raises(MeshError, match="cable 'far' leaves the body at"):
+    with pytest.raises(MeshError, match="cable 'far' leaves the body"):
         RobotModel(dataclasses.replace(robot, cables=(outside,)))
 
 

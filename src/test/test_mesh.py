@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from mesh_bodies import TAPERED_TUBE
 
 from gravcomp.description import Cap, Elements, Material, MeshBody, Robot, Segment, load_robot_file
 from gravcomp.mesh import MeshError, body_mesh, tube_mesh
@@ -68,12 +69,21 @@ def test_the_shipped_body_has_an_equilibrium():
     assert shape.status == 0 and shape.tip_position[0] < -5e-3
 
 
+def test_the_shipped_body_is_the_tube_that_its_file_describes():
+    shape = Segment("a", 0.08, 9e-3, 3e-3, tip_outer_diameter=6e-3)
+    tube = tube_mesh(Robot("tube", segments=(shape,), elements=Elements(around=6, along=24, radial=1, grading=1.0)))
+    shipped = body_mesh(load_robot_file("mesh_body").robot)
+    assert shipped.nodes == pytest.approx(tube.nodes, abs=1e-9) and np.array_equal(shipped.elements, tube.elements)
+
+
 def body(file: str, **changes) -> Robot:
     return Robot("body", body=dataclasses.replace(MeshBody(file, 0.08), **changes))
 
 
-def shipped_mesh() -> str:
-    return load_robot_file("mesh_body").robot.body.file
+def in_tetrahedra() -> Robot:
+    """The shipped body, of coarse tetrahedra."""
+    robot = load_robot_file("mesh_body").robot
+    return dataclasses.replace(robot, body=dataclasses.replace(robot.body, file=str(TAPERED_TUBE)))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +97,7 @@ def shipped_mesh() -> str:
 )
 def test_a_body_that_does_not_fit_its_description_is_refused(changes, words):
     with pytest.raises(MeshError) as error:
-        body_mesh(body(**{"file": shipped_mesh()} | changes))
+        body_mesh(body(**{"file": str(TAPERED_TUBE)} | changes))
     for word in words:
         assert word in str(error.value)
 
@@ -95,7 +105,7 @@ def test_a_body_that_does_not_fit_its_description_is_refused(changes, words):
 def test_a_body_lying_on_its_side_is_refused(tmp_path):
     import meshio
 
-    content = meshio.read(shipped_mesh())
+    content = meshio.read(str(TAPERED_TUBE))
     meshio.write(tmp_path / "side.vtk", meshio.Mesh(content.points[:, [2, 0, 1]], content.cells))
     with pytest.raises(MeshError, match="its axis is not z"):
         body_mesh(body(str(tmp_path / "side.vtk")))
@@ -104,7 +114,7 @@ def test_a_body_lying_on_its_side_is_refused(tmp_path):
 def test_linear_tetrahedra_become_quadratic_with_a_warning(tmp_path, caplog):
     import meshio
 
-    content = meshio.read(shipped_mesh())
+    content = meshio.read(str(TAPERED_TUBE))
     linear = meshio.Mesh(content.points, [("tetra", content.cells[0].data[:, :4])])
     meshio.write(tmp_path / "linear.vtk", linear)
     assert body_mesh(body(str(tmp_path / "linear.vtk"))).kind == "tet10"
@@ -120,10 +130,12 @@ def test_quality_sees_a_distorted_element():
     assert bad.jacobian_ratio < 0.1 and "distorted" in bad.advice[0]
 
 
-def test_divided_tetrahedra_have_the_same_surface_and_contain_the_same_shapes():
+@pytest.mark.parametrize("kind", ["tet10", "hex20"])
+def test_divided_elements_have_the_same_surface_and_contain_the_same_shapes(kind):
     """A rounded element, divided: the same volume, and a quadratic displacement of the old nodes is that of the new ones."""
-    body = load_robot_file("mesh_body").robot
+    body = in_tetrahedra() if kind == "tet10" else load_robot_file("mesh_body").robot
     mesh = body_mesh(body)
+    assert mesh.kind == kind
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
     mesh = dataclasses.replace(mesh, nodes=mesh.nodes * (1.0 + 5.0 * radius[:, None] * [1.0, 1.0, 0.0]))  # curved sides
     finer = refined(mesh)

@@ -42,7 +42,7 @@ def choose_mesh(described: "Robot") -> None:
 
     if is_chosen(described):
         return
-    what = f"choosing the mesh of {described.name}, once for this robot (up to half a minute)"
+    what = f"choosing the mesh of {described.name}, once for this robot (up to a minute)"
     if not output.console().is_terminal:
         output.note(what)  # there a status is not shown
     with output.console().status(what), contextlib.suppress(MeshError):

@@ -9,7 +9,6 @@ equilibrium, but so near to one that Newton's method needs only a few steps from
 import numpy as np
 
 from gravcomp.mesh import Mesh
-from gravcomp.mesh.elements import is_hexahedron
 from gravcomp.mesh.embedding import embed
 
 _DEGREE = 2
@@ -17,14 +16,16 @@ _DEGREE = 2
 _UNDETERMINED = 1e-9
 
 
-def carried_shape(u: np.ndarray, source: Mesh, target: Mesh) -> np.ndarray:
+def carried_shape(u: np.ndarray, source: Mesh, target: Mesh, *, from_file: bool) -> np.ndarray:
     """Return displacements (n, 3) in m of the target mesh, from those of the source (m, 3). Both are of the same body.
+
+    from_file: whether the body is from a file.
 
     Raises MeshError if a node of a body from a file lies outside the other mesh.
     """
     from scipy.interpolate import CubicSpline
 
-    if not is_hexahedron(source.kind):
+    if from_file:
         place = embed(source, target.nodes)
         moved: np.ndarray = np.einsum("nc,nci->ni", place.weights, u[place.nodes])
         moved[target.clamped] = 0.0

@@ -3,9 +3,10 @@
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
 to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
-direction that loses most error for the time that it adds to a step is refined, until the sum is within `ACCURACY`; where no
-direction can be refined any more, the mesh with the least error so far is taken. The first direction is along the robot: under
-coarse layers the sections seem to be worse than they are, several times so where the stiffness jumps.
+direction that loses most error for the time that it adds to a step is refined, until the sum is within `ACCURACY`. Where no
+direction can be refined any more, or the search has cost as much as it may, the mesh with the least error so far is taken, and a
+warning gives its estimate. The first direction is along the robot: under coarse layers the sections seem to be worse than they
+are, several times so where the stiffness jumps.
 
 The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
 
@@ -35,7 +36,7 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 8  # part of the key; to be raised when the choice changes
+_FORMAT = 9  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
@@ -46,6 +47,9 @@ _START_ALONG = 8
 # The power with which layers are denser where the body is soft, and the stiffness over the largest from where on it is used.
 _SOFTNESS, _ALIKE = 0.5, 0.7
 _MOST_UNKNOWNS = 15000
+# The most multiplications in factors that a choice may take, about twenty seconds of one core where shapes are
+# found from those of the mesh before, and the factors of a load on one mesh.
+_MOST_WORK, _FACTORS = 1e11, 12
 # The most cells through the wall, of those around: with more they are flat, and the estimate of both directions is wrong. What
 # more cells through the wall change is then measured on the mesh with the next number around.
 _FLAT = 0.5
@@ -132,8 +136,14 @@ def _rounded_down(modulus: float) -> float:
 def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
     """Return the choice, and the names of the loads that are left out, as a mesh or a finer one has no equilibrium under them."""
     here = _start(robot)
-    tips, choices = _Tips(robot, here), []
+    tips = _Tips(robot, here)
+    choices: list[MeshChoice] = []
     left_out: dict[Elements, list[str]] = {}
+
+    def best_choice() -> tuple[MeshChoice, list[str]]:
+        best = min(choices, key=lambda choice: choice.error)
+        return best, left_out[best.elements]
+
     while True:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
@@ -146,6 +156,8 @@ def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
             flat = direction == "radial" and "around" in changes and finer.radial > _FLAT * finer.around
             if flat and "around" in meshes and (deeper := tips.finer(meshes["around"], direction)) is not None:
                 base, finer = meshes["around"], deeper
+            if choices and tips.work + tips.work_of(finer) > _MOST_WORK:
+                return best_choice()
             twice = _to_twice(getattr(base, direction), getattr(finer, direction), direction)
             changes[direction] = twice * tips.change(base, finer)
             if base != here:  # more elements around are what allows more cells through the wall: they gain both changes
@@ -154,14 +166,14 @@ def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
                 continue
             meshes[direction] = finer
             gains[direction] = _largest(changes[direction]) / (tips.cost(finer) - tips.cost(here))
-            if direction == "along" and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
+            early = choices or tips.work < 0.5 * _MOST_WORK  # else there would be no estimate in the end
+            if direction == "along" and early and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
         else:  # all directions are measured
             choices.append(MeshChoice(here, _together(list(changes.values())) if changes else 0.0))
             left_out[here] = tips.left_out(list(changes.values()))
             if choices[-1].error <= _USED * ACCURACY or not gains:
-                best = min(choices, key=lambda choice: choice.error)
-                return best, left_out[best.elements]
+                return best_choice()
         here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
 
 
@@ -183,13 +195,14 @@ def _largest(changes: np.ndarray) -> float:
 
 
 class _Tips:
-    """The tips of a robot's meshes under its loads, each computed once."""
+    """The tips of a robot's meshes under its loads, each computed once; work: of all of them, see `work_of`."""
 
     def __init__(self, robot: Robot, start: Elements):
         """Find the loads with the mesh `start`."""
         self._robot = robot
         self._known: dict[Elements, LoadedShapes] = {}
         self._unknowns: dict[Elements, int] = {}
+        self.work = 0.0
         self._loads = mesh_loads(self._model(start))
 
     def unknowns(self, elements: Elements) -> int:
@@ -201,6 +214,10 @@ class _Tips:
     def cost(self, elements: Elements) -> float:
         """Return a measure of the time of a step: unknowns times the square of those of a layer, as for a band's factor."""
         return self.unknowns(elements) ** 3 / elements.along**2
+
+    def work_of(self, elements: Elements) -> float:
+        """Return about how many multiplications the factors of a mesh take; none where its tips are known."""
+        return 0.0 if elements in self._known else _FACTORS * len(self._loads) * self.cost(elements)
 
     def finer(self, elements: Elements, direction: str) -> Elements | None:
         """Return the next mesh in a direction that has more unknowns and a good shape; None where there is none."""
@@ -233,6 +250,7 @@ class _Tips:
         if elements not in self._known:
             if near is not None:
                 self._tips(near)
+            self.work += self.work_of(elements)
             self._known[elements] = shapes_under(self._model(elements), self._loads, self._known[near] if near else None)
         return self._known[elements].tips
 

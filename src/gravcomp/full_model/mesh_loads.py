@@ -94,7 +94,7 @@ def shapes_under(model: MeshedModel, loads: list[MeshLoad], near: LoadedShapes |
 def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
-    u = carried_shape(shape, source.mesh, model.mesh)
+    u = carried_shape(shape, source.mesh, model.mesh, from_file=model.robot.body is not None)
     solver.state = dataclasses.replace(
         solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
     )
@@ -129,7 +129,7 @@ def _bending_tension(model: MeshedModel) -> np.ndarray | None:
     index = int(np.argmax([robot.cable_end(cable) for cable in robot.cables]))
     unit, solver = np.eye(len(robot.cables))[index], StaticSolver(model)
     limit, factor = robot.limits.tension_max, _FACTOR
-    tension, best = _FIRST * limit, 0.0
+    tension, best, best_angle = _FIRST * limit, 0.0, 0.0
     while True:
         before = solver.state
         state = solver.track(np.zeros(3), CableInput(tension=tension * unit), _ITERATIONS)
@@ -143,8 +143,12 @@ def _bending_tension(model: MeshedModel) -> np.ndarray | None:
             continue
         if state.tendons.displacement[index] > robot.limits.displacement_max:
             break
-        best = tension
-        if tension >= limit or _turned(model, state.u) > _TURN:
+        angle = _turned(model, state.u)
+        if angle > _TURN:  # a step of the tension may go far beyond
+            best += (tension - best) * (_TURN - best_angle) / (angle - best_angle)
+            break
+        best, best_angle = tension, angle
+        if tension >= limit:
             break
         tension = min(limit, factor * tension)
     return best * unit if best else None

@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         "motors": _motors(file),
         "hold": None if answer is None else hold.figures(answer, model),
         "reach": reach(simulator),
-        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, robot, sag),
+        "mesh": dataclasses.asdict(quality) | {"unknowns": model.pattern.n} | _mesh_error(file.robot, model, sag),
     }
     if robot.body is not None:
         figures["mesh_file"] = {"file": robot.body.file, "notes": list(robot.body.placed().notes)}
@@ -150,19 +150,17 @@ def _lines(cables: dict[str, dict[str, float | None]]) -> list[str]:
     return sentences
 
 
-def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, Any]:
-    """Return the estimated error of a chosen mesh, or how far the horizontal tip moves when the described one is refined.
-
-    For a body from a file return advice only.
-    """
+def _mesh_error(described: "Robot", model: "RobotModel", sag: "Shape") -> dict[str, Any]:
+    """Return the estimated error of a chosen mesh or of a file's, or how far the tip moves when the described one is refined."""
     import numpy as np
 
     from gravcomp.config import to_mapping
     from gravcomp.full_model.mesh_choice import ACCURACY, chosen_mesh
     from gravcomp.simulation import Simulator
 
+    robot = model.robot
     if robot.body is not None:
-        return {"refinement": "use a finer mesh file (or lower element_size_mm) and compare horizontal_tip_mm"}
+        return _file_error(model)
     elements = robot.elements
     assert elements is not None  # the model's robot has its mesh chosen
     if described.elements is None:
@@ -184,6 +182,35 @@ def _mesh_error(described: "Robot", robot: "Robot", sag: "Shape") -> dict[str, A
         if good
         else "raise elements.along or elements.around: the change is above 0.2 % of the length",
     }
+
+
+def _file_error(model: "RobotModel") -> dict[str, Any]:
+    """Return the estimated error of the mesh of a body from a file, and what to do about it."""
+    import math
+
+    from gravcomp.full_model.mesh_choice import ACCURACY
+    from gravcomp.full_model.recovered_strain import estimated_error
+
+    estimate, body = estimated_error(model), model.robot.body
+    assert body is not None
+    if estimate is None:
+        return {
+            "estimated_error_pct": None,
+            "refinement": "its error is not estimated (too large, or without an equilibrium): compare with a finer mesh",
+        }
+    if estimate.error <= ACCURACY:
+        advice = "fine enough"
+    else:
+        fitting = 1e3 * estimate.element_length * math.sqrt(ACCURACY / estimate.error)
+        where = f"along the robot around z = {1e3 * estimate.place:.0f} mm"
+        if body.placed().kind == "tri3":
+            advice = f"too coarse; use element_size_mm: {fitting:.2g}"
+        else:
+            advice = (
+                f"too coarse; use elements of {fitting:.2g} mm in place of {1e3 * estimate.element_length:.2g} mm {where};"
+                " hexahedra of 20 nodes are the fewest"
+            )
+    return {"estimated_error_pct": 100 * estimate.error, "worst_load": estimate.load, "refinement": advice}
 
 
 def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
@@ -213,6 +240,11 @@ def _text(figures: dict[str, Any], hold_lines: list[str]) -> str:
         lines.append(
             f"  elements chosen: {{{numbers}}}; with twice as many each way the tip, horizontal or bent to its limit, moves by"
             f" about {mesh['estimated_error_pct']:.2g} % of the length: {mesh['refinement']}"
+        )
+    elif mesh.get("estimated_error_pct") is not None:
+        lines.append(
+            f"  mesh of the file: with twice as many elements each way the tip ({mesh['worst_load']}) moves by about"
+            f" {mesh['estimated_error_pct']:.2g} % of the length: {mesh['refinement']}"
         )
     elif mesh.get("tip_change_when_refined_mm") is not None:
         lines.append(
