@@ -9,6 +9,7 @@ from gravcomp_node.local_topics import Adapted, LocalPublisher, LocalTopics
 from gravcomp_node.polled import Polled
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Int32
 
 from gravcomp_node import local_topics
@@ -105,6 +106,20 @@ def test_a_value_is_published_as_a_message_by_a_node_that_is_alone(process):
     publisher.publish(Adapted("3", lambda value: Int32(data=int(value))))
     process.until(lambda: there)
     assert there[0].data == 3
+
+
+def test_the_middleware_gets_the_bytes_of_a_value_that_has_them(process):
+    values, messages, there = [], [], []
+    process.subscribe(process.second, "numbers", lambda _: pytest.fail("it takes values"), takes=values.append)
+    process.subscribe(process.second, "numbers", messages.append)
+    publisher = process.publisher(process.first, "numbers")
+    process.elsewhere.create_subscription(Int32, "numbers", there.append, QOS)
+    process.until(lambda: publisher.get_subscription_count() == 3)
+    publisher.publish(
+        Adapted("3", lambda value: Int32(data=int(value)), lambda value: serialize_message(Int32(data=10 * int(value))))
+    )
+    process.until(lambda: there)
+    assert values == ["3"] and messages[0].data == 3 and there[0].data == 30
 
 
 def test_a_subscriber_elsewhere_receives_as_well(process):

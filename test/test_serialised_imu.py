@@ -1,11 +1,11 @@
-"""A sample is read from a serialised Imu as from the message, for every length of the frame's name."""
+"""A sample is read from a serialised Imu, and written into one, as rclpy does it, for every length of the frame's name."""
 
 import struct
 
 import numpy as np
 import pytest
-from gravcomp_node.serialised_imu import read_sample
-from rclpy.serialization import serialize_message
+from gravcomp_node.serialised_imu import SampleWriter, read_sample
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu
 
 
@@ -27,6 +27,21 @@ def test_a_sample_is_the_one_in_the_message(length):
     assert stamp == filled.header.stamp.sec * 10**9 + filled.header.stamp.nanosec
     w, a = filled.angular_velocity, filled.linear_acceleration
     assert (rate, force) == ((w.x, w.y, w.z), (a.x, a.y, a.z))
+
+
+@pytest.mark.parametrize("length", range(18))
+def test_a_written_sample_is_the_message_that_rclpy_makes(length):
+    rng, made = np.random.default_rng(length), Imu()
+    made.header.frame_id = "x" * length
+    made.orientation_covariance[0] = -1.0
+    writer = SampleWriter("x" * length)
+    for _ in range(2):  # the second one takes the place of the first
+        made.header.stamp.sec, made.header.stamp.nanosec = int(rng.integers(2**31)), int(rng.integers(10**9))
+        rate, force = rng.normal(size=(2, 3)).tolist()
+        made.angular_velocity.x, made.angular_velocity.y, made.angular_velocity.z = rate
+        made.linear_acceleration.x, made.linear_acceleration.y, made.linear_acceleration.z = force
+        stamp = made.header.stamp
+        assert deserialize_message(writer.write(stamp.sec * 10**9 + stamp.nanosec, rate, force), Imu) == made
 
 
 @pytest.fixture

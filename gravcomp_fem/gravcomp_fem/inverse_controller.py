@@ -12,7 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
+from gravcomp_node.local_topics import Adapted
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.serialised_command import PublishedCommand
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
@@ -20,7 +22,7 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.holdability.background import HoldProcess
 from gravcomp.inverse import Command, ControllerCode, Holdable, Target, TargetError, direction_weight, rest_target, warm_up
 from gravcomp.inverse import InverseController as InverseProblem
-from gravcomp_fem.conversion import doubles, point_message, pose_target, seconds, shape_target
+from gravcomp_fem.conversion import point_message, pose_target, seconds, shape_target
 from gravcomp_fem.deformed import Deformed, PublishedShape, from_message, from_shape
 from gravcomp_fem.tracker_input import TrackerInput
 from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation, ShapeTarget
@@ -167,9 +169,8 @@ class InverseController(ManagedNode):
         else:
             self._publish_code(ControllerCode.INACTIVE, "disabled" if not self._enabled else "waiting for a target", header)
             return
-        self._command.publish(
-            CableCommand(header=header, displacement=doubles(command.displacement), tension=doubles(command.tension))
-        )
+        sent = PublishedCommand(header, command.displacement, command.tension)
+        self._command.publish(Adapted(sent, PublishedCommand.message, PublishedCommand.serialised))
         self._publish_status(command, header)
 
     def _interval(self, header: Header) -> float:

@@ -7,14 +7,18 @@ from collections.abc import Callable
 
 from builtin_interfaces.msg import Time
 from gravcomp_node.managed_node import ERROR, OK, WARN
+from gravcomp_node.serialised_command import read_command
+from gravcomp_node.serialised_imu import SampleWriter
 from rclpy.lifecycle import LifecycleNode
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import Imu, Temperature
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from gravcomp.canbus.imu_stream import ImuSample
 from gravcomp.motors.state import CableSnapshot, State
 from gravcomp_msgs.msg import CableCommand, CableState
-from gravcomp_node import SENSOR
+from gravcomp_node import COMMAND, SENSOR
 
 _LOG_PERIOD = 1.0  # s, between two log messages about refused commands
 _TEMPERATURE_EVERY = 10  # samples; the chip updates its temperature every 1.28 s
@@ -50,20 +54,24 @@ def trigger(request: Callable, action: Callable) -> Callable[[Trigger.Request, T
     return serve
 
 
-def follow(node: LifecycleNode, command: Callable) -> Callable[[CableCommand], None]:
-    """Return the callback of cable/command that gives the driver's `command` each message, and logs why one is refused."""
+def subscribe_command(node: LifecycleNode, command: Callable) -> Subscription:
+    """Subscribe to cable/command: the driver's `command` gets each one, and why one is refused is logged."""
     logged = -math.inf
 
-    def take(message: CableCommand) -> None:
+    def take(serialised: bytes) -> None:
         nonlocal logged
-        stamp = message.header.stamp
-        reason = command(message.displacement, message.tension, stamp.sec * 10**9 + stamp.nanosec)
+        try:
+            stamp_ns, displacement, tension = read_command(serialised)
+        except ValueError as error:
+            reason = str(error)
+        else:
+            reason = command(displacement, tension, stamp_ns)
         # The logger's own throttle is not used: it looks up its caller's source each time, which takes longer than the command.
         if reason and time.monotonic() - logged > _LOG_PERIOD:
             logged = time.monotonic()
             node.get_logger().warning(f"command refused: {reason}")
 
-    return take
+    return node.create_subscription(CableCommand, "cable/command", take, COMMAND, raw=True)
 
 
 class ImuTopics:
@@ -73,22 +81,15 @@ class ImuTopics:
         self._node, self._count = node, 0
         self._imu = node.create_publisher(Imu, "imu/data_raw", SENSOR)
         self._temperature = node.create_publisher(Temperature, "imu/temperature", SENSOR)
-        # One message for all samples, because making it takes longer than to publish it. It is serialised before the next one,
-        # since its node is alone in its process; gravcomp_node.local_topics would hand on the message itself, and its header.
-        self._message = Imu()
-        self._message.header.frame_id = frame
-        self._message.orientation_covariance[0] = -1.0  # sensor_msgs/Imu: there is no orientation
+        self._frame, self._writer = frame, SampleWriter(frame)
 
     def publish(self, sample: ImuSample) -> None:
         """Publish a sample, and with one in ten the temperature."""
-        message = self._message
-        message.header.stamp = to_time(round(1e9 * sample.stamp))
-        a, w = message.linear_acceleration, message.angular_velocity
-        a.x, a.y, a.z = sample.specific_force
-        w.x, w.y, w.z = sample.angular_rate
-        self._imu.publish(message)
+        stamp_ns = round(1e9 * sample.stamp)
+        self._imu.publish(self._writer.write(stamp_ns, sample.angular_rate, sample.specific_force))
         if self._count % _TEMPERATURE_EVERY == 0:
-            self._temperature.publish(Temperature(header=message.header, temperature=float(sample.temperature)))
+            header = Header(stamp=to_time(stamp_ns), frame_id=self._frame)
+            self._temperature.publish(Temperature(header=header, temperature=float(sample.temperature)))
         self._count += 1
 
     def destroy(self) -> None:

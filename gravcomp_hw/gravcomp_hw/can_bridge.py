@@ -21,8 +21,8 @@ from gravcomp.graph.parameters.can_bridge import CanBridgeParameters
 from gravcomp.motors.driver import BridgeDriver, DriverOptions
 from gravcomp.motors.guard_client import GuardError
 from gravcomp.motors.state import CableSnapshot
-from gravcomp_hw.bridge_topics import ImuTopics, cable_state, follow, level, trigger
-from gravcomp_msgs.msg import CableCommand, CableState
+from gravcomp_hw.bridge_topics import ImuTopics, cable_state, level, subscribe_command, trigger
+from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 
@@ -59,7 +59,7 @@ class CanBridge(ManagedNode):
             raise ConfigError(str(error)) from error
         self._publishing = True
         self._active_entities = [
-            self.create_subscription(CableCommand, "cable/command", follow(self, self._driver.command), COMMAND),
+            subscribe_command(self, self._driver.command),
             # A best-effort subscription also receives from reliable publishers.
             self.create_subscription(Float32, "imu/heater", lambda m: self._driver.heater(m.data), SENSOR),
             self.create_service(Trigger, "~/home", trigger(self._driver.request, lambda bridge, now: bridge.home(now))),

@@ -24,9 +24,9 @@ from gravcomp.description.joint_motors import Joints
 from gravcomp.graph.parameters.joint_bridge import JointBridgeParameters
 from gravcomp.motors.joint_driver import JointDriver, JointDriverOptions
 from gravcomp.motors.state import CableSnapshot
-from gravcomp_hw.bridge_topics import cable_state, follow, level, trigger
+from gravcomp_hw.bridge_topics import cable_state, level, subscribe_command, trigger
 from gravcomp_hw.joint_guard_client import JointGuardClient, JointGuardError
-from gravcomp_msgs.msg import CableCommand, CableState
+from gravcomp_msgs.msg import CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 _STATES = QoSProfile(depth=10)
@@ -70,7 +70,7 @@ class JointBridgeNode(ManagedNode):
         request = self._driver.request
         self._subscriptions_here = [
             self.create_subscription(JointState, "joint_states", self._on_joint_states, _STATES),
-            self.create_subscription(CableCommand, "cable/command", follow(self, self._driver.command), COMMAND),
+            subscribe_command(self, self._driver.command),
         ]
         if self.parameters.require_imu:
             self._subscriptions_here.append(self.create_subscription(Imu, "imu/data_raw", self._on_imu, SENSOR))

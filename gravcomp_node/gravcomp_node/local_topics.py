@@ -29,15 +29,20 @@ FOLLOW_PERIOD = 0.5
 
 
 class Adapted:
-    """A value to publish, and `to_message`, which makes the message from it."""
+    """A value to publish. `to_message` makes the message from it; `to_bytes`, if given, the bytes that the middleware gets."""
 
-    def __init__(self, value: Any, to_message: Callable[[Any], Any]):
-        self.value, self._to_message = value, to_message
+    def __init__(self, value: Any, to_message: Callable[[Any], Any], to_bytes: Callable[[Any], bytes] | None = None):
+        self.value, self._to_message, self._to_bytes = value, to_message, to_bytes
 
     @functools.cached_property
     def message(self) -> Any:
         """The message, made when it is first asked for."""
         return self._to_message(self.value)
+
+    @property
+    def sent(self) -> Any:
+        """What the middleware gets: the message, or its bytes."""
+        return self._to_bytes(self.value) if self._to_bytes is not None else self.message
 
 
 @dataclasses.dataclass
@@ -173,6 +178,10 @@ def message_of(message: Any) -> Any:
     return message.message if isinstance(message, Adapted) else message
 
 
+def _sent(message: Any) -> Any:
+    return message.sent if isinstance(message, Adapted) else message
+
+
 def _fits(publisher: Publisher, subscription: Subscription) -> bool:
     offered, wanted = publisher.qos_profile, subscription.qos_profile
     compatible, _ = qos_check_compatible(offered, wanted)
@@ -190,13 +199,13 @@ class LocalPublisher(Publisher):
     def publish(self, message: Any) -> None:
         """Publish a message, or an `Adapted` value."""
         if self.local is None:
-            super().publish(message_of(message))
+            super().publish(_sent(message))
             return
         self.count += 1
         # First to the middleware: the receivers here may take a while.
         latched = self.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL  # kept for those who subscribe later
         receivers = [receiver for receiver in self.receivers if receiver.is_local]
         if latched or self.get_subscription_count() > len(receivers):
-            super().publish(message_of(message))
+            super().publish(_sent(message))
         if receivers:
             self.local.deliver(self, message, receivers)
