@@ -56,8 +56,8 @@ def check_compensation(figures: dict) -> None:
     # all; `bench graph` measures the rate.
     assert 0.52 * figures["imu_rate_hz"] < figures["command_rate_hz"] < 1.02 * figures["imu_rate_hz"]
     assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.1)
-    # A wrong axis or sign gives 20 deg and more. A loop that misses samples estimates gravity from fewer of them.
-    assert figures["gravity_error_deg"] < 2.0 * max(1.0, figures["imu_rate_hz"] / figures["command_rate_hz"])
+    # A wrong axis or sign gives tens of degrees. An overloaded machine sends frames late: 0.1 s are 5 deg of this motion.
+    assert figures["gravity_error_deg"] < (2.0 if figures["overloaded"] is None else 10.0)
     assert figures["delay_ms"]["median"] > 0.0
     assert figures["overloaded"] is None or "overloaded machine" in figures["overloaded"]
     assert figures["full_model_pct"] < 10.0  # the run of the tests has built the reduced model
