@@ -39,14 +39,14 @@ def test_info_tells_masses_modes_and_reach(tmp_path, capsys):
     weak.write_text("base: mesh_body\nrobot:\n  limits: {tension_max: 0.3}\n", encoding="utf-8")
     assert main(["model", "info", str(weak), "--directions", "4", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert figures["mass_g"] == pytest.approx(3.44, abs=0.05) and figures["mesh"]["kind"] == "tet10"
+    assert figures["mass_g"] == pytest.approx(3.44, abs=0.05) and figures["mesh"]["kind"] == "hex20"
     assert len(figures["natural_frequency_hz"]) == 6
     assert [(entry["cable"], entry["ended_by"]) for entry in figures["reach"]] == [(f"c{k}", "tension limit") for k in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("command", [["info", "--no-hold"], ["solve"], ["view", "--out", "robot.png"], ["build"]])
 def test_a_mesh_that_has_to_be_chosen_is_announced(command, monkeypatch, tmp_path, capsys):
-    """Without a terminal, where no status is shown; the choice takes up to half a minute."""
+    """Without a terminal, where no status is shown; the choice takes up to 41 s."""
     from gravcomp.full_model import mesh_choice
 
     def choice(robot):
