@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from gravcomp.launcher.node_process import ACTIVE_FILE, find_executable
 
 PATIENCE = 180.0  # s; events, which a machine that others load delays
-_HEARD = 3.0  # s that `topic hz` listens
+_HEARD = 1.0  # s that `topic hz` listens
 
 
 class Ros2:

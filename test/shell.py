@@ -7,6 +7,8 @@ import signal
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 
 START = 300.0  # s; a machine that has never run the graph compiles first
@@ -32,8 +34,18 @@ def check_doctor(code: int, output: str) -> None:
     assert "ok" in levels and code == ("missing" in levels), output
 
 
+def future(step: Callable, *given: object) -> Future:
+    """Return what a step returned or raised: a fixture keeps it for the test that checks it, in which `result()` raises it."""
+    done: Future = Future()
+    try:
+        done.set_result(step(*given))
+    except Exception as error:
+        done.set_exception(error)
+    return done
+
+
 class Shell:
-    """A command that runs until Ctrl-C."""
+    """A command that runs in the background, until Ctrl-C or to its end."""
 
     def __init__(self, words: list[str], cwd: Path, environment: dict[str, str]):
         handle, name = tempfile.mkstemp(prefix="output_", dir=cwd)
@@ -50,10 +62,18 @@ class Shell:
             assert self.process.poll() is None and time.monotonic() < end, self.output.read_text(encoding="utf-8")
             time.sleep(0.1)
 
+    def end(self) -> tuple[int, str]:
+        """Return exit code and output of a command that ends by itself."""
+        code = self._wait(START)
+        return code, self.output.read_text(encoding="utf-8")
+
     def ctrl_c(self) -> int:
         self.process.send_signal(signal.SIGINT)
+        return self._wait(60.0)
+
+    def _wait(self, patience: float) -> int:
         try:
-            return self.process.wait(60.0)
+            return self.process.wait(patience)
         except subprocess.TimeoutExpired:
             os.killpg(self.process.pid, signal.SIGKILL)
             raise

@@ -1,13 +1,25 @@
-"""The running graph: its nodes have the topics and services of the table of nodes, and the doctor measures the graph."""
+"""The running graph: its nodes have the topics and services of the table of nodes, and the doctor measures the graph.
+
+The graph takes a processor as long as it runs. So all that needs it is done in one go, and the tests check what was found.
+"""
 
 import functools
 import importlib
+import json
+import os
 import re
+import subprocess
 import time
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="it looks at the running graph: ./gravcomp test")
+
+from shell import future
 
 from gravcomp.graph.nodes import NODES, node
 from gravcomp.launcher import Graph
@@ -19,6 +31,7 @@ pytestmark = [pytest.mark.rates, pytest.mark.timeout(600)]
 
 # With a namespace, because nothing must depend on an empty one.
 NAMESPACE = "/left"
+DOCTOR = (str(Path(__file__).resolve().parents[1] / "gravcomp"), "doctor", "--graph", "--namespace", NAMESPACE, "--json")
 DOMAIN = reserve_domain()
 START = 300.0  # s; a machine that has never run the graph compiles first
 # Ports of every node: those of rclpy, of the parameters and of the lifecycle.
@@ -27,28 +40,61 @@ COMMON_SERVICES = ("rcl_interfaces/", "lifecycle_msgs/", "type_description_inter
 RATED = {port.name: port.type for entry in NODES for port in entry.publishes if port.rate is not None}
 
 
+class Found(NamedTuple):
+    """What was found in the running graph, each as a future, which raises in the test what was raised while the graph ran.
+
+    regular: findings about topics that come at their rates; unserved: exit code and findings while this process demands what the
+    estimator does not offer; compared: the ports of every node were compared with the table.
+    """
+
+    regular: Future
+    unserved: Future
+    compared: Future
+
+
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory):
-    """The loop on a virtual robot, as processes."""
+def found(tmp_path_factory):
+    """Run the loop on a virtual robot, as processes, and look at it."""
+    from geometry_msgs.msg import Vector3Stamped
+
     from gravcomp.canbus.multicast import private_channel
 
     motion = {"motion": "topic", "truth_rate": 50.0, "feedback_rate": 125}
     graph = RobotGraph("article", "udp_multicast", private_channel(), NAMESPACE, {"virtual_robot": motion})
     specs = [*graph.loop(), graph.node("gravcomp_hw", "virtual_robot")]
-    with Graph(specs, tmp_path_factory.mktemp("logs"), {"ROS_DOMAIN_ID": DOMAIN}, NodeHost()) as processes:
+    logs = tmp_path_factory.mktemp("logs")
+    with Graph(specs, logs, {"ROS_DOMAIN_ID": DOMAIN}, NodeHost()) as processes, observing() as observer:
         processes.start()
-        yield graph, processes
+        regular = future(regular_findings, observer, processes)
+        demanding = observer.create_subscription(Vector3Stamped, f"{NAMESPACE}/gravity", lambda _: None, 10)
+        doctor = subprocess.Popen(DOCTOR, stdout=subprocess.PIPE, text=True, env={**os.environ, "ROS_DOMAIN_ID": DOMAIN})
+        try:
+            compared = future(compare_with_the_table, observer, graph, tmp_path_factory.mktemp("more"))
+            unserved = future(findings_of, doctor)
+        finally:
+            doctor.kill()  # nothing happens where the process has ended
+        observer.destroy_subscription(demanding)
+        processes.check()
+    return Found(regular, unserved, compared)
 
 
-@pytest.fixture(scope="module")
-def observer(robot):
-    """A node that asks the middleware for the nodes and topics of the graph."""
+@contextmanager
+def observing():
+    """Context with a node that asks the middleware for the nodes and topics of the graph."""
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(DOMAIN))
     observer = rclpy.create_node("doctors_test", context=context)
-    yield observer
-    observer.destroy_node()
-    rclpy.shutdown(context=context)
+    try:
+        yield observer
+    finally:
+        observer.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def findings_of(doctor: subprocess.Popen) -> tuple[int, list[dict]]:
+    """Return exit code and findings of the doctor when it ends."""
+    printed, _ = doctor.communicate(timeout=START)
+    return doctor.returncode, json.loads(printed.strip().splitlines()[-1])["findings"]
 
 
 def until(done, what, processes, patience=START):
@@ -92,8 +138,8 @@ def agrees(found: dict, ports: tuple, executable: str) -> bool:
     return needed.items() <= found.items() <= declared.items()
 
 
-def test_the_doctor_finds_rates_delays_and_fitting_qos(gravcomp, robot, observer):
-    _, processes = robot
+def regular_findings(observer, processes) -> dict[str, dict]:
+    """Return the findings by subject, as soon as all topics come regularly."""
     # Wait until everything is compiled and follows commands; before that the topics are silent.
     heard = set()
     for name, kind in RATED.items():
@@ -107,45 +153,22 @@ def test_the_doctor_finds_rates_delays_and_fitting_qos(gravcomp, robot, observer
 
     def regular() -> bool:
         """Whether all topics come regularly, as far as a slow machine allows; a loop that leaves samples out has half."""
-        answer = gravcomp("doctor", "--graph", "--namespace", NAMESPACE, "--json", ROS_DOMAIN_ID=DOMAIN)
-        found.update({f["subject"]: f for f in answer.json["findings"]})
+        doctor = subprocess.Popen(DOCTOR, stdout=subprocess.PIPE, text=True, env={**os.environ, "ROS_DOMAIN_ID": DOMAIN})
+        found.update({f["subject"]: f for f in findings_of(doctor)[1]})
         return all(0.7 * wanted < rate < 1.1 * wanted for rate, wanted in (rates(found[name]) for name in RATED))
 
     try:
         until(regular, "", processes, 120.0)
     except AssertionError:
         raise AssertionError(f"not at their rates: {found}") from None
-    for name in RATED:
-        rate, wanted = rates(found[name])
-        assert "behind its IMU sample" in found[name]["found"], found[name]
-        if abs(rate - wanted) != 0.05 * wanted:  # the rate is rounded, so that this one may be either
-            assert (found[name]["level"] == "ok") == (abs(rate - wanted) < 0.05 * wanted), found[name]
-    assert found["QoS"]["level"] == "ok"
+    return found
 
 
-def test_the_doctor_names_a_subscription_that_cannot_be_served(gravcomp, robot, observer):
-    from geometry_msgs.msg import Vector3Stamped
-
-    demanding = observer.create_subscription(Vector3Stamped, f"{NAMESPACE}/gravity", lambda _: None, 10)
-    answer = gravcomp("doctor", "--graph", "--namespace", NAMESPACE, "--json", ROS_DOMAIN_ID=DOMAIN)
-    observer.destroy_subscription(demanding)
-    wrong = [f for f in answer.json["findings"] if f["subject"] == f"{NAMESPACE}/gravity"]
-    assert answer.code == 1 and len(wrong) == 1
-    assert "imu_estimator to doctors_test" in wrong[0]["found"] and "reliab" in wrong[0]["found"].lower()
-
-
-def test_the_doctor_reports_that_nothing_runs(gravcomp):
-    answer = gravcomp("doctor", "--graph", "--json", ROS_DOMAIN_ID=reserve_domain())
-    assert answer.code == 1
-    silent = {f["subject"] for f in answer.json["findings"] if f["found"] == "nothing is published"}
-    assert silent == set(RATED)
-
-
-def test_every_node_has_the_topics_and_services_of_the_table(robot, observer, tmp_path):
+def compare_with_the_table(observer, graph: RobotGraph, folder: Path) -> None:
+    """Compare the ports of the running nodes, and of those that only some graphs have, with the table of nodes."""
     from gravcomp.arm.description import expanded, shipped_xacro
 
-    graph, processes = robot
-    urdf = tmp_path / "arm.urdf"
+    urdf = folder / "arm.urdf"
     urdf.write_text(expanded(shipped_xacro("seven_axis_arm.urdf.xacro")), encoding="utf-8")
     more = [
         graph.node("gravcomp_fem", "viewer", port=8860),
@@ -154,8 +177,7 @@ def test_every_node_has_the_topics_and_services_of_the_table(robot, observer, tm
         graph.node("gravcomp_hw", "judge", duration=3600.0),
     ]
     names = [executable for _, executable in LOOP] + ["virtual_robot"] + [spec.executable for spec in more]
-    # They end with this test: another one would hear the arm's topics, and the judge ends by itself.
-    with Graph(more, tmp_path / "logs", {"ROS_DOMAIN_ID": DOMAIN}) as added:
+    with Graph(more, folder / "logs", {"ROS_DOMAIN_ID": DOMAIN}) as added:
         added.start()
         for executable in names:
             until(functools.partial(is_there, observer, executable), f"no {executable}", added)
@@ -164,7 +186,6 @@ def test_every_node_has_the_topics_and_services_of_the_table(robot, observer, tm
                 until(functools.partial(fits_the_table, observer, executable), "", added, 60.0)
             except AssertionError:
                 raise AssertionError(f"{executable} is not what the table says: {interface(observer, executable)}") from None
-    processes.check()
 
 
 def fits_the_table(observer, executable: str) -> bool:
@@ -181,3 +202,24 @@ def fits_the_table(observer, executable: str) -> bool:
 def message_class(kind: str) -> type:
     package, _, name = kind.split("/")
     return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def test_the_doctor_finds_rates_delays_and_fitting_qos(found):
+    findings = found.regular.result()
+    for name in RATED:
+        rate, wanted = rates(findings[name])
+        assert "behind its IMU sample" in findings[name]["found"], findings[name]
+        if abs(rate - wanted) != 0.05 * wanted:  # the rate is rounded, so that this one may be either
+            assert (findings[name]["level"] == "ok") == (abs(rate - wanted) < 0.05 * wanted), findings[name]
+    assert findings["QoS"]["level"] == "ok"
+
+
+def test_the_doctor_names_a_subscription_that_cannot_be_served(found):
+    code, findings = found.unserved.result()
+    wrong = [f for f in findings if f["subject"] == f"{NAMESPACE}/gravity"]
+    assert code == 1 and len(wrong) == 1
+    assert "imu_estimator to doctors_test" in wrong[0]["found"] and "reliab" in wrong[0]["found"].lower()
+
+
+def test_every_node_has_the_topics_and_services_of_the_table(found):
+    found.compared.result()

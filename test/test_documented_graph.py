@@ -1,8 +1,15 @@
-"""The documented lines that talk to a running graph: one virtual robot that runs as the tutorial says."""
+"""The documented lines that talk to a running graph: one virtual robot that runs as the tutorial says.
+
+The graph takes a processor as long as it runs. So all lines that need it run in one go, those that only listen at the same time,
+and the tests check what they gave; what evaluates a recording runs after the graph.
+"""
 
 import os
 import re
 import time
+from concurrent.futures import Future
+from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from documents import documented
@@ -11,28 +18,9 @@ pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
 
 from ros2_line import Ros2
 from sensor_msgs.msg import Imu
-from shell import START, Shell, check_doctor
+from shell import START, Shell, check_doctor, future
 
 pytestmark = [pytest.mark.rates, pytest.mark.timeout(900)]
-
-
-@pytest.fixture(scope="module")
-def live(folder):
-    """A virtual robot that runs as the tutorial says."""
-    shell = Shell(documented("./gravcomp up --virtual --viewer"), folder, dict(os.environ))
-    try:
-        shell.wait_for("The live page: http://")
-        yield shell
-    finally:
-        if shell.process.poll() is None:
-            assert shell.ctrl_c() == 130
-
-
-@pytest.fixture(scope="module")
-def ros2():
-    ros2 = Ros2()
-    yield ros2
-    ros2.close()
 
 
 PUBLISHED_ONCE = (
@@ -63,24 +51,73 @@ ROS2_LINES = (
 )
 
 
-def test_the_doctor_examines_the_running_graph(live, ros2, type_in):
+class Lines(NamedTuple):
+    """What the lines gave, each as a future, which raises in the test what was raised while the graph ran."""
+
+    doctor: Future
+    recorder: Future
+    poses: Future
+    ros2: Future
+    up: Future
+
+
+@pytest.fixture(scope="module")
+def lines(folder):
+    """Run a virtual robot as the tutorial says, and type the lines next to it."""
+    ros2, graph = Ros2(), in_background(folder, "./gravcomp up --virtual --viewer")
+    try:
+        graph.wait_for("The live page: http://")
+        wait_for_target(ros2)
+        recorder = in_background(folder, "./gravcomp record --out my_bag --duration 60")
+        doctor = in_background(folder, "./gravcomp doctor --graph")
+        poses = in_background(folder, "./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 5")
+        recorded, examined, posed = future(record, ros2, recorder), future(doctor.end), future(poses.end)
+        # These disturb the graph: after those that listen.
+        asked = future(ask, ros2)
+        return Lines(examined, recorded, posed, asked, future(graph.ctrl_c))
+    finally:
+        if graph.process.poll() is None:
+            graph.ctrl_c()
+        ros2.close()
+
+
+def in_background(folder: Path, line: str, shorter: str = "") -> Shell:
+    return Shell([*documented(line), *shorter.split()], folder, dict(os.environ))
+
+
+def wait_for_target(ros2: Ros2) -> None:
     end = time.monotonic() + START
     while "target" not in (said := ros2.run("ros2 topic echo /controller/status --field message")):
         assert time.monotonic() < end, said
         time.sleep(0.5)
-    check_doctor(*type_in("./gravcomp doctor --graph"))
 
 
-def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder):
-    from gravcomp.commands.record import describe
-
-    recorder = Shell(documented("./gravcomp record --out my_bag --duration 60"), folder, dict(os.environ))
+def record(ros2: Ros2, recorder: Shell) -> tuple[int, str]:
+    """Publish a message once while the recorder runs, and end it."""
     ros2.until(lambda: "recorder" in ros2.subscribers("/target/shape"), "the recorder does not find the topics")
     samples = ros2.listen(Imu, "/imu/data_raw")
     ros2.until(lambda: len(samples) > 100, "no samples")
     ros2.run(PUBLISHED_ONCE)
     ros2.until(lambda: len(samples) > 500, "no samples")
-    assert recorder.ctrl_c() == 0, recorder.output.read_text(encoding="utf-8")
+    return recorder.ctrl_c(), recorder.output.read_text(encoding="utf-8")
+
+
+def ask(ros2: Ros2) -> None:
+    for line, printed in ROS2_LINES:
+        documented(line)
+        assert re.search(printed, ros2.run(line)), line
+    ros2.run("ros2 service call /can_bridge/resume std_srvs/srv/Trigger")  # after the stop of the last line
+
+
+def test_the_doctor_examines_the_running_graph(lines):
+    check_doctor(*lines.doctor.result())
+
+
+def test_the_running_graph_is_recorded_and_evaluated(lines, type_in, folder):
+    from gravcomp.commands.record import describe
+
+    code, output = lines.recorder.result()
+    assert code == 0, output
     # A message that was published once, by a node that ended since, is recorded as well.
     topics = describe(folder / "my_bag")["topics"]
     assert topics["/target/shape"] == 1 and topics["/imu/data_raw"] > 400
@@ -88,17 +125,17 @@ def test_the_running_graph_is_recorded_and_evaluated(live, ros2, type_in, folder
     assert code in (0, 1) and "Keeping the shape, recorded" in output and "cables commanded, median" in output, output
 
 
-def test_an_imu_is_calibrated_from_a_recording(live, type_in, folder):
-    code, output = type_in("./gravcomp record --out poses --topics imu/data_raw imu/temperature", "--duration 5")
+def test_an_imu_is_calibrated_from_a_recording(lines, type_in, folder):
+    code, output = lines.poses.result()
     assert code == 0, output
     # The base is at rest: one pose, which is too few for the scale but enough for the offset of the gyroscope.
     code, output = type_in("./gravcomp calibrate-imu poses --write my_robot.yaml", "--robot article")
     assert code == 0 and "gyroscope" in (folder / "my_robot.yaml").read_text(encoding="utf-8"), output
 
 
-def test_each_ros2_line_does_what_it_says(live, ros2):
-    for line, printed in ROS2_LINES:
-        documented(line)
-        assert re.search(printed, ros2.run(line)), line
-    # The last line stopped the bridge, which the other tests need.
-    ros2.run("ros2 service call /can_bridge/resume std_srvs/srv/Trigger")
+def test_each_ros2_line_does_what_it_says(lines):
+    lines.ros2.result()
+
+
+def test_the_graph_runs_until_ctrl_c(lines):
+    assert lines.up.result() == 130
