@@ -11,8 +11,9 @@ from gravcomp.bench.contact import slender_rod
 from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
+from gravcomp.contact.stability import unstable_motions
 from gravcomp.description import Elements, load_robot_file
-from gravcomp.full_model.supports import SupportedFactor, unstable_motions
+from gravcomp.full_model.supports import SupportedFactor
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target, direction_weight, straight_target
 from gravcomp.mesh import tube_mesh
@@ -141,6 +142,37 @@ def test_a_robot_follows_a_curved_tube_that_the_straight_robot_would_cross(model
     assert simulator.solver.contact.depth(simulator.displacements) < 2e-5
 
 
+def test_a_step_that_fails_leaves_no_forces_behind(model):
+    """The shape that is kept has its own contacts, and the steps that follow are those of a robot that did not try."""
+    results = []
+    for tried in (False, True):
+        plane = {"normal": [1, 0, 0], "point_mm": [-15, 0, 0], "friction": 0.3}
+        simulator = Simulator(model, reduced=False, scene=scene_of(planes=[plane]), searches=False)
+        simulator.solve(G)
+        before = simulator.step(G)
+        if tried:
+            failed = simulator.step(G, tension=np.array([3e3, 0.0, 0.0, 0.0, 0.0, 0.0]))
+            assert not failed.is_equilibrium
+            assert failed.contacts.force == pytest.approx(before.contacts.force, abs=0.0)
+        shape = simulator.step(G + np.array([0.0, 0.05, 0.0]))
+        results.append(np.concatenate([shape.tip_position, shape.contacts.force.ravel()]))
+    assert results[1] == pytest.approx(results[0], abs=1e-9)  # the factor of the tangent is not kept: rounding errors
+
+
+def test_a_robot_does_not_stay_balanced_on_a_ball(model):
+    """By symmetry there is an equilibrium on top of the ball, where friction may hold the robot. Without, it rolls off."""
+    ball = {"centre_mm": [-16.0, 0.0, 80.0], "radius_mm": 3.0}
+    on_top = in_scene(model, spheres=[ball | {"friction": 1.0}])
+    on_top.solve(G)
+    held = on_top.step(G)
+    assert held.is_equilibrium and held.contacts.normal[0, 0] > 0.9
+    free = in_scene(model, spheres=[ball])
+    shape = free.solve(G)
+    assert shape.is_equilibrium and shape.tip_position[0] < held.tip_position[0] - 1e-2
+    disturbed = free.step(G + np.array([0.0, 0.02, 0.0]))
+    assert disturbed.is_equilibrium and np.linalg.norm(disturbed.tip_position - shape.tip_position) < 1e-3
+
+
 def test_contact_is_a_constraint_in_the_response_to_the_cables(model):
     simulator = in_scene(model, planes=[{"normal": [1, 0, 0], "point_mm": [-10, 0, 0]}])
     tension = np.array([0.0, 0.1, 0.05, 0.1, 0.0, 0.1])
@@ -238,10 +270,10 @@ def test_walls_that_squeeze_the_robot_to_nothing_are_named(model):
         for k in range(6)
     ]
     contact = in_scene(model, spheres=ring).solver.contact
-    sentence = contact.squeezed(np.zeros_like(model.mesh.nodes))
+    sentence = contact.squeezed(np.zeros_like(model.mesh.nodes), G)
     assert "between the walls of 'ball 0' and 'ball 3' there are 5.5 mm" in sentence
     assert "60 mm from the base, where the robot needs 9 mm" in sentence
-    assert in_scene(model, spheres=ring[:1]).solver.contact.squeezed(np.zeros_like(model.mesh.nodes)) == ""
+    assert in_scene(model, spheres=ring[:1]).solver.contact.squeezed(np.zeros_like(model.mesh.nodes), G) == ""
 
 
 def test_the_face_of_the_tip_lies_flat_on_a_wall_ahead(model):

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, random_scene, scene_of, seeded_gravity
+from gravcomp.bench.sampled_depth import sampled_depth
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.shape import Shape
 from gravcomp.full_model.wrench import Wrench
@@ -165,7 +166,7 @@ def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
         if shape.is_equilibrium and len(shape.contacts):
             touched_at = simulator.solver.contact
             assert touched_at is not None
-            deepest = max(deepest, touched_at.depth(simulator.displacements))
+            deepest = max(deepest, sampled_depth(touched_at, simulator.displacements))
         # What the elastic energy gains beyond the work of the weight comes from contact.
         work = float(model.nodal_weight @ (simulator.displacements - moved) @ (0.5 * (last + gravity)))
         net, whole = net + work, whole + abs(work)

@@ -24,17 +24,22 @@ forces and friction together. Its states, at a bound or between, are changed all
 that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped and halved until they lower the
 sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The limits follow from the normal
 forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
+
+Next to convex obstacles D is positive, and the robot may be balanced as on top of a ball. Where the forces that turn overcome
+the stiffness, they are left out: the steps then lead away from such a shape. It is no solution where it would be left.
 """
 
 import numpy as np
 from numba import njit
 
+from gravcomp.contact.stability import AT_LIMIT, leaves
+
 OPEN, STICKING, SLIDING = 0, 1, 2
 _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among places that the model cannot move on their own
 _SWITCHES, _PATIENCE = 40, 4  # changes of wrong states; those of all at once that may leave as many wrong ones as before
 _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
+_STIFF = 1e-2  # of the stiffness that forces which turn have to leave, to be part of a step
 _SMALL = 1e-12  # m of slack that is rounding error
-_AT_LIMIT = 1e-4  # of the limit: friction nearer to it slides
 _ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
 
 
@@ -49,17 +54,18 @@ def contact_forces(
     given (m,): tensions, which take precedence, or (0,); tension (m,): first guess. gap (c,) in m; yielding (c,): m/N of walls;
     friction (c,): coefficients, (0,) where there are no rows of friction; bend (e,): D in N/m; pressed (c,) and rub (c, 2):
     normal forces and friction in N, first guesses. The changes by the tensions hold the places that touch in contact, and those
-    that stick at rest.
+    that stick at rest. The conditions include that the robot stays there, if its stiffness without walls is positive.
     """
     m, c = len(wound), len(gap)
     rubbing = len(friction) > 0
     rows = m + (3 * c if rubbing else c)
     extra = len(bend)
     w, q, turned = compliance[:rows, :rows].copy(), free[:rows].copy(), np.zeros((extra, rows + 1))
+    turning, balanced = bend, False
     if extra:  # eliminate the last rows
         own = np.ascontiguousarray(compliance[rows:, rows:])
         if bend.max() > 0.0 and not _stable(own, bend):
-            bend = np.minimum(bend, 0.0)
+            bend, balanced = np.minimum(bend, 0.0), True
         turned[:, :rows], turned[:, rows] = compliance[rows:, :rows], free[rows:]
         turned = np.linalg.solve(np.eye(extra) - own * bend, turned)
         for i in range(extra):
@@ -94,7 +100,7 @@ def contact_forces(
         if force[m + i] <= 0.0:
             state[i] = OPEN
         else:
-            most = (1.0 - _AT_LIMIT) * high[k] if rubbing else 0.0
+            most = (1.0 - AT_LIMIT) * high[k] if rubbing else 0.0
             sticks = rubbing and abs(force[k]) < most and abs(force[k + 1]) < most
             state[i] = STICKING if sticks else SLIDING
     # Changes by the tensions.
@@ -118,6 +124,11 @@ def contact_forces(
         part = np.ascontiguousarray(turned[:, :rows])
         whole[rows:] = part @ force + turned[:, rows]
         changes[rows:] = part @ change
+    if settled and balanced:
+        body = compliance.copy()
+        for i in range(c):
+            body[m + i, m + i] += yielding[i]
+        settled = not leaves(0, body, whole, friction, turning, wound, given, c)
     return whole, changes, state, settled
 
 
@@ -130,7 +141,7 @@ def _stable(compliance: np.ndarray, bend: np.ndarray) -> bool:
         for j in range(c):
             softer[i, j] = -np.sqrt(max(bend[i], 0.0) * max(bend[j], 0.0)) * compliance[i, j]
         softer[i, i] += 1.0
-    return np.linalg.eigvalsh(softer)[0] > 0.05
+    return np.linalg.eigvalsh(softer)[0] > _STIFF
 
 
 @njit(cache=True)

@@ -3,7 +3,8 @@
 import numpy as np
 from numba import njit
 
-from gravcomp.contact.places import Places, all_gaps, deepest, write_tangents
+from gravcomp.contact.outline_gap import deepest, deepest_from
+from gravcomp.contact.places import Places, write_tangents
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import SceneArrays, gap_to
 
@@ -14,7 +15,7 @@ def positions(places: Places, sections: np.ndarray) -> np.ndarray:
     result = np.zeros((len(places.row), 3))
     for i in range(len(places.row)):
         x, y = places.own[i]
-        for n in range(3):
+        for n in range(4):
             section = sections[places.first[i] + n]
             for j in range(3):
                 result[i, j] += places.share[i, n] * (section[0, j] + x * section[1, j] + y * section[2, j])
@@ -30,8 +31,11 @@ def follow(scene: SceneArrays, surface: ContactSurface, places: Places, sections
     section = np.empty((3, 3))
     for i in range(len(places.row)):
         section[:] = 0.0
-        for n in range(3):
-            section += places.share[i, n] * sections[places.first[i] + n]
+        for n in range(4):
+            share, station = places.share[i, n], places.first[i] + n
+            for v in range(3):
+                for j in range(3):
+                    section[v, j] += share * sections[station, v, j]
         row, station, own, normal = places.row[i], places.station[i], places.own[i], places.normal[i]
         if places.slot[i] < len(surface.place):
             places.gap[i] = deepest(scene, row, surface, station, section, own, normal)
@@ -42,10 +46,24 @@ def follow(scene: SceneArrays, surface: ContactSurface, places: Places, sections
 
 @njit(cache=True)
 def unseen_depth(scene: SceneArrays, surface: ContactSurface, places: Places, sections: np.ndarray, allowed: float) -> float:
-    """Return how deep in m a station at `sections` (s, 3, 3) is that is none of the places, or less than `allowed` m."""
-    shape = len(scene.kind), len(surface.place)
-    own, normal, seen = np.zeros((shape[0], shape[1], 2)), np.zeros((shape[0], shape[1], 3)), np.zeros(shape, dtype=np.bool_)
-    gap = all_gaps(scene, surface, sections, np.full(shape[1], -allowed), seen, own, normal)
+    """Return how deep in m a station at `sections` (s, 3, 3) is that is none of the places, and at least `allowed` m."""
+    rows, stations = len(scene.kind), len(surface.place)
+    own, normal, seen, deep = np.empty(2), np.empty(3), np.zeros((rows, stations), dtype=np.bool_), allowed
     for i in range(len(places.row)):
-        gap[places.row[i], places.station[i]] = np.inf
-    return -gap.min()
+        seen[places.row[i], places.station[i]] = True
+    for k in range(rows):
+        middle = -np.inf  # a bound: a gap changes by no more than the way
+        for s in range(stations):
+            one = two = square = 0.0
+            for j in range(3):
+                one += sections[s, 1, j] ** 2
+                two += sections[s, 2, j] ** 2
+                square += (sections[s, 0, j] - sections[max(s - 1, 0), 0, j]) ** 2
+            size = np.sqrt(max(one, two)) * surface.radius[s]
+            middle -= np.sqrt(square)
+            if seen[k, s] or middle - size > -allowed:
+                continue
+            middle = gap_to(scene, k, sections[s, 0], normal)
+            if middle - size <= -allowed:
+                deep = max(deep, -deepest_from(scene, k, surface, s, sections[s], middle, own, normal))
+    return deep

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.contact.condensed import SLIDING
 from gravcomp.contact.moved_places import positions
 from gravcomp.contact.places import Places
 from gravcomp.contact.surface import ContactSurface
@@ -12,19 +13,31 @@ from gravcomp.scene.distance import SceneArrays, gap_to
 
 
 class Pressed(NamedTuple):
-    """The p places that are pressed: numbers (p,) of them; along (p,): m along the robot; position (p, 3) and gap (p,) in m."""
+    """The p places that are pressed.
 
-    numbers: np.ndarray
+    row (p,): of the obstacle in the scene; along (p,): m along the robot; position (p, 3) and gap (p,) in m; normal (p, 3);
+    force (p, 3) in N; sliding (p,): whether it slides or sticks; by_tension (p, m): change of the normal force by the tensions.
+    """
+
+    row: np.ndarray
     along: np.ndarray
     position: np.ndarray
     gap: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+    sliding: np.ndarray
+    by_tension: np.ndarray
 
 
 @njit(cache=True)
 def pressed_places(
-    scene: SceneArrays, surface: ContactSurface, places: Places, forces: np.ndarray, sections: np.ndarray
-) -> Pressed:
-    """Return the places that are pressed by the forces (c, 3), where the stations are now at `sections` (s, 3, 3)."""
+    scene: SceneArrays, surface: ContactSurface, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray,
+    sections: np.ndarray,
+) -> Pressed:  # fmt: skip
+    """Return the places that are pressed by the forces (c, 3), where the stations are now at `sections` (s, 3, 3).
+
+    Of all places: held (c,), states of `condensed`; by_tension (c, m).
+    """
     point, normal = positions(places, sections), np.empty(3)
     chosen, count = np.empty(len(point), dtype=np.int64), 0
     for i in range(len(point)):
@@ -33,13 +46,16 @@ def pressed_places(
             count += 1
     chosen = chosen[:count]
     along, gap, position = np.zeros(count), np.empty(count), np.empty((count, 3))
+    sliding = held[chosen] == SLIDING
     for k in range(count):
         i = chosen[k]
-        for n in range(3):
+        for n in range(4):
             along[k] += places.share[i, n] * surface.place[places.first[i] + n]
         position[k] = point[i]
         gap[k] = gap_to(scene, places.row[i], point[i], normal)
-    return Pressed(chosen, along, position, gap)
+    return Pressed(
+        places.row[chosen], along, position, gap, places.normal[chosen], forces[chosen], sliding, by_tension[chosen]
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -55,14 +71,18 @@ def rubbing(
     """Return the coefficients of friction (c,), and how far the places have slid since the last equilibrium (2 c,) in m.
 
     start and sections (s, 3, 3): then and now. Only places rub that touched then: whose gap was below `touched` radii, or which
-    were pressed (k, slots). The motions are along the tangents `around` and `along` of each place.
+    were pressed (k, slots); of those that move along the robot, as on a peg or an edge, also where a neighbour was pressed. The
+    motions are along the tangents `around` and `along` of each place.
     """
     before = positions(places, start)
     friction, normal = np.zeros(len(before)), np.empty(3)
     for i in range(len(before)):
-        near = gap_to(scene, places.row[i], before[i], normal) < touched * surface.radius[places.station[i]]
-        if near or pressed[places.row[i], places.slot[i]]:
-            friction[i] = scene.friction[places.row[i]]
+        row, slot, station = places.row[i], places.slot[i], places.station[i]
+        rubs = pressed[row, slot] or gap_to(scene, row, before[i], normal) < touched * surface.radius[station]
+        if places.rocking[i] != 0.0:
+            rubs |= pressed[row, max(station - 1, 0)] or pressed[row, min(station + 1, len(surface.place) - 1)]
+        if rubs:
+            friction[i] = scene.friction[row]
     return friction, slid_by(places, start, sections)
 
 
@@ -101,11 +121,17 @@ def forces_at(places: Places, normal: np.ndarray, rub: np.ndarray) -> np.ndarray
 
 @njit(cache=True)
 def remembered(places: Places, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, slots, 3) in N: of `remember`."""
+    """Return normal forces (c,) and forces along both tangents (c, 2) of last time; force (k, slots, 3) in N: of `remember`.
+
+    A place that moves along the robot may have been that of the next station.
+    """
     count = len(places.row)
     pressed, rub = np.empty(count), np.empty((count, 2))
     for i in range(count):
-        last = force[places.row[i], places.slot[i]]
+        row, slot = places.row[i], places.slot[i]
+        if places.rocking[i] != 0.0 and not force[row, slot].any():
+            slot = slot - 1 if slot > 0 and force[row, slot - 1].any() else slot + 1
+        last = force[row, slot]
         pressed[i] = max(places.normal[i] @ last, 0.0)
         rub[i, 0], rub[i, 1] = places.around[i] @ last, places.along[i] @ last
     return pressed, rub

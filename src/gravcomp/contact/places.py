@@ -1,9 +1,9 @@
 """Places where the robot's surface is near an obstacle; compiled.
 
-At each station the point of the section's outline with the smallest gap g is found. Between stations the gap can be smaller by
-an eighth of g''. Where that is much and the gap is a minimum along the robot, the place moves there, so that no point of the
-surface is deeper in a wall than at these places, within a few micrometres. Whether places move follows from g'' alone: if it
-followed from the slope, a force would hop between a station and the minimum next to it, and no equilibrium would be found.
+At each station the point of the section's outline with the smallest gap g is found (`outline_gap`). Between stations the gap can
+be smaller by an eighth of g''. Where that is much and the gap is a minimum along the robot, the place moves there, so that no
+point of the surface is deeper in a wall than at these places, within a few micrometres. Whether places move follows from g''
+alone: with the slope, a force would hop between a station and the minimum next to it, and no equilibrium would be found.
 
 Where a wall is across the robot, the points on the rim of the tip's face are places too; the nearest one of the rim is one then
 only where it is deeper than they are, as in a small tilt.
@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.contact.outline_gap import deepest, deepest_from
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
 
-_TURNS = 4  # corrections of the direction in which the outline is nearest
-_SETTLED = 1e-5  # of the radius: what it changes of the gap is the square of that
-_MOVES = 3  # corrections of the place along the robot
+_MOVES, _THERE = 8, 1e-7  # corrections of the place along the robot, and the part of a distance of stations that ends them
 _ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
 _WORTH = 3e-4  # of the radius: places move along the robot where that can make the gap smaller by this
 
@@ -28,10 +27,10 @@ class Places(NamedTuple):
     """c places.
 
     row (c,): of the obstacle in the scene; station (c,): the nearest one; slot (c,): the station, or, after all of them, the
-    point of the rim; first (c,) and share (c, 3): the first of three neighbours, and their weights; own (c, 2): x and y in the
+    point of the rim; first (c,) and share (c, 4): the first of four neighbours, and their weights; own (c, 2): x and y in the
     section, m; gap (c,) in m; normal (c, 3); around (c, 3): tangent in the section; along (c, 3): the other tangent; curvature
-    (c,) of the obstacle across the robot in 1/m: change of the normal along `around`, positive next to a ball; tilt (c, 3):
-    weights of the three stations for the slope along the robot, a station; rocking (c,): -1 / g'' a station in 1/m, by which
+    (c,) of the obstacle across the robot in 1/m: change of the normal along `around`, positive next to a ball; tilt (c, 4):
+    weights of the four stations for the slope along the robot, a station; rocking (c,): -1 / g'' a station in 1/m, by which
     the place moves along the robot when it tilts; 0 where it does not.
     """
 
@@ -51,45 +50,6 @@ class Places(NamedTuple):
 
 
 @njit(cache=True)
-def deepest(
-    scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
-) -> float:
-    """Return the smallest gap of a section (3, 3) p, f_1, f_2, and write where it is in the section and the normal there."""
-    gap_to(scene, row, section[0], normal)
-    return _deepest_from(scene, row, surface, station, section, own, normal)
-
-
-@njit(cache=True)
-def _deepest_from(
-    scene: SceneArrays, row: int, surface: ContactSurface, station: int, section: np.ndarray, own: np.ndarray, normal: np.ndarray
-) -> float:
-    """Do as `deepest`, where the normal at the section's middle is known."""
-    corners, radius = surface.outline.shape[1], surface.radius[station]
-    point, gap = np.empty(3), np.inf
-    for turn in range(_TURNS):
-        x = -(normal[0] * section[1, 0] + normal[1] * section[1, 1] + normal[2] * section[1, 2])
-        y = -(normal[0] * section[2, 0] + normal[1] * section[2, 1] + normal[2] * section[2, 2])
-        before_x, before_y = own[0], own[1]
-        if corners == 0:
-            length = np.sqrt(x * x + y * y)
-            own[0], own[1] = (radius * x / length, radius * y / length) if length > 1e-9 else (radius, 0.0)
-        else:
-            farthest = -np.inf
-            for c in range(corners):
-                corner = surface.outline[station, c]
-                reach = x * corner[0] + y * corner[1]
-                if reach > farthest:
-                    farthest = reach
-                    own[0], own[1] = corner[0], corner[1]
-        if turn and abs(own[0] - before_x) + abs(own[1] - before_y) < _SETTLED * radius:
-            break
-        for i in range(3):
-            point[i] = section[0, i] + own[0] * section[1, i] + own[1] * section[2, i]
-        gap = gap_to(scene, row, point, normal)
-    return gap
-
-
-@njit(cache=True)
 def all_gaps(
     scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, reach: np.ndarray, asked: np.ndarray, own: np.ndarray,
     normal: np.ndarray,
@@ -103,9 +63,13 @@ def all_gaps(
     stations = len(surface.place)
     gap, way, size = np.empty((len(scene.kind), stations)), np.zeros(stations), np.empty(stations)
     for s in range(stations):
-        size[s] = max(_length(sections[s, 1]), _length(sections[s, 2])) * surface.radius[s]
-        if s:
-            way[s] = _length(sections[s, 0] - sections[s - 1, 0])
+        one = two = square = 0.0
+        for j in range(3):
+            one += sections[s, 1, j] ** 2
+            two += sections[s, 2, j] ** 2
+            square += (sections[s, 0, j] - sections[max(s - 1, 0), 0, j]) ** 2
+        size[s] = np.sqrt(max(one, two)) * surface.radius[s]
+        way[s] = np.sqrt(square)
     far = reach.max() + 2.0 * way.max() + size.max() - size.min()
     for k in range(len(scene.kind)):
         middle = -np.inf
@@ -118,7 +82,7 @@ def all_gaps(
             if middle - size[s] > reach[s]:
                 gap[k, s] = middle - size[s]
             else:
-                gap[k, s] = _deepest_from(scene, k, surface, s, sections[s], own[k, s], normal[k, s])
+                gap[k, s] = deepest_from(scene, k, surface, s, sections[s], middle, own[k, s], normal[k, s])
     return gap
 
 
@@ -135,7 +99,7 @@ def find_places(
     own, normal = np.zeros((rows, stations, 2)), np.zeros((rows, stations, 3))
     reach = np.empty(stations)
     for s in range(stations):
-        reach[s] = margin + _length(moved[s])
+        reach[s] = margin + np.sqrt(moved[s, 0] ** 2 + moved[s, 1] ** 2 + moved[s, 2] ** 2)
     # A force moves from station to station as the robot slides or tilts.
     chosen = np.zeros((rows, stations), dtype=np.bool_)
     for k in range(rows):
@@ -149,16 +113,21 @@ def find_places(
     for k in range(rows):
         for s in range(stations):
             if gap[k, s] < reach[s] and not chosen[k, s]:
-                free = gap[k, s] + normal[k, s] @ moved[s]
+                free = gap[k, s]
+                for j in range(3):
+                    free += normal[k, s, j] * moved[s, j]
                 chosen[k, s] = gap[k, s] < margin or free < margin
             count += chosen[k, s]
     # The tip's face.
     tip, shift = sections[stations - 1], moved[stations - 1]
-    axis = _cross(tip[1], tip[2])
+    axis = _cross((tip[1, 0], tip[1, 1], tip[1, 2]), (tip[2, 0], tip[2, 1], tip[2, 2]))
     least = _ACROSS * _length(axis)
     on_rim, edge, there = np.zeros((rows, rim), dtype=np.bool_), np.empty((rows, rim)), np.empty((rows, rim, 3))
     for k in range(rows):
-        if not chosen[k, stations - 1] or abs(normal[k, stations - 1] @ axis) < least:
+        if not chosen[k, stations - 1]:
+            continue
+        there_tip = normal[k, stations - 1]
+        if abs(there_tip[0] * axis[0] + there_tip[1] * axis[1] + there_tip[2] * axis[2]) < least:
             continue
         lowest, some = np.inf, False
         for n in range(rim):
@@ -183,7 +152,7 @@ def find_places(
         for n in range(rim):
             if on_rim[k, n]:
                 result.row[i], result.station[i], result.slot[i] = k, stations - 1, stations + n
-                result.first[i], result.share[i, 2] = stations - 3, 1.0
+                result.first[i], result.share[i, 3] = stations - 4, 1.0
                 _write_frame(scene, surface, tip, surface.rim[n], edge[k, n], there[k, n], result, i)
                 i += 1
     return result
@@ -194,51 +163,57 @@ def empty_places(count: int) -> Places:
     """Return arrays for `count` places, in which nothing is written yet."""
     return Places(
         np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64),
-        np.empty(count, dtype=np.int64), np.zeros((count, 3)), np.empty((count, 2)), np.empty(count), np.empty((count, 3)),
-        np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.zeros((count, 3)), np.zeros(count),
+        np.empty(count, dtype=np.int64), np.zeros((count, 4)), np.empty((count, 2)), np.empty(count), np.empty((count, 3)),
+        np.empty((count, 3)), np.empty((count, 3)), np.empty(count), np.zeros((count, 4)), np.zeros(count),
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _write_place(
     scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, gap: np.ndarray, own: np.ndarray, normal: np.ndarray,
     k: int, s: int, result: Places, i: int,
 ) -> None:  # fmt: skip
     """Write place i of the result: that of station s and row k, moved to the minimum along the robot."""
     stations = len(surface.place)
-    first = min(max(s - 1, 0), stations - 3)
-    share, place = result.share[i], float(s - first)
-    result.row[i], result.station[i], result.slot[i], result.first[i] = k, s, s, first
-    section = sections[s].copy()
-    best, here, there = gap[k, s], own[k, s].copy(), normal[k, s].copy()
+    row, section, share, tilt = result.row, np.empty((3, 3)), result.share[i], result.tilt[i]
+    row[i], result.station[i], result.slot[i] = k, s, s
+    best, here, there, place = gap[k, s], own[k, s].copy(), normal[k, s].copy(), float(s)
     before, after = gap[k, max(s - 1, 0)], gap[k, min(s + 1, stations - 1)]
-    bend = gap[k, first] - 2.0 * gap[k, first + 1] + gap[k, first + 2]
-    slope = 0.5 * (gap[k, first + 2] - gap[k, first]) + (place - 1.0) * bend
+    middle = min(max(s, 1), stations - 2)
+    bend = gap[k, middle - 1] - 2.0 * gap[k, middle] + gap[k, middle + 1]
+    slope = 0.5 * (gap[k, middle + 1] - gap[k, middle - 1]) + (s - middle) * bend
     if best <= before and best <= after and bend > 8.0 * _WORTH * surface.radius[s]:
-        low, high = max(place - 0.5, 0.0), min(place + 0.5, 2.0)
+        end = stations - 1.0
+        low, high = max(place - 1.0, 0.0), min(place + 1.0, end)
         moved, other, across = place - slope / bend, np.empty(2), np.empty(3)
-        for _ in range(_MOVES):
+        last, last_ahead, steep = place, 0.0, bend
+        for turn in range(_MOVES):
             moved = min(max(moved, low), high)
-            _section_at(sections, first, moved, share, section)
+            first = _between(moved, stations, share, tilt)
+            _section_at(sections, first, share, section)
             found = deepest(scene, k, surface, s, section, other, across)
             if found < best:
                 best, place = found, moved
                 here[:], there[:] = other, across
-            # The gap's slope along the robot follows from its gradient; its bend is that of the stations.
+            # The gap's slope along the robot follows from its gradient; its bend is at first that of the stations.
             ahead = 0.0
-            for j in range(3):
-                curve = sections[first + 2, 0, j] - 2.0 * sections[first + 1, 0, j] + sections[first, 0, j]
-                ahead += across[j] * (0.5 * (sections[first + 2, 0, j] - sections[first, 0, j]) + (moved - 1.0) * curve)
-            moved -= ahead / bend
-        if 0.0 < min(max(moved, low), high) < 2.0:  # at an end of the robot the place stays when it tilts
+            for n in range(4):
+                for j in range(3):
+                    ahead += across[j] * tilt[n] * sections[first + n, 0, j]
+            if turn and (ahead - last_ahead) * (moved - last) > 0.0:
+                steep = (ahead - last_ahead) / (moved - last)
+            last, last_ahead = moved, ahead
+            moved -= ahead / steep
+            if abs(moved - last) < _THERE:
+                break
+        if 0.0 < min(max(moved, low), high) < end:  # at an end of the robot the place stays when it tilts
             result.rocking[i] = -1.0 / bend
-    _section_at(sections, first, place, share, section)
-    tilt = result.tilt[i]
-    tilt[0], tilt[1], tilt[2] = place - 1.5, 2.0 - 2.0 * place, place - 0.5
+    result.first[i] = _between(place, stations, share, tilt)
+    _section_at(sections, result.first[i], share, section)
     _write_frame(scene, surface, section, here, best, there, result, i)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _write_frame(
     scene: SceneArrays, surface: ContactSurface, section: np.ndarray, own: np.ndarray, gap: float, normal: np.ndarray,
     result: Places, i: int,
@@ -249,49 +224,77 @@ def _write_frame(
     if scene.kind[result.row[i]] == PLANE:
         result.curvature[i] = 0.0
         return
-    h, around = 0.02 * surface.radius[result.station[i]], result.around[i]
-    one, other = np.empty(3), np.empty(3)
-    gap_to(scene, result.row[i], section[0] + h * around, one)
-    gap_to(scene, result.row[i], section[0] - h * around, other)
-    bend = ((one - other) @ around) / (2.0 * h)
+    h, bend, point, turned = 0.02 * surface.radius[result.station[i]], 0.0, np.empty(3), np.empty(3)
+    for side in (1.0, -1.0):
+        for j in range(3):
+            point[j] = section[0, j] + side * h * result.around[i, j]
+        gap_to(scene, result.row[i], point, turned)
+        for j in range(3):
+            bend += side * turned[j] * result.around[i, j]
+    bend /= 2.0 * h
     result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
 
 
 @njit(cache=True)
 def write_tangents(section: np.ndarray, result: Places, i: int) -> None:
     """Write the tangents of place i, whose normal is known, in a section (3, 3)."""
-    axis, normal = _cross(section[1], section[2]), result.normal[i]
+    normal = (result.normal[i, 0], result.normal[i, 1], result.normal[i, 2])
+    one = (section[1, 0], section[1, 1], section[1, 2])
+    axis = _cross(one, (section[2, 0], section[2, 1], section[2, 2]))
     around = _cross(axis, normal)
     length = _length(around)
     if length < 1e-6 * _length(axis):  # the wall is across the robot
-        around[:] = section[1] - (section[1] @ normal) * normal
+        out = one[0] * normal[0] + one[1] * normal[1] + one[2] * normal[2]
+        around = (one[0] - out * normal[0], one[1] - out * normal[1], one[2] - out * normal[2])
         length = _length(around)
-    around /= length
-    result.around[i], result.along[i] = around, _cross(normal, around)
+    around = (around[0] / length, around[1] / length, around[2] / length)
+    along = _cross(normal, around)
+    for j in range(3):
+        result.around[i, j], result.along[i, j] = around[j], along[j]
 
 
 @njit(cache=True)
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    result = np.empty(3)
-    result[0] = a[1] * b[2] - a[2] * b[1]
-    result[1] = a[2] * b[0] - a[0] * b[2]
-    result[2] = a[0] * b[1] - a[1] * b[0]
-    return result
+def _cross(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
-def _section_at(sections: np.ndarray, first: int, place: float, share: np.ndarray, section: np.ndarray) -> None:
-    """Write the section (3, 3) at `place` (0 to 2) among three stations, and the weights (3,) of these."""
-    share[0] = 0.5 * (place - 1.0) * (place - 2.0)
-    share[1] = place * (2.0 - place)
-    share[2] = 0.5 * place * (place - 1.0)
-    for v in range(3):
-        for j in range(3):
-            section[v, j] = (
-                share[0] * sections[first, v, j] + share[1] * sections[first + 1, v, j] + share[2] * sections[first + 2, v, j]
-            )
+def _between(place: float, stations: int, share: np.ndarray, tilt: np.ndarray) -> int:
+    """Write the weights (4,) of four stations for `place`, in distances of stations, and for the slope there; return the first.
+
+    Between two stations the parabolas through either of them and its neighbours are blended linearly (A. Overhauser, 1968): the
+    curve is smooth, and where it is between two stations does not depend on the one from which it is looked for.
+    """
+    one = min(int(place), stations - 2)
+    t, first = place - one, min(max(one - 1, 0), stations - 4)
+    share[:], tilt[:] = 0.0, 0.0
+    part = t if 0 < one < stations - 2 else (1.0 if one == 0 else 0.0)  # of the parabola around the second station
+    steeper = 1.0 if 0 < one < stations - 2 else 0.0
+    before, here, after = 0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)
+    own, second, beyond = 0.5 * (t - 1.0) * (t - 2.0), t * (2.0 - t), 0.5 * t * (t - 1.0)
+    if one > 0:
+        share[one - 1 - first] = (1.0 - part) * before
+        tilt[one - 1 - first] = (1.0 - part) * (t - 0.5) - steeper * before
+    share[one - first] = (1.0 - part) * here + part * own
+    tilt[one - first] = -2.0 * (1.0 - part) * t + part * (t - 1.5) + steeper * (own - here)
+    share[one + 1 - first] = (1.0 - part) * after + part * second
+    tilt[one + 1 - first] = (1.0 - part) * (t + 0.5) + part * (2.0 - 2.0 * t) + steeper * (second - after)
+    if one < stations - 2:
+        share[one + 2 - first] = part * beyond
+        tilt[one + 2 - first] = part * (t - 0.5) + steeper * beyond
+    return first
 
 
 @njit(cache=True)
-def _length(vector: np.ndarray) -> float:
+def _section_at(sections: np.ndarray, first: int, share: np.ndarray, section: np.ndarray) -> None:
+    """Write the section (3, 3) of four stations with the weights (4,)."""
+    section[:] = 0.0
+    for n in range(4):
+        for v in range(3):
+            for j in range(3):
+                section[v, j] += share[n] * sections[first + n, v, j]
+
+
+@njit(cache=True)
+def _length(vector: tuple[float, float, float]) -> float:
     return np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gravcomp.contact.places import deepest
+from gravcomp.contact.outline_gap import deepest
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import SceneArrays, gap_to
 

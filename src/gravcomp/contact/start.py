@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gravcomp.config import ConfigError
-from gravcomp.contact.places import deepest
+from gravcomp.contact.outline_gap import deepest
 from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Robot
 from gravcomp.scene.distance import PLANE, TUBE, SceneArrays, gap_to

@@ -1,6 +1,7 @@
 """The robot's surface for contact: outlines of cross-sections at stations along it.
 
-A section moves as a whole: its points are p + x f_1 + y f_2 (`mesh.sections`). Between stations p, f_1 and f_2 are parabolas.
+A section moves as a whole: its points are p + x f_1 + y f_2 (`mesh.sections`). Between stations p, f_1 and f_2 are
+smooth curves through four of them (`places`).
 The tip's face is flat. So that it can lie on a wall ahead, points of its rim can touch too, always the same ones.
 """
 

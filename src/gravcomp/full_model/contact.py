@@ -7,7 +7,7 @@ dense: the compliance S of cables and places, from which forces and states follo
 
 import numpy as np
 
-from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
+from gravcomp.contact.condensed import contact_forces
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.place_forces import (
     Pressed,
@@ -21,11 +21,13 @@ from gravcomp.contact.place_forces import (
 )
 from gravcomp.contact.places import Places, all_gaps, find_places
 from gravcomp.contact.squeezed import squeezed
+from gravcomp.contact.stability import leaves
 from gravcomp.contact.surface import contact_surface
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.supports import SupportedFactor, unstable_motions
+from gravcomp.full_model.supports import SupportedFactor
+from gravcomp.full_model.touch import Touch
 from gravcomp.mechanics.block_matrix import Factor
 from gravcomp.mesh.sections import section_functionals
 from gravcomp.scene.distance import SceneArrays
@@ -33,16 +35,16 @@ from gravcomp.scene.scene import Scene
 
 # Parts of the radius: a place nearer than the first is a candidate; one nearer than the second at the last equilibrium rubs.
 NEAR, TOUCHED = 0.02, 1e-3
+# Part of the radius by which a robot is pushed off an obstacle on which it is balanced.
+KICK = 0.01
 
 
 class FullContact:
-    """Contact of a model with a scene. Remembers the forces at the places as guesses for the next solution.
+    """Contact of a model with a scene.
 
     Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
     nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
-    for loads applied in steps; of the last solution: pull (3 n_free,): forces on the unknowns; force (k, slots, 3): those of
-    `places.remember`; settled: whether all conditions of contact hold; longest: largest step in m that cannot pass over an
-    obstacle.
+    for loads applied in steps; touch: what touches in the solution that is sought, from the state at which `begin` started.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -58,25 +60,35 @@ class FullContact:
         self.sections_at_rest = self.sections(np.zeros_like(model.mesh.nodes))
         self.allowed = 0.0
         self.rubbing = bool((scene.arrays.friction > 0.0).any())
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the forces: nothing touches."""
-        self.force = np.zeros((len(self.arrays.kind), self.surface.slots, 3))
-        self._start = self.sections_at_rest
-        self._none_pressed = np.zeros(self.force.shape[:2], dtype=np.bool_)  # here those that press have no gap
-        self.longest = np.inf
-        self.pull, self.settled = np.zeros(3 * self._model.n_free), True
-        self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray] | None = None
+        slots = len(self.arrays.kind), self.surface.slots
+        none_pressed = np.zeros(slots, dtype=np.bool_)
+        self._nothing = Touch(self.sections_at_rest, none_pressed, np.zeros((*slots, 3)), np.zeros(3 * model.n_free))
+        self.touch = self._nothing
 
     def sections(self, u: np.ndarray) -> np.ndarray:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
         return (self._rows @ (self._model.mesh.nodes + u)).reshape(-1, 3, 3)
 
-    def begin(self, u: np.ndarray, gravity: np.ndarray) -> None:
-        """Start a step from the equilibrium u (n, 3): friction counts from there. gravity (3,) places what is in the world."""
+    @property
+    def longest(self) -> float:
+        """Largest step in m that cannot pass over an obstacle."""
+        return float(self.surface.radius.min()) if self.touch.solution is not None else np.inf
+
+    def begin(self, state: Equilibrium, gravity: np.ndarray) -> None:
+        """Start a step from a state with what touches there. gravity (3,) places what is in the world.
+
+        Friction counts from an equilibrium: from this state, or else from the one from which the way to it began.
+        """
         self.place(gravity)
-        self._start = self.sections(u)
+        last = state.touch or self._nothing
+        if state.converged:
+            last = last._replace(start=self.sections(state.u), pressed=np.asarray(last.force.any(axis=2)))
+        self.touch = last
+
+    def touch_at(self, u: np.ndarray, force: np.ndarray, handed: Pressed | None) -> Touch:
+        """Return what touches at the equilibrium u (n, 3) of another model: force (k, slots, 3) in N of `remember`."""
+        pressed = np.asarray(force.any(axis=2))
+        return self._nothing._replace(start=self.sections(u), pressed=pressed, force=force.copy(), handed=handed)
 
     def place(self, gravity: np.ndarray) -> SceneArrays:
         """Place what is in the world for gravity (3,), and return the obstacles."""
@@ -87,9 +99,12 @@ class FullContact:
         """Return changes (s, 3, 3, r) of the stations' p, f_1, f_2 by fields (r, n, 3) of displacements."""
         return np.stack([(self._rows @ field).reshape(-1, 3, 3) for field in fields], axis=-1)
 
-    def squeezed(self, u: np.ndarray) -> str:
-        """Return a sentence on where walls leave less room than the robot needs at u (n, 3), empty without any."""
-        return squeezed(self.arrays, self.scene.names, self.surface, self.sections(u))
+    def squeezed(self, u: np.ndarray, gravity: np.ndarray) -> str:
+        """Return a sentence on where walls leave less room than the robot needs at u (n, 3), empty without any.
+
+        gravity (3,) places what is in the world.
+        """
+        return squeezed(self.scene.under_gravity(gravity), self.scene.names, self.surface, self.sections(u))
 
     def depth(self, u: np.ndarray) -> float:
         """Return in m how deep the robot is in an obstacle at the displacements u (n, 3); 0 outside."""
@@ -107,28 +122,28 @@ class FullContact:
         supported: in `factor`, where only the walls keep the robot from buckling. Sets compliance and answer of `state`, which
         hold what touches in contact.
         """
-        model, m = self._model, len(state.tension)
+        model, m, last = self._model, len(state.tension), self.touch
         wound, given = cables.arrays(m)
-        solved = factor.solve(np.column_stack([out, out + self.pull, state.tendons.force_jacobian.T]))
+        solved = factor.solve(np.column_stack([out, out + last.pull, state.tendons.force_jacobian.T]))
         y, foreseen, answer = solved[:, 0], solved[:, 1], solved[:, 2:]
         if supported is not None:  # without the walls it would move the wrong way
-            foreseen = supported.held(out + self.pull)
+            foreseen = supported.held(out + last.pull)
         jacobian, stretch = state.tendons.jacobian, np.diag(model.tendons.stretch(state.tendons))
         compliance, free = jacobian @ answer + stretch, state.tendons.displacement + jacobian @ y
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, self.force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, last.force)
         if not len(places.row):
             state.compliance, state.answer = compliance, answer
-            self._keep(places, np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m)), np.zeros(len(y)))
+            self.touch = self._nothing._replace(start=last.start, pressed=last.pressed)
             return y + answer @ tension, tension
-        pressed, rub = remembered(places, self.force)
+        pressed, rub = remembered(places, last.force)
         turns, moves, bend = turning(places, pressed)
         directions, friction, slid = self._directions(places, turns, moves), np.zeros(0), np.zeros(0)
         arrays, count = self.arrays, len(places.row)
         if self.rubbing:
-            friction, slid = rubbing(arrays, self.surface, places, self._start, sections, TOUCHED, self._none_pressed)
+            friction, slid = rubbing(arrays, self.surface, places, last.start, sections, TOUCHED, last.pressed)
         columns = np.hstack([answer, factor.solve(directions.T)])
         rows = np.vstack([jacobian, directions])
         whole = rows @ columns
@@ -137,83 +152,72 @@ class FullContact:
         free[:m] += state.tendons.displacement
         free[m + count : m + count + len(slid)] += slid
         softness = yielding(arrays, self.surface, places)
-        force, change, held, self.settled = contact_forces(
+        force, change, held, settled = contact_forces(
             whole, free, wound, given, state.tension, places.gap + self.allowed,
             softness, friction, bend, pressed, rub,
         )  # fmt: skip
         if supported is not None:
             soft = np.concatenate([np.zeros(m), softness, np.zeros(len(whole) - m - count)])
-            self.settled &= not self._buckles(supported, whole + np.diag(soft), force, held, bend, wound, given)
+            settled &= not leaves(supported.negative, whole + np.diag(soft), force, friction, bend, wound, given, count)
         state.compliance, state.answer = whole[:m] @ change, columns @ change
         forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
-        remember(places, forces, self.force)
-        self._keep(places, forces, held, change[m : m + count], force[m:] @ directions)
-        return y + columns @ force, force[:m]
+        by_slot = np.empty_like(last.force)
+        remember(places, forces, by_slot)
+        step = y + columns @ force
+        if not settled and len(turns):
+            self._kick(step, columns[:, m + count + len(slid) :][:, : len(turns)], bend[: len(turns)])
+        solution = places, forces, held, change[m : m + count]
+        self.touch = Touch(last.start, last.pressed, by_slot, force[m:] @ directions, settled, solution)
+        return step, force[:m]
 
     def pressed_sections(self) -> list[np.ndarray]:
         """Return the rows (n,) of the middles of the sections that walls pressed in the last solution."""
-        pressed = np.flatnonzero(self.force.any(axis=(0, 2)))
+        pressed = np.flatnonzero(self.touch.force.any(axis=(0, 2)))
         stations = np.unique(np.minimum(pressed, len(self.surface.place) - 1))
         return [self._rows[[3 * station]].toarray()[0] for station in stations]
 
-    def _buckles(
-        self, supported: SupportedFactor, compliance: np.ndarray, force: np.ndarray, held: np.ndarray, bend: np.ndarray,
-        wound: np.ndarray, given: np.ndarray,
-    ) -> bool:  # fmt: skip
-        """Whether the robot would leave this equilibrium.
+    def _kick(self, step: np.ndarray, answers: np.ndarray, bend: np.ndarray) -> None:
+        """Add to a short step (3 n_free,) a motion off the obstacles on which the robot may be balanced, as on top of a ball.
 
-        compliance (k, k): with those of the walls; the others are arguments and results of `contact.condensed`.
+        answers (3 n_free, t): to forces along the tangents `around` at the middles; bend (t,): stiffness of those that turn.
         """
-        m, count, turning = len(wound), len(held), len(force) - len(bend)
-        rows = [a for a in range(m) if not len(given) and np.isfinite(wound[a]) and force[a] > 0.0]
-        rows += [m + i for i in range(count) if held[i] != OPEN]
-        rows += [m + count + 2 * i + v for i in range(count) if held[i] == STICKING for v in range(2)]
-        rows += range(turning, len(force))
-        return unstable_motions(supported.negative, compliance[np.ix_(rows, rows)], bend) > 0
+        away = answers @ np.sqrt(np.maximum(bend, 0.0))
+        size, kick = float(np.abs(away).max()), KICK * float(self.surface.radius.min())
+        if size > 0.0 and np.abs(step).max() < kick:
+            step += (kick if away @ step >= 0.0 else -kick) / size * away
 
-    def contacts(self, u: np.ndarray) -> Contacts:
-        """Return what touched in the last solution, with the gaps at the displacements u (n, 3)."""
-        if self._last is None or not len(self._last[0].row):
+    def contacts(self, state: Equilibrium) -> Contacts:
+        """Return what touches at a state."""
+        if state.touch is None or state.touch.solution is None:
+            return self.described(None if state.touch is None else state.touch.handed)
+        places, forces, held, by_tension = state.touch.solution
+        return self.described(pressed_places(self.arrays, self.surface, places, forces, held, by_tension, self.sections(state.u)))
+
+    def described(self, pressed: Pressed | None) -> Contacts:
+        """Return the pressed places with their obstacles."""
+        if pressed is None or not len(pressed.row):
             return Contacts.none()
-        places, forces, held, by_tension = self._last
-        pressed = pressed_places(self.arrays, self.surface, places, forces, self.sections(u))
-        return self.described(places, forces, held, by_tension, pressed)
-
-    def described(
-        self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pressed: Pressed
-    ) -> Contacts:
-        """Return the pressed places.
-
-        Of all places: forces (c, 3), states (c,) of `contact.condensed`, and changes (c, m) of the normal forces by the tensions.
-        """
-        chosen = pressed.numbers
-        obstacle = self.arrays.obstacle[places.row[chosen]]
+        obstacle = self.arrays.obstacle[pressed.row]
         return Contacts(
             obstacle=obstacle,
             station=pressed.along / self._model.length,
             position=pressed.position,
-            normal=places.normal[chosen],
-            force=forces[chosen],
+            normal=pressed.normal,
+            force=pressed.force,
             gap=pressed.gap,
-            sliding=held[chosen] == SLIDING,
-            by_tension=by_tension[chosen],
+            sliding=pressed.sliding,
+            by_tension=pressed.by_tension,
             names=tuple(self.scene.names[k] for k in obstacle),
         )
-
-    def _keep(self, places: Places, forces: np.ndarray, held: np.ndarray, by_tension: np.ndarray, pull: np.ndarray) -> None:
-        if not len(places.row):
-            self.force[:], self.settled = 0.0, True
-        self._last, self.pull = (places, forces, held, by_tension), pull
-        self.longest = float(self.surface.radius.min()) if len(places.row) else np.inf
 
     def _directions(self, places: Places, turns: np.ndarray, moves: np.ndarray) -> np.ndarray:
         """Rows (r, 3 n_free) of `contact.condensed`: normals, tangents if anything rubs, then those of `turning`."""
         from scipy.sparse import csr_matrix
 
         count, n = len(places.row), self._model.n_free
-        three, start = (places.first[:, None] + np.arange(3)).ravel(), 3 * np.arange(count + 1)
+        four, start = (places.first[:, None] + np.arange(4)).ravel(), 4 * np.arange(count + 1)
         share, tilt = (
-            csr_matrix((weights.ravel(), three, start), shape=(count, len(self.surface.place)))
+            csr_matrix((weights.ravel(), four, start), shape=(count, len(self.surface.place)))
             for weights in (places.share, places.tilt)
         )
 

@@ -122,5 +122,5 @@ class StaticSolver(StaticTracker):
         """Return how deep in m the straight robot is in an obstacle under gravity (3,)."""
         if self.contact is None:
             return 0.0
-        self.contact.begin(np.zeros_like(self.state.u), gravity)
+        self.contact.place(gravity)
         return self.contact.depth(np.zeros_like(self.state.u))

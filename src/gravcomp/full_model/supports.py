@@ -11,12 +11,7 @@ result:
     A^-1 = A'^-1 + Z (1/k - C Z)^-1 Z^T,      Z = A'^-1 C^T.
 
 A has as many negative eigenvalues as 1/k - C Z (Sylvester's law of inertia, both Schur complements of [[A', C^T], [C, 1/k]]).
-With the rows N of what the walls hold, and T of forces D T u that turn with the robot, the equilibrium is stable where
-A - T^T D T is positive definite on the motions with N u = 0. On these it has
-
-    n(A) + n(diag(0, D^-1) - R A^-1 R^T) - n(D) - rank(N)
-
-negative eigenvalues, where R are the rows of N and T, and n counts negative ones.
+Whether the robot stays there is decided by `contact.stability`.
 """
 
 from collections.abc import Sequence
@@ -26,9 +21,6 @@ import numpy as np
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.turning_loads import add_part
 from gravcomp.mechanics.block_matrix import BlockCholesky, BlockMatrix
-
-# By how much walls yield, of the compliance of the robot where they hold it.
-_SOFT = 1e-7
 
 
 class SupportedFactor:
@@ -59,21 +51,3 @@ def add_springs(matrix: BlockMatrix, model: MeshedModel, sections: Sequence[np.n
         if add_part(matrix, model, middle[None], -stiffness * np.eye(3)):
             rows.append(np.kron(middle[None, : model.n_free], np.eye(3)))
     return np.concatenate(rows) if rows else np.zeros((0, 3 * model.n_free))
-
-
-def unstable_motions(negative: int, compliance: np.ndarray, turning: np.ndarray) -> int:
-    """Return how many motions, which the walls allow, have a negative stiffness.
-
-    negative: n(A); compliance (k, k): R A^-1 R^T, rows of N first; turning (t,): D of the last rows, none of which is 0. Rows of
-    N may depend on each other, as those of a face on a plane do: with walls that yield a little, each of them counts.
-    """
-    held = len(compliance) - len(turning)
-    inner = -0.5 * (compliance + compliance.T)
-    inner[range(held, len(inner)), range(held, len(inner))] += 1.0 / turning
-    # Scaling changes no sign. Without it, the rounding error of the entry of a force that is nearly 0 hides all others.
-    size = np.abs(inner.diagonal())
-    size[:held][size[:held] == 0.0] = 1.0  # at the clamp
-    size[held:] = 1.0 / np.abs(turning)
-    inner /= np.sqrt(np.outer(size, size))
-    inner[range(held), range(held)] -= _SOFT
-    return negative + int((np.linalg.eigvalsh(inner) < 0.0).sum()) - int((turning < 0.0).sum()) - held

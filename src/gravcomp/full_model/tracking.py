@@ -85,8 +85,6 @@ class StaticTracker:
         tendons = self.model.tendons.state(self.model.mesh.nodes)
         self.sliding = Sliding.none(count, self.model.length)
         self.state = Equilibrium(u, np.zeros(count), np.zeros((count, count)), np.zeros((3 * self.model.n_free, count)), tendons)
-        if self.contact is not None:
-            self.contact.reset()
 
     def track(
         self,
@@ -113,7 +111,7 @@ class StaticTracker:
         if self.extrapolates and self._before is not None:
             self._go_ahead(state, self._before)
         if self.contact is not None:
-            self.contact.begin(previous.u, gravity)
+            self.contact.begin(previous, gravity)
             iterations *= _MORE_IN_CONTACT
         loads = with_payload(self.model, gravity / fraction, loads)
         load = AppliedLoad(self.model.weight(gravity), loads, fraction)
@@ -127,8 +125,10 @@ class StaticTracker:
             self._measure(state, load)
             if origin is None:
                 break
-            settled = self.contact is None or self.contact.settled
+            settled = self.contact is None or self.contact.touch.settled
             state.converged &= settled and state.residual <= self._allowed_residual(state, load)
+        if self.contact is not None:
+            state.touch = self.contact.touch
         self._before = previous.u if state.converged and previous.converged else None
         self.state = state
         return state
@@ -371,7 +371,7 @@ class StaticTracker:
     def _pull(self, state: Equilibrium) -> np.ndarray:
         """Return the forces (3 n_free,) of cables and contact on the unknowns."""
         pull = state.tension @ state.tendons.force_jacobian
-        return pull if self.contact is None else pull + self.contact.pull
+        return pull if self.contact is None else pull + self.contact.touch.pull
 
     def _measure(self, state: Equilibrium, load: AppliedLoad) -> None:
         """Set the residual of `state`."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from gravcomp.contact.places import deepest
+from gravcomp.contact.outline_gap import deepest
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import SceneArrays, gap_to
 

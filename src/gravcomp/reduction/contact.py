@@ -6,14 +6,14 @@ import numpy as np
 
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.place_forces import Pressed
-from gravcomp.contact.places import Places
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import FullContact
+from gravcomp.full_model.touch import Touch
 from gravcomp.scene.distance import SceneArrays
 
 
 class Touching(NamedTuple):
-    """What contact needs: scene, surface, rest (s, 3, 3) and change (9 s, r) of the stations' p, f_1, f_2; and the memory.
+    """What contact needs: scene, surface, change (9 s, r) of the stations' p, f_1, f_2, that of p alone (3 s, r); and the memory.
 
     start (s, 3, 3): stations at the last equilibrium; pressed (k, slots): what pressed there; force (k, slots, 3) in N: of
     `remember`; pull (1, r): force of contact on the coordinates; rubs: whether any obstacle has friction; margin: m, nearer
@@ -22,8 +22,8 @@ class Touching(NamedTuple):
 
     scene: SceneArrays
     surface: ContactSurface
-    rest: np.ndarray
     change: np.ndarray
+    middle_change: np.ndarray
     start: np.ndarray
     pressed: np.ndarray
     force: np.ndarray
@@ -37,7 +37,9 @@ class ReducedContact:
 
     def __init__(self, full: FullContact, section_change: np.ndarray):
         """full: contact of the full model; section_change (s, 3, 3, r): changes of its stations' p, f_1, f_2."""
-        self._full, self._change = full, np.ascontiguousarray(section_change.reshape(-1, section_change.shape[-1]))
+        r = section_change.shape[-1]
+        self._full, self._change = full, np.ascontiguousarray(section_change.reshape(-1, r))
+        self._middle_change = np.ascontiguousarray(section_change[:, 0].reshape(-1, r))
         self._rest = full.sections_at_rest
         self.forget()
 
@@ -45,15 +47,15 @@ class ReducedContact:
         """Forget the forces, for a start from another shape."""
         self.force = np.zeros((len(self._full.arrays.kind), self._full.surface.slots, 3))
         self._pull = np.zeros((1, self._change.shape[1]))
-        self._last: tuple[Places, np.ndarray, np.ndarray, np.ndarray, Pressed] | None = None
+        self._pressed: Pressed | None = None
 
-    def take_over(self, basis: np.ndarray) -> None:
-        """Take the forces of the full model's last solution as guesses; basis (3 n_free, r)."""
-        self.force, self._pull = self._full.force.copy(), (self._full.pull @ basis)[None]
+    def take_over(self, touch: Touch, basis: np.ndarray) -> None:
+        """Take the forces of a solution of the full model as guesses; basis (3 n_free, r)."""
+        self.force, self._pull = touch.force.copy(), (touch.pull @ basis)[None]
 
-    def hand_over(self) -> None:
-        """Give the forces of the last solution to the full model as guesses."""
-        self._full.force[:] = self.force
+    def hand_over(self, u: np.ndarray) -> Touch:
+        """Return the forces of the last solution as guesses for the full model at the displacements u (n, 3)."""
+        return self._full.touch_at(u, self.force, self._pressed)
 
     def sections(self, q: np.ndarray) -> np.ndarray:
         """Return p, f_1, f_2 (s, 3, 3) of the stations at q (r,)."""
@@ -64,23 +66,14 @@ class ReducedContact:
         full = self._full
         scene = full.place(gravity)
         return Touching(
-            scene, full.surface, self._rest, self._change, self.sections(q), np.asarray(self.force.any(axis=2)),
+            scene, full.surface, self._change, self._middle_change, self.sections(q), np.asarray(self.force.any(axis=2)),
             self.force.copy(), self._pull.copy(), full.rubbing, full.margin,
         )  # fmt: skip
 
-    def keep(
-        self,
-        touching: Touching,
-        places: Places,
-        forces: np.ndarray,
-        held: np.ndarray,
-        by_tension: np.ndarray,
-        pressed: Pressed,
-    ) -> None:
+    def keep(self, touching: Touching, pressed: Pressed) -> None:
         """Keep what a step has found."""
-        self.force, self._pull = touching.force, touching.pull
-        self._last = (places, forces, held, by_tension, pressed) if len(pressed.numbers) else None
+        self.force, self._pull, self._pressed = touching.force, touching.pull, pressed
 
     def contacts(self) -> Contacts:
         """Return what touched in the last solution."""
-        return Contacts.none() if self._last is None else self._full.described(*self._last)
+        return self._full.described(self._pressed)

@@ -13,7 +13,7 @@ def directions_of(places: Places, change: np.ndarray, rubs: bool, turns: np.ndar
     first = 3 * count if rubs else count
     result = np.zeros((first + len(turns) + len(moves), r))
     for i in range(count):
-        for n in range(3):
+        for n in range(4):
             share = places.share[i, n]
             if share == 0.0:
                 continue
@@ -30,7 +30,7 @@ def directions_of(places: Places, change: np.ndarray, rubs: bool, turns: np.ndar
                         result[count + 2 * i + 1, a] += places.along[i, j] * here
     for k in range(len(turns)):
         i = turns[k]
-        for n in range(3):
+        for n in range(4):
             base = 9 * (places.first[i] + n)
             for j in range(3):
                 weight = places.share[i, n] * places.around[i, j]
@@ -39,7 +39,7 @@ def directions_of(places: Places, change: np.ndarray, rubs: bool, turns: np.ndar
     for k in range(len(moves)):
         i = moves[k]
         x, y = places.own[i]
-        for n in range(3):
+        for n in range(4):
             base = 9 * (places.first[i] + n)
             for j in range(3):
                 weight = places.tilt[i, n] * places.normal[i, j]
@@ -55,7 +55,7 @@ def pull_of(places: Places, forces: np.ndarray, change: np.ndarray) -> np.ndarra
     at = np.zeros(len(change))
     for i in range(len(places.row)):
         x, y = places.own[i]
-        for n in range(3):
+        for n in range(4):
             base = 9 * (places.first[i] + n)
             for j in range(3):
                 here = places.share[i, n] * forces[i, j]

@@ -76,21 +76,17 @@ def tracked_touching(
     given: np.ndarray, pulling: np.ndarray, scale: float, offset: np.ndarray, kept: KeptStiffness,
     iterations: int, longest_step: float, near: float, tolerance: float, calm: float, touching: Touching,
 ) -> tuple[
-    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Places, np.ndarray, np.ndarray,
-    np.ndarray, Pressed,
+    bool, Point, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float, Pressed,
 ]:  # fmt: skip
-    """Return what `tracking._tracked` returns, then places, their forces (c, 3), states (c,) and changes by tension (c, m).
-
-    Last come the pressed places. Writes the memory of `touching`.
-    """
+    """Return what `tracking._tracked` returns, then the pressed places. Writes the memory of `touching`."""
     m, r, start, expected_first, cables = len(tension), len(q), point, expected, body.cables
     of_law = len(body.deviation.weight) > 0
-    rest, change, stations = touching.rest, touching.change, len(touching.rest)
+    change, stations = touching.change, len(touching.start)
     compliance, answer = np.zeros((m, m)), np.zeros((m, r))
     converged, residual, reuse, before = False, np.inf, False, 0.0
     factor = np.zeros((r, r))
     forces, held, pressing = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m))
-    sections = rest + (change @ q).reshape(stations, 3, 3)
+    sections = touching.start  # linear in q: each step adds what it moves
     places = empty_places(0)
     for iteration in range(iterations):
         stress = scale * point.strain + offset
@@ -108,12 +104,12 @@ def tracked_touching(
         solve(factor, columns)
         own = stretch(cables, point.tendons)
         y, of_cables = columns[:, 0].copy(), np.ascontiguousarray(columns[:, 2:])
-        foreseen = (change @ (columns[:, 1] + of_cables @ tension)).reshape(stations, 3, 3)
+        foreseen = (touching.middle_change @ (columns[:, 1] + of_cables @ tension)).reshape(stations, 3)
         places = find_places(
             touching.scene,
             touching.surface,
             sections,
-            np.ascontiguousarray(foreseen[:, 0]),
+            foreseen,
             touching.margin,
             touching.force,
         )
@@ -146,8 +142,8 @@ def tracked_touching(
         touching.pull[0] = force[m:] @ directions
         forces = forces_at(places, force[m : m + count].copy(), force[m + count : m + plain].copy())
         step, cable_force = y + answers @ force, point.tendons.force_jacobian
-        wide = (change @ step).reshape(stations, 3, 3)[:, 0]
-        size = np.sqrt((wide**2).sum(axis=1).max())
+        moved = (change @ step).reshape(stations, 3, 3)
+        size = np.sqrt((moved[:, 0] ** 2).sum(axis=1).max())
         if not np.isfinite(size):
             break
         share = min(1.0, longest_step / size) if size > 0.0 else 1.0
@@ -155,7 +151,7 @@ def tracked_touching(
         q, tension = q + share * step, tension + share * (force[:m] - tension)
         expected = point.strain + share * (step @ point.jacobian)
         point = point_at(body, q, pulling)
-        sections = rest + (change @ q).reshape(stations, 3, 3)
+        sections = sections + share * moved
         before = share * size
         reuse = not rough and before < _SHORT * longest_step
         if not rough and settled and size < near:
@@ -170,8 +166,8 @@ def tracked_touching(
                 lag, step, corrected, by_tension, held, settled = _corrected(
                     linear, touching, places, out, point, q, tension, force, sections
                 )
-                wide = (change @ step).reshape(stations, 3, 3)[:, 0]
-                shift = np.sqrt((wide**2).sum(axis=1).max())
+                moved = (change @ step).reshape(stations, 3, 3)
+                shift = np.sqrt((moved[:, 0] ** 2).sum(axis=1).max())
                 if not settled or not shift < _CONTRACTION * size:
                     break
                 force, size, way = corrected, shift, way + shift
@@ -180,9 +176,9 @@ def tracked_touching(
                 q, tension = q + step, force[:m].copy()
                 expected = point.strain + step @ point.jacobian
                 point = point_at(body, q, pulling)
-                sections = rest + (change @ q).reshape(stations, 3, 3)
+                sections = sections + moved
             converged = size < tolerance and (
-                way < touching.margin or unseen_depth(touching.scene, touching.surface, places, sections, tolerance) < tolerance
+                way < touching.margin or unseen_depth(touching.scene, touching.surface, places, sections, tolerance) <= tolerance
             )
         if of_law:
             expected = point.strain
@@ -199,11 +195,10 @@ def tracked_touching(
         point, expected = start, expected_first
         forget(kept)
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
-    touched = pressed_places(touching.scene, touching.surface, places, forces, sections)
-    return (
-        converged, point, expected, q, tension, displacement, compliance, answer, residual, places, forces, held, pressing,
-        touched,
-    )  # fmt: skip
+    if not converged:
+        places, forces, held = empty_places(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+    touched = pressed_places(touching.scene, touching.surface, places, forces, held, pressing, sections)
+    return converged, point, expected, q, tension, displacement, compliance, answer, residual, touched
 
 
 @njit(cache=True)

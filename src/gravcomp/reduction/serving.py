@@ -164,8 +164,8 @@ class ReducedServing:
             return
         q, strain = self._projected(state)
         self._tracker.place(q, state.tension, self._full.sliding)
-        if self._tracker.contact is not None:
-            self._tracker.contact.take_over(self.reduced.basis)
+        if self._tracker.contact is not None and state.touch is not None:
+            self._tracker.contact.take_over(state.touch, self.reduced.basis)
         own = self._tracked(gravity, cables, h, loads, iterations=_TO_AGREE)
         self._remember(q, strain, h)
         if h is not None and not self._uniform:
@@ -200,9 +200,7 @@ class ReducedServing:
 
     def _hand_over(self) -> None:
         """Set the full model to the reduced model's shape, and its memory to that before the present step."""
-        u, sliding = self.displacements, self._tracker.sliding
-        if self._tracker.contact is not None:
-            self._tracker.contact.hand_over()
+        u, sliding, contact = self.displacements, self._tracker.sliding, self._tracker.contact
         if self._creep is not None and self._uniform:
             assert isinstance(self._model.elements, SolidElements)
             self._creep.strain, self._creep.held = self._memory.at_points(self._model.elements, self.reduced.basis)
@@ -214,6 +212,7 @@ class ReducedServing:
             u=u,
             tension=self._tracker.state.tension.copy(),
             tendons=self._model.tendons.state(self._model.mesh.nodes + u, sliding.direction),
+            touch=None if contact is None else contact.hand_over(u),
         )
 
     def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> float:

@@ -155,15 +155,14 @@ class ReducedTracker:
         touching = self.contact.touching(state.q, gravity)
         longest = min(longest, touching.surface.radius.min())
         (
-            converged, self._point, self._expected, q, tension, displacement, compliance, answer, residual, places, forces, held,
-            by_tension, pressed,
+            converged, self._point, self._expected, q, tension, displacement, compliance, answer, residual, pressed,
         ) = tracked_touching(
             self._body, self._point, self._expected, state.q, state.tension, weight, wound, given, self.sliding.direction, scale,
             offset, self._kept, iterations, longest, min(longest, near), tolerance, calm, touching,
         )  # fmt: skip
         if not converged:
             return replace(state, residual=np.inf, converged=False)
-        self.contact.keep(touching, places, forces, held, by_tension, pressed)
+        self.contact.keep(touching, pressed)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 

@@ -63,7 +63,7 @@ def nearest(scene: SceneArrays, point: np.ndarray, normal: np.ndarray) -> tuple[
     return best, row
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def gap_to(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) -> float:
     """Return the gap in m between a point (3,) and row k of `scene`, and write its normal (3,), a unit vector into free space."""
     r = scene.rotation[k]
@@ -73,37 +73,43 @@ def gap_to(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) ->
         for i in range(3):
             normal[i] = r[i, 2]
         return r[0, 2] * x + r[1, 2] * y + r[2, 2] * z
-    own, here = np.empty(3), np.empty(3)
-    for i in range(3):
-        own[i] = r[0, i] * x + r[1, i] * y + r[2, i] * z
+    # In the obstacle's own frame; no arrays, which would take longer than the distance.
+    own_x = r[0, 0] * x + r[1, 0] * y + r[2, 0] * z
+    own_y = r[0, 1] * x + r[1, 1] * y + r[2, 1] * z
+    own_z = r[0, 2] * x + r[1, 2] * y + r[2, 2] * z
     if kind == SPHERE:
-        gap = scene.sign[k] * (_from_centre(own, here, scene.sign[k]) - scene.size[k, 0])
+        gap = scene.sign[k] * (_from_centre(own_x, own_y, own_z, normal, scene.sign[k]) - scene.size[k, 0])
     elif kind == BOX:
-        gap = _box(own, scene.size[k], here)
+        gap = _box(own_x, own_y, own_z, scene.size[k], normal)
     elif kind == TUBE:
-        gap = _tube(scene, k, own, here)
+        gap = _tube(
+            scene.curve, scene.samples, scene.first[k], scene.last[k], scene.sign[k], scene.closed[k], own_x, own_y, own_z, normal
+        )
     else:
-        gap = scene.sign[k] * surface_gap(scene.surface, scene.first[k], own, here)
+        gap = scene.sign[k] * surface_gap(scene.surface, scene.first[k], np.array([own_x, own_y, own_z]), normal)
         for i in range(3):
-            here[i] *= scene.sign[k]
+            normal[i] *= scene.sign[k]
+    here_x, here_y, here_z = normal[0], normal[1], normal[2]
     for i in range(3):
-        normal[i] = r[i, 0] * here[0] + r[i, 1] * here[1] + r[i, 2] * here[2]
+        normal[i] = r[i, 0] * here_x + r[i, 1] * here_y + r[i, 2] * here_z
     return gap
 
 
 @njit(cache=True)
-def _from_centre(own: np.ndarray, normal: np.ndarray, sign: float) -> float:
+def _from_centre(x: float, y: float, z: float, normal: np.ndarray, sign: float) -> float:
     """Return the distance (m) from the origin, and write sign times the direction from there; any direction at the origin."""
-    length = np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
-    for i in range(3):
-        normal[i] = sign * own[i] / length if length > 0.0 else (1.0 if i == 0 else 0.0)
+    length = np.sqrt(x * x + y * y + z * z)
+    if length > 0.0:
+        normal[0], normal[1], normal[2] = sign * x / length, sign * y / length, sign * z / length
+    else:
+        normal[0], normal[1], normal[2] = 1.0, 0.0, 0.0
     return length
 
 
 @njit(cache=True)
-def _box(own: np.ndarray, half: np.ndarray, normal: np.ndarray) -> float:
+def _box(x: float, y: float, z: float, half: np.ndarray, normal: np.ndarray) -> float:
     """Return the gap to a solid cuboid."""
-    outside, deepest, face = 0.0, -np.inf, 0
+    outside, deepest, face, own = 0.0, -np.inf, 0, (x, y, z)
     for i in range(3):
         beyond = abs(own[i]) - half[i]
         normal[i] = max(beyond, 0.0) * (1.0 if own[i] >= 0.0 else -1.0)
@@ -121,22 +127,24 @@ def _box(own: np.ndarray, half: np.ndarray, normal: np.ndarray) -> float:
 
 
 @njit(cache=True)
-def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> float:
-    """Return the gap to the wall of a tube."""
-    first, last, places = scene.first[k], scene.last[k], scene.samples.shape[1]
-    x, y, z = own[0], own[1], own[2]
+def _tube(
+    curve: np.ndarray, samples: np.ndarray, first: int, last: int, sign: float, closed: bool, x: float, y: float, z: float,
+    normal: np.ndarray,
+) -> float:  # fmt: skip
+    """Return the gap to the wall of a tube. Named tuples of arrays would be counted, each array twice, in every call."""
+    places = samples.shape[1]
     best, place = -np.inf, 0.0
     for piece in range(first, last):
         for s in range(places):
-            c = scene.samples[piece, s]
-            value = c[3] - np.sqrt((x - c[0]) ** 2 + (y - c[1]) ** 2 + (z - c[2]) ** 2)
+            dx, dy, dz = x - samples[piece, s, 0], y - samples[piece, s, 1], z - samples[piece, s, 2]
+            value = samples[piece, s, 3] - np.sqrt(dx * dx + dy * dy + dz * dz)
             if value > best:
                 best, place = value, piece + s / (places - 1)
     width = 1.0 / (places - 1)
     low, high = max(place - width, float(first)), min(place + width, float(last))
     t = place
     for _ in range(_NEWTON_STEPS):
-        _, slope, curvature, _ = _along(scene, last, t, x, y, z)
+        _, slope, curvature, _ = _along(curve, last, t, x, y, z)
         if slope > 0.0:
             low = t
         else:
@@ -147,45 +155,44 @@ def _tube(scene: SceneArrays, k: int, own: np.ndarray, normal: np.ndarray) -> fl
         change, t = abs(following - t), following
         if change < within:
             break
-    value, slope, _, d = _along(scene, last, t, x, y, z)
+    value, slope, _, d = _along(curve, last, t, x, y, z)
     length = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
-    if scene.sign[k] < 0.0:
-        end = (t <= first + 1e-12 and slope < 0.0) or (t >= last - 1e-12 and slope > 0.0 and not scene.closed[k])
+    if sign < 0.0:
+        end = (t <= first + 1e-12 and slope < 0.0) or (t >= last - 1e-12 and slope > 0.0 and not closed)
         if end:
-            beyond = _past_end(scene, last, t, t > 0.5 * (first + last), np.array(d), value + length, normal)
+            beyond = _past_end(curve, last, t, t > 0.5 * (first + last), np.array(d), value + length, normal)
             if beyond > 0.0:
                 return beyond
     for i in range(3):
-        normal[i] = scene.sign[k] * d[i] / length if length > 0.0 else 0.0
+        normal[i] = sign * d[i] / length if length > 0.0 else 0.0
     if length == 0.0:  # on the centre line every direction is as good
-        _across(scene, last, t, normal)
-    return -scene.sign[k] * value
+        _across(curve, last, t, normal)
+    return -sign * value
 
 
 @njit(cache=True)
 def _along(
-    scene: SceneArrays, last: int, t: float, x: float, y: float, z: float
+    a: np.ndarray, last: int, t: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, tuple[float, float, float]]:
-    """Return r - |x - c| and its first and second derivatives at the place t (piece + share), and d = x - c."""
+    """Return r - |x - c| and its first and second derivatives at the place t (piece + share) of the curve a, and d = x - c."""
     piece = min(int(t), last - 1)
     s = t - piece
-    a = scene.curve[piece]
     d = (
-        x - (((a[0, 0] * s + a[1, 0]) * s + a[2, 0]) * s + a[3, 0]),
-        y - (((a[0, 1] * s + a[1, 1]) * s + a[2, 1]) * s + a[3, 1]),
-        z - (((a[0, 2] * s + a[1, 2]) * s + a[2, 2]) * s + a[3, 2]),
+        x - (((a[piece, 0, 0] * s + a[piece, 1, 0]) * s + a[piece, 2, 0]) * s + a[piece, 3, 0]),
+        y - (((a[piece, 0, 1] * s + a[piece, 1, 1]) * s + a[piece, 2, 1]) * s + a[piece, 3, 1]),
+        z - (((a[piece, 0, 2] * s + a[piece, 1, 2]) * s + a[piece, 2, 2]) * s + a[piece, 3, 2]),
     )
     square, along, bend, moved = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        c1 = (3.0 * a[0, i] * s + 2.0 * a[1, i]) * s + a[2, i]
-        c2 = 6.0 * a[0, i] * s + 2.0 * a[1, i]
+        c1 = (3.0 * a[piece, 0, i] * s + 2.0 * a[piece, 1, i]) * s + a[piece, 2, i]
+        c2 = 6.0 * a[piece, 0, i] * s + 2.0 * a[piece, 1, i]
         square += d[i] * d[i]
         along += d[i] * c1
         bend += d[i] * c2
         moved += c1 * c1
-    r = ((a[0, 3] * s + a[1, 3]) * s + a[2, 3]) * s + a[3, 3]
-    r1 = (3.0 * a[0, 3] * s + 2.0 * a[1, 3]) * s + a[2, 3]
-    r2 = 6.0 * a[0, 3] * s + 2.0 * a[1, 3]
+    r = ((a[piece, 0, 3] * s + a[piece, 1, 3]) * s + a[piece, 2, 3]) * s + a[piece, 3, 3]
+    r1 = (3.0 * a[piece, 0, 3] * s + 2.0 * a[piece, 1, 3]) * s + a[piece, 2, 3]
+    r2 = 6.0 * a[piece, 0, 3] * s + 2.0 * a[piece, 1, 3]
     length = np.sqrt(square)
     if length < 1e-12:
         return r - length, r1, 0.0, d
@@ -193,13 +200,13 @@ def _along(
 
 
 @njit(cache=True)
-def _past_end(scene: SceneArrays, last: int, t: float, far: bool, d: np.ndarray, radius: float, normal: np.ndarray) -> float:
+def _past_end(curve: np.ndarray, last: int, t: float, far: bool, d: np.ndarray, radius: float, normal: np.ndarray) -> float:
     """Return the distance to the rim of an open end for a point beyond it, d (3,) from its centre, and write its direction.
 
     0 for a point that is not beyond.
     """
     tangent = np.empty(3)
-    _tangent(scene, last, t, tangent)
+    _tangent(curve, last, t, tangent)
     if not far:
         tangent *= -1.0
     axial = d[0] * tangent[0] + d[1] * tangent[1] + d[2] * tangent[2]
@@ -216,9 +223,9 @@ def _past_end(scene: SceneArrays, last: int, t: float, far: bool, d: np.ndarray,
 
 
 @njit(cache=True)
-def _tangent(scene: SceneArrays, last: int, t: float, tangent: np.ndarray) -> None:
+def _tangent(curve: np.ndarray, last: int, t: float, tangent: np.ndarray) -> None:
     piece = min(int(t), last - 1)
-    s, a = t - piece, scene.curve[piece]
+    s, a = t - piece, curve[piece]
     length = 0.0
     for i in range(3):
         tangent[i] = (3.0 * a[0, i] * s + 2.0 * a[1, i]) * s + a[2, i]
@@ -227,9 +234,9 @@ def _tangent(scene: SceneArrays, last: int, t: float, tangent: np.ndarray) -> No
 
 
 @njit(cache=True)
-def _across(scene: SceneArrays, last: int, t: float, normal: np.ndarray) -> None:
+def _across(curve: np.ndarray, last: int, t: float, normal: np.ndarray) -> None:
     """Write a unit vector (3,) across the curve at t."""
-    _tangent(scene, last, t, normal)
+    _tangent(curve, last, t, normal)
     least = int(np.argmin(np.abs(normal)))
     share = normal[least]
     for i in range(3):

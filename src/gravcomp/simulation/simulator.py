@@ -144,14 +144,15 @@ class Simulator:
         if shape is not None:
             self._pace.found(gravity, cables)
             return shape
-        before = self.solver.state
+        before, sliding = self.solver.state, self.solver.sliding
         self.solver.viscous = None if h is None else self._creep.step(h)
         state = self.solver.track(gravity, cables, loads=loads)
         if not state.converged:
             # More iterations find an equilibrium that is near; if the tangent is not positive definite, none is.
             state = self.solver.track(gravity, cables, iterations=_MORE_ITERATIONS, stable=True, loads=loads)
         if not state.converged and self._searches and self._pace.may_search(gravity, cables):
-            last, self.solver.state = self._pace.last_gravity, before
+            last = self._pace.last_gravity
+            self.solver.state, self.solver.sliding = before, sliding
             if last is not None and loads is None:
                 state = self.solver.approach(last, gravity, cables)
             if not state.converged:
@@ -161,7 +162,7 @@ class Simulator:
         if state.converged:
             self._pace.found(gravity, cables)
         else:
-            self.solver.state = before
+            self.solver.state, self.solver.sliding = before, sliding
         self._remember(self.solver.state.u, h)
         shape = self._shape(state, gravity, started)
         if not self._serving:
@@ -245,16 +246,16 @@ class Simulator:
             residual=state.residual,
             solve_time=time.perf_counter() - started,
             status=ShapeStatus.OK if state.converged else ShapeStatus.NOT_CONVERGED,
-            message=beyond_range(self.model, state.u) if state.converged else self._reason(state),
-            contacts=Contacts.none() if self.solver.contact is None else self.solver.contact.contacts(state.u),
+            message=beyond_range(self.model, state.u) if state.converged else self._reason(state, gravity),
+            contacts=Contacts.none() if self.solver.contact is None else self.solver.contact.contacts(state),
         )
 
-    def _reason(self, state: Equilibrium) -> str:
-        """Return the reason why no equilibrium was found, as a sentence."""
+    def _reason(self, state: Equilibrium, gravity: np.ndarray) -> str:
+        """Return the reason why no equilibrium was found under gravity (3,), as a sentence."""
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
         message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
-        narrow = "" if self.solver.contact is None else self.solver.contact.squeezed(state.u)
+        narrow = "" if self.solver.contact is None else self.solver.contact.squeezed(state.u, gravity)
         return f"{message}: {narrow or beyond_range(self.model, state.u) or _LIMIT_POINT}"
 
 

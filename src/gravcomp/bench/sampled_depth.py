@@ -1,0 +1,29 @@
+"""How deep a robot is in obstacles, at points all over its surface: it checks the places that the model of contact finds."""
+
+import numpy as np
+
+from gravcomp.full_model.contact import FullContact
+
+_AROUND = 180  # points of an outline: between them a round one is deeper by 0.02 % of its radius
+
+
+def sampled_depth(contact: FullContact, u: np.ndarray) -> float:
+    """Return in m how deep the surface is in an obstacle at the displacements u (n, 3), 0 outside.
+
+    Round outlines are looked at in the stations and in the middle between them, where these are a cubic through four of them;
+    others in the stations only. The tip's face is not looked at within its rim.
+    """
+    stations, surface = contact.sections(u), contact.surface
+    between = (9.0 * (stations[1:-2] + stations[2:-1]) - stations[:-3] - stations[3:]) / 16.0
+    sections = np.concatenate([stations, between])
+    radius = np.concatenate([surface.radius, 0.5 * (surface.radius[1:-2] + surface.radius[2:-1])])
+    gap = contact.scene.nearest(sections[:, 0], contact.arrays)[0]
+    near = np.flatnonzero(gap < radius)
+    if surface.outline.shape[1]:
+        near = near[near < len(stations)]
+        own = surface.outline[near]
+    else:
+        angle = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+        own = radius[near, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = sections[near, None, 0] + own @ sections[near, 1:]
+    return max(0.0, -float(contact.scene.nearest(points, contact.arrays)[0].min(initial=0.0)))
