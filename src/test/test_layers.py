@@ -28,7 +28,9 @@ def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path
 
 
 class MadeUp(mesh_choice._Tips):
-    """Tips that are made up: `size` is the change from one mesh to another. Nothing is meshed."""
+    """Tips that are made up: `size` is the change from one mesh to another. Nothing is meshed, and no work is counted."""
+
+    work = 0.0
 
     def __init__(self, robot, start):
         self._robot = robot
@@ -39,6 +41,9 @@ class MadeUp(mesh_choice._Tips):
 
     def cost(self, elements):
         return self.unknowns(elements)
+
+    def work_of(self, elements):
+        return 0.0
 
     def finer(self, elements, direction):
         finer = mesh_choice._finer(self._robot, elements, direction)
