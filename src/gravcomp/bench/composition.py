@@ -16,7 +16,8 @@ from gravcomp.evaluation.bus_delay import delays_during
 from gravcomp.launcher.virtual_graph import RunningGraph
 
 _FEWEST = 5  # pairs
-_NARROW = 5.0  # percentage points on both sides: the ratio is known
+# The ratio is known within so many percentage points on both sides, or so large a part of itself.
+_NARROW, _CLEAR = 5.0, 0.2
 
 
 class Ratio(NamedTuple):
@@ -27,8 +28,8 @@ class Ratio(NamedTuple):
 
     @property
     def is_known(self) -> bool:
-        """Whether the interval is narrow."""
-        return self.within <= _NARROW
+        """Whether the interval is narrow, in percentage points or against the ratio."""
+        return self.within <= max(_NARROW, _CLEAR * self.less)
 
 
 def ratio(apart: Sequence[float], together: Sequence[float]) -> Ratio:
