@@ -168,7 +168,7 @@ def empty_places(count: int) -> Places:
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _write_place(
     scene: SceneArrays, surface: ContactSurface, sections: np.ndarray, gap: np.ndarray, own: np.ndarray, normal: np.ndarray,
     k: int, s: int, result: Places, i: int,
@@ -213,7 +213,7 @@ def _write_place(
     _write_frame(scene, surface, section, here, best, there, result, i)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _write_frame(
     scene: SceneArrays, surface: ContactSurface, section: np.ndarray, own: np.ndarray, gap: float, normal: np.ndarray,
     result: Places, i: int,
