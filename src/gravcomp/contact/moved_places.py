@@ -5,7 +5,7 @@ from numba import njit
 
 from gravcomp.contact.outline_gap import deepest, deepest_from
 from gravcomp.contact.places import Places, write_tangents
-from gravcomp.contact.surface import ContactSurface
+from gravcomp.contact.surface import ContactSurface, size_and_way
 from gravcomp.scene.distance import SceneArrays, gap_to
 
 
@@ -54,13 +54,8 @@ def unseen_depth(scene: SceneArrays, surface: ContactSurface, places: Places, se
     for k in range(rows):
         middle = -np.inf  # a bound: a gap changes by no more than the way
         for s in range(stations):
-            one = two = square = 0.0
-            for j in range(3):
-                one += sections[s, 1, j] ** 2
-                two += sections[s, 2, j] ** 2
-                square += (sections[s, 0, j] - sections[max(s - 1, 0), 0, j]) ** 2
-            size = np.sqrt(max(one, two)) * surface.radius[s]
-            middle -= np.sqrt(square)
+            size, way = size_and_way(surface, sections, s)
+            middle -= way
             if seen[k, s] or middle - size > -allowed:
                 continue
             middle = gap_to(scene, k, sections[s, 0], normal)

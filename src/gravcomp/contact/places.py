@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from gravcomp.contact.outline_gap import deepest, deepest_from
-from gravcomp.contact.surface import ContactSurface
+from gravcomp.contact.surface import ContactSurface, size_and_way
 from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
 
 _MOVES, _THERE = 8, 1e-7  # corrections of the place along the robot, and the part of a distance of stations that ends them
@@ -63,13 +63,7 @@ def all_gaps(
     stations = len(surface.place)
     gap, way, size = np.empty((len(scene.kind), stations)), np.zeros(stations), np.empty(stations)
     for s in range(stations):
-        one = two = square = 0.0
-        for j in range(3):
-            one += sections[s, 1, j] ** 2
-            two += sections[s, 2, j] ** 2
-            square += (sections[s, 0, j] - sections[max(s - 1, 0), 0, j]) ** 2
-        size[s] = np.sqrt(max(one, two)) * surface.radius[s]
-        way[s] = np.sqrt(square)
+        size[s], way[s] = size_and_way(surface, sections, s)
     far = reach.max() + 2.0 * way.max() + size.max() - size.min()
     for k in range(len(scene.kind)):
         middle = -np.inf

@@ -8,6 +8,7 @@ The tip's face is flat. So that it can lie on a wall ahead, points of its rim ca
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from gravcomp.description import Robot
 
@@ -53,3 +54,14 @@ def contact_surface(robot: Robot) -> ContactSurface:
         return ContactSurface(place, length, size, np.zeros((count, 0, 2)), rim)
     angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
     return ContactSurface(place, length, size, np.array([outline.boundary(angle) for outline in outlines]), rim)
+
+
+@njit(cache=True)
+def size_and_way(surface: ContactSurface, sections: np.ndarray, s: int) -> tuple[float, float]:
+    """Return the largest radius of station s at `sections` (s, 3, 3), and the way from the station before, 0 for the first; m."""
+    one = two = square = 0.0
+    for j in range(3):
+        one += sections[s, 1, j] ** 2
+        two += sections[s, 2, j] ** 2
+        square += (sections[s, 0, j] - sections[max(s - 1, 0), 0, j]) ** 2
+    return np.sqrt(max(one, two)) * surface.radius[s], np.sqrt(square)
