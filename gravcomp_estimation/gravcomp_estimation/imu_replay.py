@@ -1,13 +1,16 @@
 """Node imu_replay: publishes the IMU samples of a recording, in real time or faster, with /clock.
 
 The samples are published reliably and with unlimited history. A subscriber with the same QoS, such as imu_estimator, receives
-every sample; a slow one delays the replay.
+every sample; a slow one delays the replay. With `exit_at_end` it follows the gravity of an estimator and ends after that of the
+last sample: a sample that has arrived is not yet processed.
 """
 
 import time
 
 import numpy as np
+from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node.managed_node import OK
+from gravcomp_node.qos import SENSOR
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -27,6 +30,8 @@ TICK = 0.002  # s
 LONGEST_TICK = 0.05  # s of publishing before signals and services are handled
 # Discovery may be wrong about a subscriber that has just appeared, and connecting takes time.
 SETTLE = 1.0  # s
+# After the last sample or its gravity: for what subscribers still process; and the longest pause between two gravities before.
+LAST, LONGEST_PAUSE = 1.0, 10.0  # s
 CLOCK_QOS = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=1)
 # ROS interprets time 0 as 'not set', so a recording without absolute times starts at 1 s.
 EARLIEST_NS = 1_000_000_000
@@ -63,6 +68,10 @@ class ImuReplay(ManagedNode):
         self._imu = self.create_publisher(Imu, "imu/data_raw", LOSSLESS)
         self._temperature = self.create_publisher(Temperature, "imu/temperature", LOSSLESS)
         self._clock_publisher = self.create_publisher(ClockMessage, "/clock", CLOCK_QOS) if parameters.clock else None
+        self._last_sample_ns = int(self._stamps[self._places >= 0][-1])
+        self._estimated = (
+            self.create_subscription(Vector3Stamped, "gravity", self._follow, SENSOR) if parameters.exit_at_end else None
+        )
 
     def activate(self) -> None:
         """Start waiting for subscribers."""
@@ -72,6 +81,8 @@ class ImuReplay(ManagedNode):
         self._waiting_since = time.monotonic()
         self._complete_since: float | None = None
         self._ended: float | None = None
+        self._followed_at = 0.0  # monotonic, s: the last gravity came
+        self._followed_ns: int | None = None  # its stamp
         self._timer = self.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.report(OK, f"waiting for a subscriber of {self._imu.topic_name}")
 
@@ -80,7 +91,9 @@ class ImuReplay(ManagedNode):
         self.destroy_timer(self._timer)
 
     def cleanup(self) -> None:
-        """Destroy the publishers."""
+        """Destroy publishers and subscription."""
+        if self._estimated is not None:
+            self.destroy_subscription(self._estimated)
         for publisher in (self._imu, self._temperature, self._clock_publisher):
             if publisher is not None:
                 self.destroy_publisher(publisher)
@@ -89,7 +102,9 @@ class ImuReplay(ManagedNode):
         now = time.monotonic()
         if self._ended is not None:
             # The subscribers may still process the last samples.
-            if self.parameters.exit_at_end and now - self._ended > 1.0:
+            awaited = self._followed_ns is not None and self._followed_ns < self._last_sample_ns
+            quiet = now - max(self._ended, self._followed_at)
+            if self.parameters.exit_at_end and quiet > (LONGEST_PAUSE if awaited else LAST):
                 self.finished = True
             return
         if self._begin is None:
@@ -119,6 +134,12 @@ class ImuReplay(ManagedNode):
         self._ended = time.monotonic()
         self.get_logger().info("the recording has ended")
         self.report(OK, "the recording has ended")
+
+    def _follow(self, message: Vector3Stamped) -> None:
+        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        # Gravity that another source goes on to publish does not delay the end.
+        if self._followed_ns is None or self._followed_ns < min(stamp, self._last_sample_ns):
+            self._followed_at, self._followed_ns = time.monotonic(), stamp
 
     def _is_complete(self) -> bool:
         """Return whether a reliable subscriber exists and every node in `wait_for` is active."""
