@@ -10,7 +10,6 @@ import time
 import numpy as np
 from geometry_msgs.msg import Vector3Stamped
 from gravcomp_node.managed_node import OK
-from gravcomp_node.qos import SENSOR
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -24,7 +23,7 @@ from gravcomp.graph.parameters.imu_replay import ImuReplayParameters
 from gravcomp.recordings.imu import read_recording
 from gravcomp_estimation import messages
 from gravcomp_estimation.stream import LOSSLESS
-from gravcomp_node import ManagedNode, run
+from gravcomp_node import SENSOR, ManagedNode, run
 
 TICK = 0.002  # s
 LONGEST_TICK = 0.05  # s of publishing before signals and services are handled

@@ -4,6 +4,7 @@ from array import array
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray, Vector3
+from gravcomp_node.array_fields import doubles
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
@@ -182,13 +183,6 @@ def pose_target(pose: Pose, position_weight: float, direction_weight: float) -> 
         tip_direction=Rotation.from_quat(q).apply((0.0, 0.0, 1.0)),
         tip_direction_weight=direction_weight,
     )
-
-
-def doubles(values: np.ndarray) -> array:
-    """Return values for a float64[] field, which takes an array.array 100 times faster than a list, as it checks no elements."""
-    result = array("d")
-    result.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
-    return result
 
 
 def _matrix(field: array | np.ndarray, rows: int, columns: int, name: str) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from gravcomp_node.array_fields import doubles
 from gravcomp_node.polled import Polled
 from rclpy.lifecycle import LifecycleNode
 from sensor_msgs.msg import JointState
@@ -23,7 +24,7 @@ from gravcomp.load_estimation import AnchoredProcess, LoadEstimate, LoadObserver
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.scene.scene import Scene
 from gravcomp.simulation import DynamicSimulator, Shape, Simulator
-from gravcomp_fem.conversion import doubles, seconds, vector_of
+from gravcomp_fem.conversion import seconds, vector_of
 from gravcomp_msgs.msg import WrenchEstimate
 from gravcomp_node import SENSOR
 

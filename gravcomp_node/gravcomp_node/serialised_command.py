@@ -5,7 +5,6 @@ convert it and to make it again from what arrives as the middleware does to carr
 """
 
 import struct
-from array import array
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from std_msgs.msg import Header
 
 from gravcomp_msgs.msg import CableCommand
 from gravcomp_node import cdr
+from gravcomp_node.array_fields import doubles
 
 _COUNT = struct.Struct("<I")
 
@@ -28,9 +28,7 @@ class PublishedCommand:
 
     def message(self) -> CableCommand:
         """Return the message."""
-        fields = (array("d", np.asarray(values, float).tobytes()) for values in (self.displacement, self.tension))
-        displacement, tension = fields
-        return CableCommand(header=self.header, displacement=displacement, tension=tension)
+        return CableCommand(header=self.header, displacement=doubles(self.displacement), tension=doubles(self.tension))
 
     def serialised(self) -> bytes:
         """Return the message, serialised."""

@@ -182,7 +182,7 @@ NODES = (
         "gravcomp_estimation", "imu_replay", "plays the IMU samples of a recording at their own times",
         f"{_PARAMETERS}.imu_replay:ImuReplayParameters",
         subscribes=(
-            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "it ends after the last sample's (exit_at_end)", optional=True),
+            Port("gravity", "geometry_msgs/msg/Vector3Stamped", "that of the last sample ends it (exit_at_end)", optional=True),
         ),
         publishes=(
             Port("imu/data_raw", "sensor_msgs/msg/Imu", "specific force (m/s^2) and angular rate (rad/s) in imu_link"),

@@ -19,7 +19,7 @@ class ImuReplayParameters:
         read_only=True,
     )
     loop: bool = parameter(False, description="start again at the end, with increasing stamps", read_only=True)
-    exit_at_end: bool = parameter(True, description="end the process after the last sample", read_only=True)
+    exit_at_end: bool = parameter(True, description="end the process after the gravity of the last sample", read_only=True)
     wait_for_subscribers: float = parameter(
         10.0,
         unit="s",
