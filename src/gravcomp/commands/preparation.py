@@ -57,7 +57,7 @@ def compile_parts(parts: tuple[str, ...]) -> None:
     processes = compilation.start(missing)
     try:
         what = ", ".join(part.replace("_", " ") for part in missing)
-        text = f"compiling, once for this machine (about a minute): {what}"
+        text = f"compiling, once for this machine (a minute or two): {what}"
         if not output.console().is_terminal:
             output.note(text)  # there a status is not shown
         with output.console().status(text):
