@@ -93,8 +93,11 @@ class Ros2:
         return self._node.get_subscriptions_info_by_topic(topic)
 
     def names(self) -> list[str]:
-        """Return the names of the nodes in the graph."""
-        return self._node.get_node_names()
+        """Return the full names of the nodes in the graph.
+
+        A node that has ended may stay among them: rmw takes a last report of its endpoints that comes after its end for a node.
+        """
+        return [f"{space.rstrip('/')}/{name}" for name, space in self._node.get_node_names_and_namespaces()]
 
     def _call(self, kind: str, name: str, content: str = "{}") -> object:
         service = _interface(kind)

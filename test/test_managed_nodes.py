@@ -152,22 +152,22 @@ def test_a_node_ends_without_error_messages(start, observer, tmp_path):
 
 
 def test_a_node_waits_at_its_gate_and_can_be_ended_there(start, observer):
-    def gated(name: str) -> NodeProcess:
-        process = NodeProcess(NodeSpec("gravcomp_estimation", "imu_estimator"), start.folder / f"{name}.log", gated=True)
+    def gated(namespace: str) -> NodeProcess:
+        spec = NodeSpec("gravcomp_estimation", "imu_estimator", namespace=namespace)
+        process = NodeProcess(spec, start.folder / "imu_estimator.log", gated=True)
         start.processes.append(process)
-        observer.until(lambda: "imu_estimator" in observer.names(), "it does not start")
+        observer.until(lambda: f"{namespace}/imu_estimator" in observer.names(), "it does not start")
         end = time.monotonic() + 0.5
         observer.until(lambda: time.monotonic() > end, "")
         assert process.exit_code is None and not process.was_active
         return process
 
-    process = gated("opened")
+    process = gated("/opened")
     process.open_gate()
-    assert observer.state_of("/imu_estimator") == "active"
+    assert observer.state_of("/opened/imu_estimator") == "active"
     observer.until(lambda: process.was_active, "it does not note that it is active")
     process.stop()
-    observer.until(lambda: "imu_estimator" not in observer.names(), "it does not end")
-    process = gated("ended")
+    process = gated("/ended")
     process.signal(signal.SIGINT)  # as by the kernel when the launcher ends
     observer.until(lambda: process.exit_code is not None, "it waits for ever")
     assert process.exit_code == 0 and not process.was_active

@@ -60,7 +60,7 @@ def node():
     graph = Ros2()
     process = subprocess.Popen(["ros2", "run", "gravcomp_estimation", "imu_estimator"], start_new_session=True)
     try:
-        graph.until(lambda: "imu_estimator" in graph.names() and graph.state_of("/imu_estimator") == "active", "no active node")
+        graph.until(lambda: "/imu_estimator" in graph.names() and graph.state_of("/imu_estimator") == "active", "no active node")
         yield process
     finally:
         graph.close()
