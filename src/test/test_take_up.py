@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from virtual_article import article, given
 
+from gravcomp.bench.joint_campaign import with_joints
 from gravcomp.canbus import c610, codec
+from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.description.hardware import Hardware
+from gravcomp.description.joint_motors import COMMANDS
 from gravcomp.motors.bridge import Bridge
 from gravcomp.motors.take_up import TakeUp
 from gravcomp.virtual.draw import draw
@@ -19,19 +22,27 @@ RESTS = 4e-6  # m, within which a position loop is at rest: 37.5 counts
 
 
 class Rig:
-    """Bridge and virtual motors whose cables pull `SPRING` from the displacement 0 on."""
+    """Bridge and virtual motors whose cables pull `SPRING` from the displacement 0 on.
 
-    def __init__(self, backlash_deg: float = 0.6, **drive: float):
+    joints: how the motors are commanded, where they are joints of a ros2_control robot.
+    """
+
+    def __init__(self, backlash_deg: float = 0.6, joints: str | None = None, **drive: float):
         robot, hardware = article()
         self.hardware: Hardware = dataclasses.replace(hardware, drive=dataclasses.replace(hardware.drive, **drive))
         parameters = given()
         motors = dataclasses.replace(parameters.motors, backlash=math.radians(backlash_deg), capstan_radius=0.005)
         true = draw(dataclasses.replace(parameters, motors=motors), robot, hardware).motors
         self.motors = MotorBank(true, hardware, np.zeros(6), np.random.default_rng(1))
-        self.bridge = Bridge(self.hardware, require_imu=False)
+        self.motor_bridge: Bridge | BridgedJoints
+        if joints is None:
+            self.bridge = self.motor_bridge = Bridge(self.hardware, require_imu=False)
+        else:
+            self.motor_bridge = BridgedJoints(with_joints(self.hardware, joints))
+            self.bridge = self.motor_bridge.bridge
         self.now, self._step, self.frames = 0.0, 0, []
-        self.bridge.configure()
-        self.bridge.activate(0.0)
+        self.motor_bridge.configure()
+        self.motor_bridge.activate(0.0)
         self.run(0.4, np.zeros(6))
 
     def run(self, duration: float, command) -> np.ndarray:
@@ -41,12 +52,12 @@ class Rig:
             self._step, self.now = self._step + 1, self.now + 0.002
             self.motors.step(round(0.002 / TICK), np.zeros(6), SPRING)
             for motor, values in zip(self.hardware.motors, self.motors.feedback()):
-                self.bridge.on_frame(c610.feedback(motor.can_id, **values), self.now)
+                self.motor_bridge.on_frame(c610.feedback(motor.can_id, **values), self.now)
             if self._step % 5 == 0:
                 wanted = command(self.now - begin) if callable(command) else command
-                self.bridge.command(list(wanted), [0.0] * 6, self.now)
+                self.motor_bridge.command(list(wanted), [0.0] * 6, self.now)
             if self._step % 2 == 0:
-                self._deliver(self.bridge.tick(self.now))
+                self._deliver(self.motor_bridge.tick(self.now))
             rotors.append(self.bridge.snapshot().displacement)
         return np.array(rotors)
 
@@ -66,6 +77,14 @@ class Rig:
 @pytest.mark.parametrize("backlash_deg", [0.4, 0.6, 0.8])
 def test_a_cable_that_was_paid_out_has_the_commanded_length_whatever_the_backlash_is(backlash_deg):
     rig = Rig(backlash_deg)
+    rig.move(0.0, 6e-4, 0.0)
+    rig.move(6e-4, 3e-4, 1.0)
+    assert np.abs(rig.motors.wound - 3e-4).max() < 2 * RESTS
+
+
+@pytest.mark.parametrize("joints", COMMANDS)
+def test_so_has_one_on_a_joint_of_any_controller(joints):
+    rig = Rig(joints=joints)
     rig.move(0.0, 6e-4, 0.0)
     rig.move(6e-4, 3e-4, 1.0)
     assert np.abs(rig.motors.wound - 3e-4).max() < 2 * RESTS

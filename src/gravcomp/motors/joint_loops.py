@@ -6,21 +6,27 @@
 A controller of efforts keeps the last one. So the loops of efforts become softer as the measured states become older and the
 messages to the controller rarer (`loop_delay`). Of an effort that answers an old state, or that stays for long, the force that
 the model expects is left, under which a robot of springs comes to rest by itself.
+
+The backlash is taken up as over CAN (`take_up`), but by the way of the setpoints: joint states may be late, and how exactly a
+controller comes to rest is not known.
 """
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
 from gravcomp.description.hardware import Drive, Watchdog
 from gravcomp.motors.joint_states import JointStates
-from gravcomp.motors.loop import PositionLoop
+from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.loop_delay import LoopDelay
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.setpoint import Setpoint
+from gravcomp.motors.take_up import TakeUp
 
 _AWAY = 0.1  # of the following error, at rest away from the setpoint
 _AWAY_TIME = 4.0  # stall times
+_STAY = 1.0 / 3.0  # of the take-up's time, in which a joint comes to where its setpoint already is
 
 
 class JointLoops:
@@ -40,6 +46,7 @@ class JointLoops:
         self._setpoints = [Setpoint(drive.acceleration_limit) for drive in drives]
         self._loops = [PositionLoop(drive, two_way=not alone) for drive, alone in zip(drives, pays_out)]
         self._monitors = [MotorMonitor(drive, watchdog) for drive in drives]
+        self._take_up: list[TakeUp | None] = [None] * len(drives)
         self._away = [0.0] * len(drives)  # s, for which each joint has been at rest away from its setpoint
         self.target, self._tension = [0.0] * len(drives), [0.0] * len(drives)
         self._resting = True
@@ -62,6 +69,17 @@ class JointLoops:
             loop.reset(displacement)
         for monitor in self._monitors:
             monitor.reset()
+        # The limits count from here on, when the zero positions are known. Antagonists are on both flanks of their gear.
+        self._take_up = [
+            TakeUp(
+                dataclasses.replace(drive, displacement_min=low),
+                REST_COUNTS * drive.travel_per_count,
+                _STAY * drive.take_up_time,
+            )
+            if alone
+            else None
+            for drive, alone, (low, _) in zip(self._drives, self._pays_out, self.limits())
+        ]
         self._away = [0.0] * len(self._away)
 
     def follow(self, displacement: Sequence[float], tension: Sequence[float]) -> None:
@@ -71,7 +89,10 @@ class JointLoops:
 
     def hold(self) -> None:
         """Keep the cables where their setpoints are now; the expected tensions stay."""
-        self.target = self._positions()
+        self.target = [
+            target if take_up is not None and take_up.moves else position
+            for target, take_up, position in zip(self.target, self._take_up, self._positions())
+        ]
 
     def pay_out(self) -> None:
         """Move all cables to the smallest displacement; motors with antagonists go to zero, where no cable is pulled in."""
@@ -96,25 +117,26 @@ class JointLoops:
             return [0.0] * len(self.target)
         if self.arrived:
             return None
-        return self._angles(dt)
+        return self._angles(self.target, [None] * len(self.target), dt)
 
     def drive(self, now: float, dt: float) -> tuple[list[float], str | None]:
         """Return what the controller is sent in a control period of `dt` s, and the fault of a motor, or None."""
         displacement, velocity, force = self._states.displacement(), self._states.velocity(), self._states.force()
         seen = self._states.times()
+        goals, limits = self._goals(displacement, dt)
         if self._by_effort:
             for loop, delay, measured in zip(self._loops, self.delays, seen):
                 loop.softness = delay.update(now, measured)
             wanted = [
-                loop.step(target, tension, x, v, dt)
-                for loop, target, tension, x, v in zip(self._loops, self.target, self._tension, displacement, velocity)
+                loop.step(goal, tension, x, v, dt, limit)
+                for loop, goal, limit, tension, x, v in zip(self._loops, goals, limits, self._tension, displacement, velocity)
             ]
             output = [
                 self._states.effort(i, current * drive.tension_per_ampere)
                 for i, (current, drive) in enumerate(zip(wanted, self._drives))
             ]
         else:
-            output = self._angles(dt)
+            output = self._angles(goals, limits, dt)
             wanted = [0.0 if f is None else f / drive.tension_per_ampere for f, drive in zip(force, self._drives)]
         for i, (x, v, setpoint) in enumerate(zip(displacement, velocity, self._positions())):
             fault = self._monitors[i].update(seen[i], wanted[i], v, setpoint - x) or self._left_behind(i, dt, setpoint - x, v)
@@ -125,10 +147,19 @@ class JointLoops:
     def _positions(self) -> list[float]:
         return [part.setpoint for part in self._loops] if self._by_effort else [part.position for part in self._setpoints]
 
-    def _angles(self, dt: float) -> list[float]:
+    def _goals(self, displacement: Sequence[float], dt: float) -> tuple[list[float], list[float | None]]:
+        """Return where each motor goes now on its way to its target (m), and how fast at most (m/s; None: the drive's limit)."""
+        goals = list(self.target)
+        limits: list[float | None] = [None] * len(goals)
+        for i, (take_up, position) in enumerate(zip(self._take_up, self._positions())):
+            if take_up is not None:
+                goals[i], limits[i] = take_up.step(self.target[i], displacement[i], dt, position)
+        return goals, limits
+
+    def _angles(self, goals: Sequence[float], limits: Sequence[float | None], dt: float) -> list[float]:
         result = []
-        for setpoint, target, drive, scale in zip(self._setpoints, self.target, self._drives, self._states.scales):
-            setpoint.advance(target, drive.velocity_limit, dt)
+        for setpoint, goal, limit, drive, scale in zip(self._setpoints, goals, limits, self._drives, self._states.scales):
+            setpoint.advance(goal, drive.velocity_limit if limit is None else limit, dt)
             result.append(scale.angle(setpoint.position))
         return result
 

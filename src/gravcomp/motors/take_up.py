@@ -38,12 +38,16 @@ class _Phase(enum.Enum):
 class TakeUp:
     """Takes up the backlash of one motor that only pulls."""
 
-    def __init__(self, drive: Drive, rest_error: float):
-        """rest_error: distance in m from its target at which the position loop is at rest."""
+    def __init__(self, drive: Drive, rest_error: float, stay: float = 0.0):
+        """rest_error: distance in m from its target at which the position loop is at rest.
+
+        stay: time in s for which the motor stays out before it winds in.
+        """
         play = drive.backlash * drive.capstan_radius
         self._width, self._least = (1.0 + _SPREAD) * play, _LEAST * play
         self._over = self._width + 2.0 * rest_error
         self._rest_error, self._farthest, self._time = rest_error, drive.displacement_min, drive.take_up_time
+        self._stay = stay
         self._acts = self._time > 0.0 and self._least > rest_error
         self._speed = min(drive.velocity_limit, self._over / (_WAY * self._time)) if self._acts else drive.velocity_limit
         self.reset()
@@ -53,7 +57,7 @@ class TakeUp:
         self._loose = 0.0
         self._last: float | None = None  # displacement
         self._kept: float | None = None  # target that stays, for `_since` s
-        self._phase, self._since, self._done = _Phase.NONE, 0.0, False
+        self._phase, self._since, self._out, self._done = _Phase.NONE, 0.0, 0.0, False
         self._rest = self._time  # s, after which a target that stays is at rest
 
     @property
@@ -61,10 +65,11 @@ class TakeUp:
         """Whether the motor takes up the backlash now."""
         return self._phase is not _Phase.NONE
 
-    def step(self, target: float, displacement: float, dt: float) -> tuple[float, float | None]:
+    def step(self, target: float, displacement: float, dt: float, setpoint: float | None = None) -> tuple[float, float | None]:
         """Return where the motor goes now on its way to `target`, in m, and how fast at most in m/s; None: as fast as it may.
 
-        displacement (m) is that of the rotor, `dt` (s) the time since the last step.
+        displacement (m) is that of the rotor, `dt` (s) the time since the last step. setpoint: that of a rotor (m) of which it is
+        not known how exactly it comes to rest; the motor is then out, and back, when its setpoint is.
         """
         if not self._acts:
             return target, None
@@ -76,11 +81,13 @@ class TakeUp:
             self._phase, self._kept, self._since, self._done = _Phase.NONE, target, 0.0, False
         self._since += dt
         if self._phase is _Phase.NONE and self._is_due(target):
-            self._phase, self._done = _Phase.OUT, True
+            self._phase, self._out, self._done = _Phase.OUT, 0.0, True
+        place = displacement if setpoint is None else setpoint
         outward = max(target - self._over, self._farthest)  # the target may tremble after the take-up has begun
-        if self._phase is _Phase.OUT and displacement <= outward + self._rest_error:
-            self._phase = _Phase.IN
-        if self._phase is _Phase.IN and displacement >= target - self._rest_error:
+        if self._phase is _Phase.OUT and place <= outward + self._rest_error:
+            self._out += dt
+            self._phase = _Phase.IN if self._out > self._stay else _Phase.OUT
+        if self._phase is _Phase.IN and place >= target - self._rest_error:
             self._phase = _Phase.NONE
         if self._phase is _Phase.OUT:
             return outward, None
