@@ -174,7 +174,7 @@ def test_the_recording_itself_is_not_changed(tmp_path, store, definitions):
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(b"", "nothing in it can be read"), (b"not a bag at all" * 100, "nothing in it can be read")],
+    [(b"", r"is empty: bag\.mcap has 0 bytes"), (b"not a bag at all" * 100, "nothing in it can be read")],
 )
 def test_a_file_that_is_no_bag_is_refused_with_the_reason(tmp_path, content, sentence):
     (tmp_path / "bag").mkdir()

@@ -196,7 +196,7 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
   }
   const bool with_bias = s->bias_estimation > 0.0f;
   const float walk = filter->temperature_stable ? s->bias_walk_stable : s->bias_walk;
-  // The velocity is a sum of samples: it has the noise that they have beside that of the data sheet.
+  // The velocity is a sum of samples: it has their noise where that is more than the data sheet says.
   const float force_noise = step->accel_usable
                                 ? gc_max(squared(s->accel_noise), gc_vibration_density(state->vibration, GC_FORCE_MEANS))
                                 : squared(GC_UNKNOWN_ACCEL_NOISE);

@@ -305,7 +305,7 @@ class OrientationFilter:
         if not gyro_usable:
             tilt += (STUCK_RATE_NOISE if self._contradicted else SATURATED_RATE_NOISE) ** 2 * dt
         walk = options.bias_walk_stable if self.temperature_stable else options.bias_walk
-        # The velocity is a sum of samples: it has the noise that they have beside that of the data sheet.
+        # The velocity is a sum of samples: it has their noise where that is more than the data sheet says.
         force_noise = max(options.accel_noise**2, self._vibration.density) if accel_usable else UNKNOWN_ACCEL_NOISE**2
         self._errors.predict(
             dt,

@@ -56,6 +56,8 @@ def readable(path: str | Path, progress: Callable[[float], None] | None = None) 
     files = [path] if path.is_file() else sorted([*path.glob("*.mcap"), *path.glob("*.db3")])
     if not files:
         raise BagError(f"{path}: is not a bag: there is no .mcap and no .db3 file in it")
+    if not any(file.stat().st_size for file in files):
+        raise BagError(f"{path}: is empty: {', '.join(file.name for file in files)} has 0 bytes")
     saved = cache_folder("bags") / _key(files) / path.stem
     if saved.exists():
         return ReadableBag(saved, problem, _read_through(saved))
