@@ -43,6 +43,7 @@ class ArmGravity(ManagedNode):
         """Read the URDF if the parameter gives one. Raises ConfigError when it is not usable."""
         self._chain: Chain | None = None
         self._point: CarriedPoint | None = None
+        self._refused = ""  # why the last robot_description is not usable
         if self.parameters.source == "joint_states" and self.parameters.urdf:
             self._take_urdf(read_urdf(self.parameters.urdf), self.parameters.urdf)
         if self.parameters.feed_acceleration and self.parameters.source != "joint_states":
@@ -106,11 +107,13 @@ class ArmGravity(ManagedNode):
         try:
             self._take_urdf(message.data, "robot_description")
         except ConfigError as error:
-            self.get_logger().error(str(error))
+            self._refused = str(error)
+            self.get_logger().error(self._refused)
 
     def _take_urdf(self, text: str, source: str) -> None:
         self._chain = Chain(text, self.parameters.base_frame, self.parameters.world_frame, source)
         self._point = CarriedPoint(self._chain, np.array(self.robot_file.robot.imu_mount.position))
+        self._refused = ""
 
     def _on_joints(self, message: JointState) -> None:
         self._positions.update(_finite(message))
@@ -213,7 +216,7 @@ class ArmGravity(ManagedNode):
         if self.parameters.source == "tf":
             return f"no pose of the arm: {self._frames.problem or 'no TF is received'}"
         if self._chain is None:
-            return "no URDF has been received"
+            return self._refused or "no URDF has been received"
         absent = [name for name in self._chain.moving if name not in self._positions]
         if not absent or not self._positions:
             return "no pose of the arm is received"

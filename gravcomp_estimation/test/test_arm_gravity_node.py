@@ -14,9 +14,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3Stamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from gravcomp.arm.chain import Chain, angle_between
-from gravcomp_node import SENSOR
+from gravcomp_node import LATCHED, SENSOR
 
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
@@ -41,7 +42,8 @@ class Bench:
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self.on_diagnostics, 10)
 
     def start(self, side: str, *parameters: str, topic: str) -> None:
-        options = ["-r", f"__ns:=/{side}", "-r", "joint_states:=/joint_states", "-p", f"urdf:={self.urdf}"]
+        options = ["-r", f"__ns:=/{side}", "-r", "joint_states:=/joint_states"]
+        options += ["-p", f"urdf:={self.urdf}"] if self.urdf else []
         options += ["-p", f"base_frame:={side}_soft_base", *(part for p in parameters for part in ("-p", p))]
         self.processes.append(subprocess.Popen([sys.executable, "-m", "gravcomp_estimation.arm_gravity", "--ros-args", *options]))
         name = f"/{side}/{topic}"
@@ -113,6 +115,15 @@ def test_missing_joints_are_named(bench):
     wanted = "joint_states does not bring left_j2; it has right_j1, right_j2: is a prefix missing?"
     names = ["right_j1", "left_j1", "right_j2"]
     bench.until(lambda: bench.sentences.get("/left/arm_gravity") == wanted, "not named", names=names)
+
+
+def test_a_description_that_is_refused_is_named(bench):
+    bench.urdf = ""
+    bench.start("left", "use:=publish", topic="gravity")
+    publisher = bench.node.create_publisher(String, "/left/robot_description", LATCHED)
+    publisher.publish(String(data=URDF.replace('<parent link="world"/>', '<parent link="left_b"/>', 1)))
+    wanted = "robot_description: the links left_a, left_b are a loop; a URDF is a tree"
+    bench.until(lambda: bench.sentences.get("/left/arm_gravity") == wanted, "not named")
 
 
 def test_the_acceleration_comes_with_a_urdf_file(bench):

@@ -101,6 +101,17 @@ def test_a_gap_of_an_arm_is_bridged_because_its_rates_change_slowly():
     assert set(problem) == {Problem.NONE} and error[600:615].max() < 2.0
 
 
+@pytest.mark.parametrize(("name", "seed", "largest_deg"), [("phone", 1, 14.0), ("arm at 2 m/s^2", 3, 4.5), ("drone", 1, 4.0)])
+def test_after_a_bridged_gap_the_error_is_that_of_the_standard_deviation(name, seed, largest_deg):
+    """From the first sample on, with motion that is faster than the filter assumes, and with vibration."""
+    moving = simulated(KINDS[name], seed, 12.0)
+    begin = round(7.0 * moving.rate)
+    error, std, problem = errors(rows(moving, np.r_[0:begin, begin + round(0.3 * moving.rate) : len(moving)]))
+    assert set(problem) == {Problem.NONE}
+    assert (error < 2.0 * std)[begin:].all() and error[begin:].max() < largest_deg
+    assert std[begin:].max() < 20.0  # it is no restart: that of one says up to 90 deg
+
+
 def test_the_filter_goes_on_from_the_alignment_without_a_new_error():
     moving = simulated(ARM, 203, 13.2)
     error, _, problem = errors(rows(moving, np.r_[0:600, 670 : len(moving)]))

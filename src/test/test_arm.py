@@ -75,6 +75,8 @@ def test_the_root_may_be_any_link_above():
             None,
             "link 'a' is below two joints, 'j1' and 'j2'",
         ),
+        (TWO_JOINTS.replace('<link name="b"/>', 2 * '<link name="b"/>'), "soft_base", None, "two links of the name 'b'"),
+        (TWO_JOINTS.replace("j2", "j1"), "soft_base", None, "two joints of the name 'j1'"),
         (TWO_JOINTS.replace('<link name="a"/>', ""), "soft_base", None, "joint 'j1' has the child link 'a', which is not in it"),
         (TWO_JOINTS.replace("0.5 0 0", "0.5 0"), "soft_base", None, "joint 'j3' has xyz '0.5 0'; three numbers are needed"),
         (TWO_JOINTS.replace("0 2 0", "0 0 0"), "soft_base", None, "joint 'j1' has an axis of length 0"),

@@ -172,9 +172,17 @@ def test_the_recording_itself_is_not_changed(tmp_path, store, definitions):
     assert sorted((p.name, p.stat().st_mtime_ns) for p in path.iterdir()) == before
 
 
+def test_a_damaged_bag_is_read_under_two_names(tmp_path, store, definitions):
+    path = write(tmp_path / "bag", store, definitions)
+    (path / "metadata.yaml").unlink()
+    first = readable(path)
+    path.rename(tmp_path / "other")
+    assert readable(tmp_path / "other").messages == first.messages == 300
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(b"", "nothing in it can be read"), (b"not a bag at all" * 100, "nothing in it can be read")],
+    [(b"", r"is empty: bag\.mcap has 0 bytes"), (b"not a bag at all" * 100, "nothing in it can be read")],
 )
 def test_a_file_that_is_no_bag_is_refused_with_the_reason(tmp_path, content, sentence):
     (tmp_path / "bag").mkdir()

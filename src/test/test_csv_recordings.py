@@ -150,6 +150,11 @@ STRANGERS = {
     "comments": ("# device: 12\n# rate, 200\n#\n% made by hand\nt,gx,gy,gz,ax,ay,az", 1.0, "rad", ""),
     "the line of a spreadsheet": ("sep=,\nt,gx,gy,gz,ax,ay,az", 1.0, "rad", ""),
     "Chinese": ("时间(s),角速度X(deg/s),角速度Y(deg/s),角速度Z(deg/s),加速度X(g),加速度Y(g),加速度Z(g)", 1.0, "deg", "g"),
+    "Chinese units": (
+        "时间(毫秒),陀螺x(度/秒),陀螺y(度/秒),陀螺z(度/秒),加速度x(米/秒²),加速度y(米/秒²),加速度z(米/秒²)", 1e3, "deg", ""),
+    "Russian units": (
+        "Время (с),Гироскоп X (рад/с),Гироскоп Y (рад/с),Гироскоп Z (рад/с),"
+        "Ускорение X (м/с²),Ускорение Y (м/с²),Ускорение Z (м/с²)", 1.0, "rad", ""),
     "Polish": ("czas [ms],żyroskop x,żyroskop y,żyroskop z,przyspieszenie x,przyspieszenie y,przyspieszenie z", 1e3, "rad", ""),
     "Spanish": ("Tiempo (s),Giroscopio x,Giroscopio y,Giroscopio z,Aceleración x,Aceleración y,Aceleración z", 1.0, "rad", ""),
     "quotes": ('"t","gx","gy","gz","ax","ay","az"', 1.0, "rad", ""),

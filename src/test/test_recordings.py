@@ -102,6 +102,29 @@ def test_a_rosbag_gives_samples_temperature_and_truth_by_their_stamps(tmp_path, 
     assert np.isfinite(recording.orientation[:, 0]).tolist() == [True, False, True, False, True]
 
 
+@pytest.mark.parametrize("metadata", [True, False])
+@pytest.mark.parametrize("compressed", ["FILE", "MESSAGE"])
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_compressed_by_zstd_is_read_with_and_without_its_metadata(tmp_path, monkeypatch, storage, compressed, metadata):
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
+    bag = write_bag(tmp_path / "bag", storage, compressed=compressed)
+    if not metadata:
+        (bag / "metadata.yaml").unlink()
+    recording = read_recording(bag)
+    assert recording.gyro[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert ["metadata.yaml" in note for note in recording.notes] == ([] if metadata else [True])
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_split_over_files_is_one_recording_without_its_metadata(tmp_path, monkeypatch, storage):
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "split").mkdir()
+    for part, first in enumerate((0, 5)):
+        (file,) = (f for f in write_bag(tmp_path / f"part{part}", storage, first=first).iterdir() if f.suffix != ".yaml")
+        file.rename(tmp_path / "split" / f"split_{part}{file.suffix}")
+    assert read_recording(tmp_path / "split").gyro[:, 0].tolist() == [float(k) for k in range(10)]
+
+
 def test_a_bag_with_several_imus_needs_the_name_of_a_topic(tmp_path):
     bag = write_bag(tmp_path / "bag", "mcap", topics=("/a/imu/data", "/b/imu/data"))
     with pytest.raises(RecordingError, match="/a/imu/data, /b/imu/data; name one"):
@@ -132,8 +155,8 @@ def test_the_memory_to_read_a_bag_does_not_grow_with_its_other_topics(tmp_path, 
     assert shares == sorted(shares) and len(shares) > 3 and max(shares) <= 1.0
 
 
-def write_bag(path, storage, topics=("/robot/imu/data_raw",), *, samples=5, images=(0, 0)):
-    from rosbags.rosbag2 import StoragePlugin, Writer
+def write_bag(path, storage, topics=("/robot/imu/data_raw",), *, samples=5, images=(0, 0), compressed="NONE", first=0):
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -142,7 +165,9 @@ def write_bag(path, storage, topics=("/robot/imu/data_raw",), *, samples=5, imag
     vector, quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
     nine = np.zeros(9)
 
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3) as writer:
+    bag = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3)
+    bag.set_compression(CompressionMode[compressed], CompressionFormat.ZSTD)
+    with bag as writer:
 
         def write(connection, kind, k, **fields):
             stamp = 10**18 + k * 10_000_000
@@ -156,7 +181,7 @@ def write_bag(path, storage, topics=("/robot/imu/data_raw",), *, samples=5, imag
         write(temperature, "sensor_msgs/msg/Temperature", 2, temperature=30.0, variance=0.0)
         for topic in topics:
             imu = writer.add_connection(topic, "sensor_msgs/msg/Imu", typestore=store)
-            for k in range(samples):
+            for k in range(first, first + samples):
                 if images[0] and k % max(1, samples // images[0]) == 0:  # never read, so that any bytes will do
                     writer.write(camera, 10**18 + k * 10_000_000, bytes(images[1]))
                 write(

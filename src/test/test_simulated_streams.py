@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.simulated_streams import KINDS, simulated
 from gravcomp.bench.stream_faults import FAULTS
+from gravcomp.orientation import estimate_recording
+from gravcomp.orientation.inclination import inclination_rmse
 from gravcomp.orientation.self_calibration import calibrate_from_itself
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.stream_checks import check_recording
@@ -60,6 +62,15 @@ def test_a_drift_is_found_in_nine_seconds_of_rest():
     clean = recording("arm at 2 m/s^2", seed=31, duration=60.0)
     assert kinds(check_recording(clean)) == []
     assert kinds(check_recording(FAULTS["bias_drift"].apply(clean, np.random.default_rng(1)))) == ["bias_drift"]
+
+
+def test_spikes_of_the_specific_force_are_found_in_vibration_and_its_noise_is_in_the_standard_deviation():
+    clean = recording("drone", seed=4, duration=15.0)
+    spiky = FAULTS["accel_spikes"].apply(clean, np.random.default_rng(4))
+    found = [estimate_recording(each) for each in (clean, spiky)]
+    without, held = (inclination_rmse(each.orientation, clean.orientation, clean.movement) for each in found)
+    assert held < without + np.radians(FAULTS["accel_spikes"].excess_deg)
+    assert without < 1.5 * np.sqrt(np.mean(found[0].inclination_std[clean.movement] ** 2))
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])

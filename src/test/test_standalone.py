@@ -243,7 +243,7 @@ def test_a_turn_that_does_not_count_has_no_forces_on_the_board(parameters, built
 
 
 def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host(parameters, found):
-    """A sensor that is shaken so fast that the first look finds spikes where there are none, with jitter and a gap."""
+    """A sensor that is shaken so fast that the first look finds spikes where there are none, with jitter, vibration and gaps."""
     rng = np.random.default_rng(3)
     host = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))
     loop, orientation, worst = StandaloneLoop(found.blob), quat.IDENTITY, 0.0
@@ -254,9 +254,12 @@ def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host
         gyro = rate + 0.01 + rng.normal(0.0, 1e-3, 3)
         if k % 31 == 30:
             gyro[k % 3] += rng.choice([-3.0, 3.0])  # a spike
+        if k > 400:
+            accel += 4.0 * np.sin(k * np.array([2.9, 2.7, 2.5]))  # vibration
+            accel += rng.choice([-20.0, 20.0], 3) if k % 53 == 50 else 0.0
         stamp = 10_000 * k + int(rng.integers(-3000, 3000))
-        if 1150 <= k < 1180:
-            continue  # the inclination is lost
+        if 1150 <= k < 1180 or 1500 <= k < 1503:
+            continue  # the inclination is lost, and is bridged
         estimate = host.update(1000 * stamp, gyro.tolist(), accel.tolist())
         assert loop.weigh(stamp, gyro, accel)
         worst = max(worst, float(np.linalg.norm(np.subtract(loop.gravity, estimate.gravity))))

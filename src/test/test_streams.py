@@ -13,7 +13,7 @@ from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.even_steps import EvenSteps
 from gravcomp.orientation.inclination import inclination_rmse
 from gravcomp.orientation.offline import without_rate_spikes
-from gravcomp.orientation.spike_review import AHEAD, SpikeReview
+from gravcomp.orientation.spike_review import AHEAD, SURE_GYRO, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
 from gravcomp.recordings.imu import Recording, RecordingError, read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
@@ -161,7 +161,7 @@ def test_fast_motion_is_not_taken_for_spikes():
 
 def reviewed(values):
     """Return what a review counts of rates (n, 3) in rad/s at 95 Hz."""
-    review, counted = SpikeReview(math.radians(20.0), SpikeOptions()), np.array(values)
+    review, counted = SpikeReview(math.radians(20.0), SpikeOptions(), SURE_GYRO), np.array(values)
     for i, value in enumerate(values.tolist()):
         decided = review.take(0.0105, tuple(value))
         if decided is not None:

@@ -8,7 +8,6 @@
 #define GC_SURE 0.0174532925f         // rad
 #define GC_START_STD 0.0872664626f    // rad
 #define GC_LARGEST_STD 1.57079633f    // rad
-#define GC_LOST 0.174532925f          // rad
 #define GC_SWING 0.3f                 // s
 #define GC_MEMORY 1.0f                // s
 #define GC_SMOOTHING 0.05f            // s
@@ -21,27 +20,13 @@ static float squared(float x) { return x * x; }
 
 static float square_of(const float *v) { return (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2]; }
 
-bool gc_alignment_lost_in(const gc_alignment *alignment, float gap, float rate_before, float rate_after) {
-  // Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
-  const float swings = gap * gap * alignment->changing;
-  const float share = swings < 6.0f * alignment->turning ? swings / (12.0f * alignment->turning) : 0.5f;
-  return share * gap * gc_max(gc_sqrt(alignment->turning), gc_max(rate_before, rate_after)) > GC_LOST;
+void gc_alignment_watch(gc_alignment *alignment, float dt, const float *force, float gravity) {
+  const float shaken = squared(gc_sqrt(square_of(force)) / gravity - 1.0f);
+  alignment->shaken += dt / (GC_MEMORY + dt) * (shaken - alignment->shaken);
 }
 
-void gc_alignment_watch(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity) {
-  const float gain = dt / (GC_MEMORY + dt);
-  const float slower = 1.0f / (GC_SMOOTHING + dt);
-  float change[3];
-  for (uint32_t i = 0; i < 3u; ++i) {
-    change[i] = (rate[i] - alignment->smooth[i]) * slower;
-    alignment->smooth[i] += change[i] * dt;
-  }
-  alignment->turning += gain * (square_of(rate) - alignment->turning);
-  alignment->changing += gain * (square_of(change) - alignment->changing);
-  alignment->shaken += gain * (squared(gc_sqrt(square_of(force)) / gravity - 1.0f) - alignment->shaken);
-}
-
-void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity) {
+void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity, bool leads) {
+  alignment->leads = leads;
   alignment->shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
   alignment->active = true;
   alignment->elapsed = alignment->square = 0.0f;
@@ -120,6 +105,12 @@ float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *v
     velocity[i] = alignment->velocity[i] - alignment->sum[i] / t - 0.5f * t * slope[i];
   }
   return gc_alignment_std(alignment, gravity) * gravity * t / GC_ROOT_OF_THREE;
+}
+
+float gc_alignment_velocity_noise(const gc_alignment *alignment, float gravity) {
+  const float t = alignment->elapsed;
+  // The line that fits white noise of a density d best over the time t has a slope with the variance 12 d^2 / t^3.
+  return gc_alignment_std(alignment, gravity) * gravity * gc_sqrt(t * t * t / 12.0f);
 }
 
 float gc_alignment_std(const gc_alignment *alignment, float gravity) {

@@ -12,8 +12,11 @@
 #define GC_UNKNOWN_ACCEL_NOISE 5.0f       // m/s^2/sqrt(Hz)
 #define GC_CONTRADICTION 0.5f             // m/s
 #define GC_CONTRADICTED_TILT 0.0349065850f  // rad
-#define GC_SURE_GYRO 1.5f
-#define GC_SURE_ACCEL 1.0f
+#define GC_LOST 0.174532925f  // rad: a gap that may hide a larger turn is not bridged
+#define GC_GATE_SURE_GYRO 1.5f
+#define GC_GATE_SURE_ACCEL 1.0f
+#define GC_REVIEW_SURE_GYRO 2.0f
+#define GC_REVIEW_SURE_ACCEL 1.0f
 #define GC_PATIENCE_GYRO 2.0f
 #define GC_MISSED_PERIODS 2.5f
 #define GC_GRAVITY_TIME 1.0f  // s
@@ -30,7 +33,8 @@ static float distance(const float *a, const float *b) {
 static void forget_suspects(gc_orientation *filter) {
   gc_spike_gate_reset(&filter->gyro_gate);
   gc_spike_gate_reset(&filter->accel_gate);
-  gc_spike_review_reset(&filter->review);
+  gc_spike_review_reset(&filter->gyro_review);
+  gc_spike_review_reset(&filter->accel_review);
   filter->kept_count = 0;
 }
 
@@ -40,15 +44,24 @@ void gc_orientation_reset(gc_orientation *filter, const gc_settings *settings) {
   filter->state.orientation.w = 1.0f;
   filter->state.gravity_norm = settings->gravity;
   filter->gyro_gate.floor = settings->spike_gyro;
-  filter->gyro_gate.sure = GC_SURE_GYRO;
+  filter->gyro_gate.sure = GC_GATE_SURE_GYRO;
   filter->gyro_gate.patience = GC_PATIENCE_GYRO;
   filter->accel_gate.floor = settings->spike_accel;
-  filter->accel_gate.sure = GC_SURE_ACCEL;
+  filter->accel_gate.sure = GC_GATE_SURE_ACCEL;
   filter->accel_gate.patience = 1.0f;
-  filter->review.floor = settings->spike_gyro;
+  filter->gyro_review.floor = settings->spike_gyro;
+  filter->gyro_review.sure = GC_REVIEW_SURE_GYRO;
+  filter->accel_review.floor = settings->spike_accel;
+  filter->accel_review.sure = GC_REVIEW_SURE_ACCEL;
   gc_sample_check_reset(&filter->check);
   gc_covariance_set_bias(&filter->state.errors, settings->bias_initial);
   forget_suspects(filter);
+}
+
+// What follows is no continuation of the samples so far.
+static void interrupt(gc_filter_state *state) {
+  gc_swings_interrupt(&state->swings);
+  gc_vibration_interrupt(state->vibration, GC_FORCE_MEANS);
 }
 
 // Start with the inclination from one specific force; yaw and bias continue where there was an orientation before.
@@ -79,6 +92,7 @@ static void start(gc_orientation *filter, const float *gyro, const float *accel,
   state->rest.started = false;
   state->rest.still = state->rest.calm = 0u;
   state->alignment.active = false;
+  interrupt(state);
   gc_copy(state->last_gyro, gyro, sizeof state->last_gyro);
   state->period = 0.0f;
   filter->started = true;
@@ -89,10 +103,15 @@ static bool is_gap(const gc_filter_state *state, float dt) {
   return state->period > 0.0f && dt > GC_MISSED_PERIODS * state->period;
 }
 
+// Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it show.
+static float missed_in(const gc_filter_state *state, float gap, const float *gyro) {
+  return gc_swings_missed_in(&state->swings, gap, state->period, distance(state->last_gyro, state->bias),
+                             distance(gyro, state->bias));
+}
+
 // Return whether the sensor may have turned too far meanwhile for a gap of dt s to be bridged.
 static bool is_lost(const gc_filter_state *state, float dt, const float *gyro) {
-  return is_gap(state, dt) && gc_alignment_lost_in(&state->alignment, dt, distance(state->last_gyro, state->bias),
-                                                   distance(gyro, state->bias));
+  return is_gap(state, dt) && missed_in(state, dt, gyro) > GC_LOST;
 }
 
 // Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty.
@@ -130,14 +149,28 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
   float rate[3], extra_tilt = 0.0f, extra_velocity = 0.0f;
   gc_copy(rate, usable, sizeof rate);
   if (is_gap(state, dt)) {
-    // The missing samples are replaced by the mean of the rates around them; its uncertainty is their difference.
+    // The mean of the rates around stands in for the missing samples; a rate counts for the period before it. The mean misses a
+    // part of the motion, and it has the noise of two samples.
+    const float noise = 0.5f * gc_vibration_variance(&state->swings.noise, state->period) + squared(0.5f * step->doubt);
+    extra_tilt = squared(missed_in(state, dt, usable)) / 3.0f + noise * (dt * dt);
+    const float share = 0.5f + 0.5f * state->period / dt;
     for (uint32_t i = 0; i < 3u; ++i) {
-      rate[i] = 0.5f * (rate[i] + state->last_gyro[i]);
+      rate[i] = share * rate[i] + (1.0f - share) * state->last_gyro[i];
     }
-    extra_tilt = squared(distance(rate, state->last_gyro) * dt);
     extra_velocity = squared(GC_UNKNOWN_ACCEL_NOISE) * dt;
+    interrupt(state);
   } else {
     state->period = state->period > 0.0f ? state->period + 0.05f * (dt - state->period) : dt;
+  }
+  if (step->gyro_usable) {
+    float unbiased[3];
+    for (uint32_t i = 0; i < 3u; ++i) {
+      unbiased[i] = step->gyro[i] - state->bias[i];
+    }
+    gc_swings_watch(&state->swings, dt, unbiased);
+  }
+  if (step->accel_usable) {
+    gc_vibration_take(state->vibration, GC_FORCE_MEANS, dt, step->accel);
   }
   gc_copy(state->last_gyro, usable, sizeof state->last_gyro);
   for (uint32_t i = 0; i < 3u; ++i) {
@@ -163,10 +196,14 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
   }
   const bool with_bias = s->bias_estimation > 0.0f;
   const float walk = filter->temperature_stable ? s->bias_walk_stable : s->bias_walk;
+  // The velocity is a sum of samples: it has their noise where that is more than the data sheet says.
+  const float force_noise = step->accel_usable
+                                ? gc_max(squared(s->accel_noise), gc_vibration_density(state->vibration, GC_FORCE_MEANS))
+                                : squared(GC_UNKNOWN_ACCEL_NOISE);
   const gc_step_noise noise = {
       tilt,
       with_bias ? squared(walk) * dt : 0.0f,
-      squared(step->accel_usable ? s->accel_noise : GC_UNKNOWN_ACCEL_NOISE) * dt + extra_velocity,
+      force_noise * dt + extra_velocity,
   };
   gc_covariance_predict(&state->errors, dt, middle, state->gravity_norm, noise, with_bias);
 }
@@ -174,7 +211,11 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
 static void correct(gc_orientation *filter, float dt, bool measure_bias) {
   const gc_settings *s = filter->settings;
   gc_filter_state *state = &filter->state;
-  const float variance = squared(s->velocity_noise) / dt;
+  float density = s->velocity_noise;
+  if (state->alignment.active) {  // after a bridged gap
+    density = gc_max(density, gc_alignment_velocity_noise(&state->alignment, state->gravity_norm));
+  }
+  const float variance = squared(density) / dt;
   float error[GC_ERRORS];
   if (measure_bias) {
     float residual[3];
@@ -225,23 +266,30 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
     state->rest.started = false;
     state->rest.still = state->rest.calm = 0u;
   }
+  const float variance = state->errors.matrix[0][0];
+  const bool gap = is_gap(state, step->dt) && step->accel_usable;
   predict(filter, step);
+  const bool bridged = gap && state->errors.matrix[0][0] > 2.0f * variance;  // the inclination is mostly that of the gap
   float rate[3];
   for (uint32_t i = 0; i < 3u; ++i) {
     rate[i] = step->gyro[i] - state->bias[i];
   }
   if (step->gyro_usable && step->accel_usable) {
-    gc_alignment_watch(&state->alignment, step->dt, rate, step->accel, s->gravity);
+    gc_alignment_watch(&state->alignment, step->dt, step->accel, s->gravity);
   }
-  if (state->alignment.active && step->gyro_usable) {
-    const float noise = step->accel_usable ? 0.0f : GC_UNKNOWN_ACCEL_NOISE;
+  if (bridged && !(state->alignment.active && state->alignment.leads)) {
+    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm, false);
+  } else if (state->alignment.active && step->gyro_usable) {
+    const float noise = step->accel_usable ? gc_sqrt(gc_vibration_density(state->vibration, GC_FORCE_MEANS))
+                                           : GC_UNKNOWN_ACCEL_NOISE;
     float up[3];
     gc_alignment_take(&state->alignment, step->dt, rate, step->accel, state->gravity_norm, noise, up);
-    set_aligned(state, up);
-    return true;
-  }
-  if (state->alignment.active) {
-    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm);
+    if (state->alignment.leads) {
+      set_aligned(state, up);
+      return true;
+    }
+  } else if (state->alignment.active) {
+    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm, state->alignment.leads);
   }
   if (step->accel_usable) {
     correct(filter, step->dt, resting && s->bias_estimation > 0.0f);
@@ -277,48 +325,48 @@ static uint32_t count_in(gc_orientation *filter, uint32_t age, bool acceleromete
     changed = changed || used[i] < value[i] || used[i] > value[i];
     used[i] = value[i];
   }
+  if (changed && !accelerometer) {
+    step->doubt = 0.0f;
+  }
   return changed ? age : 0u;
 }
 
 static uint32_t larger(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
-// Take a sensor's value through its gate, and let what is decided count in the last `oldest` steps. Returns how many steps have to
-// be repeated.
-static uint32_t gate(gc_orientation *filter, gc_spike_gate *of, gc_filter_step *step, bool accelerometer, uint32_t oldest) {
-  float counted[GC_SUSPECTS_MAX][3];
-  const uint32_t count = gc_spike_gate_take(of, filter->settings, step->dt, accelerometer ? step->accel : step->gyro, counted);
+// Take a sensor's value through its gate and its review, and let what they decide count in the last steps. Returns how many of them
+// have to be repeated.
+static uint32_t decide(gc_orientation *filter, gc_filter_step *step, bool accelerometer) {
+  gc_spike_gate *gate = accelerometer ? &filter->accel_gate : &filter->gyro_gate;
+  gc_spike_review *review = accelerometer ? &filter->accel_review : &filter->gyro_review;
+  if (!(accelerometer ? step->accel_usable : step->gyro_usable)) {
+    gc_spike_gate_reset(gate);
+    gc_spike_review_reset(review);
+    return 0;
+  }
+  float *value = accelerometer ? step->accel : step->gyro;
+  float measured[3], counted[GC_SUSPECTS_MAX][3];
   uint32_t changed = 0;
-  for (uint32_t age = 1; age <= count && age <= oldest; ++age) {
+  gc_copy(measured, value, sizeof measured);
+  if (is_gap(&filter->state, step->dt)) {
+    gc_spike_review_reset(review);
+  }
+  if (gc_spike_review_take(review, filter->settings, step->dt, measured, counted[0])) {
+    changed = count_in(filter, GC_REVIEW_AHEAD, accelerometer, counted[0]);
+  }
+  const uint32_t count = gc_spike_gate_take(gate, filter->settings, step->dt, value, counted);
+  for (uint32_t age = 1; age <= count && age < GC_REVIEW_AHEAD; ++age) {  // the review decides older ones
     changed = larger(changed, count_in(filter, age, accelerometer, counted[count - age]));
+  }
+  if (!accelerometer) {
+    step->doubt = distance(measured, value);
   }
   return changed;
 }
 
-// Look again at the rate of GC_REVIEW_AHEAD samples ago, from a sample as it came. Returns how many steps have to be repeated.
-static uint32_t review(gc_orientation *filter, const gc_filter_step *step) {
-  float counted[3];
-  if (is_gap(&filter->state, step->dt)) {
-    gc_spike_review_reset(&filter->review);
-  }
-  const bool decided = gc_spike_review_take(&filter->review, filter->settings, step->dt, step->gyro, counted);
-  return decided ? count_in(filter, GC_REVIEW_AHEAD, false, counted) : 0u;
-}
-
 // Remove spikes from a sample, and repeat the steps since the first one for which another value counts.
 static void without_spikes(gc_orientation *filter, gc_filter_step *step) {
-  uint32_t changed = 0;
-  if (step->gyro_usable) {
-    changed = review(filter, step);  // decides what is older than the values of the gate that count
-    changed = larger(changed, gate(filter, &filter->gyro_gate, step, false, GC_REVIEW_AHEAD - 1u));
-  } else {
-    gc_spike_gate_reset(&filter->gyro_gate);
-    gc_spike_review_reset(&filter->review);
-  }
-  if (step->accel_usable) {
-    changed = larger(changed, gate(filter, &filter->accel_gate, step, true, GC_STEPS_MAX));
-  } else {
-    gc_spike_gate_reset(&filter->accel_gate);
-  }
+  const uint32_t of_rates = decide(filter, step, false), of_forces = decide(filter, step, true);
+  const uint32_t changed = larger(of_rates, of_forces);
   if (changed > 0u) {
     filter->state = kept_step(filter, changed)->before;
   }
@@ -357,7 +405,7 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
   const bool lost = verdict.problem == GC_PROBLEM_NONE && is_lost(&filter->state, verdict.dt, gyro);
   if (!filter->started || lost || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
     start(filter, gyro, accel, verdict.dt);
-    gc_alignment_begin(&filter->state.alignment, accel, filter->state.gravity_norm);
+    gc_alignment_begin(&filter->state.alignment, accel, filter->state.gravity_norm, true);
     set_aligned(&filter->state, accel);
     gc_zero(&filter->even, sizeof filter->even);
     forget_suspects(filter);
@@ -365,6 +413,7 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
     return true;
   }
   gc_filter_step step;
+  step.doubt = 0.0f;
   step.dt = gc_even_steps_take(&filter->even, verdict.dt);
   gc_copy(step.gyro, gyro, sizeof step.gyro);
   gc_copy(step.accel, accel, sizeof step.accel);

@@ -9,7 +9,9 @@
 #include "sample_check.h"
 #include "spike_review.h"
 #include "spikes.h"
+#include "swings.h"
 
+#define GC_FORCE_MEANS 3u // kinds of means of the specific force whose noise is measured
 #define GC_STEPS_MAX GC_SUSPECTS_MAX // last steps that a decision about a spike may change; at least GC_REVIEW_AHEAD
 
 // What a sample changes.
@@ -24,12 +26,15 @@ typedef struct {
   gc_error_covariance errors;
   gc_rest rest;
   gc_alignment alignment;
+  gc_swings swings;                        // of the rate
+  gc_vibration vibration[GC_FORCE_MEANS];  // of the specific force
 } gc_filter_state;
 
 // What the filter takes of a sample.
 typedef struct {
   float dt, gyro[3], accel[3];
   bool gyro_usable, accel_usable;
+  float doubt;  // rad/s: by how much the measured rate differs from the one that counts until the next samples decide
 } gc_filter_step;
 
 // A step that a later sample may change.
@@ -45,7 +50,7 @@ typedef struct {
   gc_sample_check check;
   gc_even_steps even;
   gc_spike_gate gyro_gate, accel_gate;
-  gc_spike_review review;  // of the rates
+  gc_spike_review gyro_review, accel_review;
   uint32_t kept_count, kept_next;
   gc_kept_step kept[GC_STEPS_MAX];  // a ring: the last one is before kept_next
 } gc_orientation;

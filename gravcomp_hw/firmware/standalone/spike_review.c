@@ -4,7 +4,7 @@
 #include "../core/memory.h"
 
 #define GC_BOUND 0.5f
-#define GC_SURE 2.0f
+#define GC_FROM_MEDIAN 0.75f
 #define GC_WITH_IT 0.25f
 #define GC_LEFT_OUT 0.1f
 #define GC_STRAIGHT 0.1f
@@ -162,11 +162,11 @@ bool gc_spike_review_take(gc_spike_review *review, const gc_settings *settings, 
   review->mean += part * (gc_min(found.distance, GC_BOUND * threshold) - review->mean);
   review->mean_from_median += part * (gc_min(found.off, GC_BOUND * from_median) - review->mean_from_median);
   review->bend += part * (gc_max(-floor, found.bend) - review->bend);
-  const float least = GC_SURE * from_median;
+  const float least = gc_max(floor, GC_FROM_MEDIAN * from_median);
   const bool is_far = found.off > least && found.distance > floor;
   if (review->bend > GC_STRAIGHT * floor || (is_far && goes_on(review, found.median, least))) {
     if (found.distance > threshold) {
-      decide(review, GC_SURE * threshold);
+      decide(review, review->sure * threshold);
     }
   } else if (is_far) {
     gc_copy(ours, found.median, sizeof(float[3]));  // on all axes: a rest would end at what is left of the spike

@@ -13,7 +13,8 @@
 #define GC_REVIEW_SAMPLES (GC_REVIEW_BEFORE + 1u + GC_REVIEW_AHEAD)
 
 typedef struct {
-  float floor;  // a smaller distance from the curve is no spike
+  float floor;  // a smaller distance is no spike
+  float sure;   // of the threshold: from here a sample that is far from a curve is one
   uint32_t count;
   float samples[GC_REVIEW_SAMPLES][3];
   float mean, mean_from_median, bend;

@@ -119,11 +119,17 @@ def _joint(element: xml.Element, source: str) -> Joint:
 
 
 def _tree(document: xml.Element, links: list[str], source: str) -> dict[str, xml.Element]:
-    """Return the joint above each link. Raises ConfigError for links that are not one tree: two parents, a loop, two roots."""
+    """Return the joint above each link. Raises ConfigError for links that are not one tree.
+
+    That is: names that stand twice, two parents, a loop, two roots.
+    """
     above: dict[str, xml.Element] = {}
-    for joint in document.iter("joint"):
-        if joint.find("child") is None:
-            continue
+    joints = [joint for joint in document.iter("joint") if joint.find("child") is not None]
+    for what, names in (("links", links), ("joints", [joint.get("name", "") for joint in joints])):
+        twice = sorted({name for name in names if name and names.count(name) > 1})
+        if twice:
+            raise ConfigError(f"{source}: has two {what} of the name '{twice[0]}'; a name stands for one")
+    for joint in joints:
         child, name = _link(joint, "child", source), joint.get("name")
         if child in above:
             raise ConfigError(f"{source}: link '{child}' is below two joints, '{above[child].get('name')}' and '{name}'")

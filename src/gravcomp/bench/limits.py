@@ -190,6 +190,7 @@ ROWS = {
         Row("simulated.missed.*", "simulated sensors and motions: recordings in which it is not reported", "", 0.0),
         Row("simulated.excess_deg.gyro_spikes.*", "simulated: gyroscope spikes, error beyond the clean recording's", "deg", 0.25),
         Row("simulated.excess_deg.accel_spikes.*", "simulated: accelerometer spikes, error beyond the clean's", "deg", 0.25),
+        Row("simulated.after_gap_sigmas.*", "simulated: largest error after a gap, in standard deviations", "", 3.0),
         Row("us_per_sample", "CPU time of the live checks, a sample", "us", 20.0),
     ),
     "graph": (

@@ -6,6 +6,8 @@ vertical by g per second, plus that of the motion, which is bounded for a sensor
 that fits this integral best shows the vertical, however wrong the start was; how far the integral is from it shows how sure that
 is. A motion that is slower than the time since the start looks like a part of that line. Its share shows in the time scale of
 what is left: as long as that is as slow as it can be within this time, more of the same is in the line.
+
+After a gap that the filter bridges the line does not lead: the filter corrects, and the line says how much the velocity shows.
 """
 
 import math
@@ -17,11 +19,10 @@ LONGEST = 10.0  # s; then the filter corrects
 SURE = math.radians(1.0)  # at this standard deviation, too
 START_STD = math.radians(5.0)  # of one specific force at rest
 LARGEST_STD = math.radians(90.0)  # nothing is known
-LOST = math.radians(10.0)  # of a bridged gap: more is not bridged
 TOGETHER = math.sqrt(0.75)  # correlation between the slope of a line that fits evenly spread errors and its value at the end
 _SWING = 0.3  # s, about the time that a motion goes in one direction
 _MEMORY = 1.0  # s, of the motion before the gap
-_SMOOTHING = 0.05  # s, of rates and specific force whose change is measured: noise hardly turns or moves the sensor
+_SMOOTHING = 0.05  # s, of the specific force: noise hardly moves the sensor
 
 # Half a period of a sinusoid is pi v / a, with the RMS of its velocity and acceleration. What a line leaves of one that is slower
 # than a period in the time t has 0.4 t, however slow it is, because its low frequencies are in the line.
@@ -40,9 +41,8 @@ class Alignment:
     def reset(self) -> None:
         """Forget everything."""
         self.active = False
-        self._turning = self._changing = 0.0  # mean squares of the rate and of its change, (rad/s)^2 and (rad/s^2)^2
+        self.leads = True  # while active: the line gives the inclination
         self._shaken = 0.0  # mean square of the specific force's length beyond g, of g
-        self._smooth = (0.0, 0.0, 0.0)  # rate, rad/s
         self._elapsed = 0.0  # t
         self._velocity = self._sum = self._moment = (0.0, 0.0, 0.0)  # v; the integrals of v dt and of t v dt
         self._square = 0.0  # integral of v^2 dt
@@ -52,39 +52,23 @@ class Alignment:
 
     def saved(self) -> tuple:
         """Return the state, for `restore`."""
-        moving = self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed
+        moving = self.active, self.leads, self._shaken, self._elapsed
         line = self._velocity, self._sum, self._moment, self._square
         return *moving, *line, self._force, self._force_square, self._unsure
 
     def restore(self, state: tuple) -> None:
         """Set a saved state."""
-        self.active, self._turning, self._changing, self._shaken, self._smooth, self._elapsed = state[:6]
-        self._velocity, self._sum, self._moment, self._square = state[6:10]
-        self._force, self._force_square, self._unsure = state[10:]
+        self.active, self.leads, self._shaken, self._elapsed = state[:4]
+        self._velocity, self._sum, self._moment, self._square = state[4:8]
+        self._force, self._force_square, self._unsure = state[8:]
 
-    def lost_in(self, gap: float, *around: float) -> bool:
-        """Whether the sensor may have turned by more than LOST, other than the rates around it (rad/s) show, in a gap (s).
+    def watch(self, dt: float, force: Sequence[float], gravity: float) -> None:
+        """Follow the motion over `dt` s: specific force (3,) in m/s^2."""
+        self._shaken += dt / (_MEMORY + dt) * ((math.hypot(*force) / gravity - 1.0) ** 2 - self._shaken)
 
-        Of a rate that swings with an angular frequency f the mean of both ends misses (f gap)^2 / 12 in a short gap.
-        """
-        swings = gap * gap * self._changing
-        share = swings / (12.0 * self._turning) if swings < 6.0 * self._turning else 0.5
-        return share * gap * max(math.sqrt(self._turning), *around) > LOST
-
-    def watch(self, dt: float, rate: Sequence[float], force: Sequence[float], gravity: float) -> None:
-        """Follow the motion over `dt` s: rate (3,) in rad/s without bias, specific force (3,) in m/s^2."""
-        gain = dt / (_MEMORY + dt)
-        wx, wy, wz = rate
-        sx, sy, sz = self._smooth
-        slower = 1.0 / (_SMOOTHING + dt)
-        cx, cy, cz = (wx - sx) * slower, (wy - sy) * slower, (wz - sz) * slower
-        self._smooth = sx + cx * dt, sy + cy * dt, sz + cz * dt
-        self._turning += gain * (wx * wx + wy * wy + wz * wz - self._turning)
-        self._changing += gain * (cx * cx + cy * cy + cz * cz - self._changing)
-        self._shaken += gain * ((math.hypot(*force) / gravity - 1.0) ** 2 - self._shaken)
-
-    def begin(self, force: Sequence[float], gravity: float) -> None:
-        """Begin with the first specific force (3,) after a gap, as `watch`."""
+    def begin(self, force: Sequence[float], gravity: float, leads: bool) -> None:
+        """Begin with the first specific force (3,) after a gap, as `watch`. leads: the line gives the inclination."""
+        self.leads = leads
         self._shaken = max(self._shaken, (math.hypot(*force) / gravity - 1.0) ** 2)
         self.active, self._elapsed, self._square = True, 0.0, 0.0
         self._force = (float(force[0]), float(force[1]), float(force[2]))
@@ -92,9 +76,10 @@ class Alignment:
         self._velocity = self._sum = self._moment = (0.0, 0.0, 0.0)
 
     def take(self, dt: float, rate: quat.Vector, force: quat.Vector, gravity: float, noise: float = 0.0) -> quat.Vector:
-        """Take a sample `dt` s after the last one, as `watch`; return a vector (3,) that points up, m/s^2.
+        """Take a sample `dt` s after the last one; return a vector (3,) that points up, m/s^2.
 
-        noise: of the specific force, m/s^2/sqrt(Hz), where it cannot be measured and `force` is the likeliest one.
+        rate (3,) in rad/s without bias; force (3,) in m/s^2; noise: of the force, m/s^2/sqrt(Hz), by vibration, or where it
+        cannot be measured and `force` is the likeliest one.
         """
         wx, wy, wz = rate
         turn = quat.exponential(-wx * dt, -wy * dt, -wz * dt)
@@ -134,6 +119,13 @@ class Alignment:
         t = self._elapsed
         x, y, z = (v - a / t - 0.5 * t * s for v, a, s in zip(self._velocity, self._sum, self._slope()))
         return (x, y, z), self.std(gravity) * gravity * t / math.sqrt(3.0)
+
+    def velocity_noise(self, gravity: float) -> float:
+        """Return the density of a velocity about zero, m/s sqrt(s), that shows the inclination as surely as the line does.
+
+        The line that fits white noise of this density d best over the time t has a slope with the variance 12 d^2 / t^3.
+        """
+        return self.std(gravity) * gravity * math.sqrt(self._elapsed**3 / 12.0)
 
     def _scatter(self) -> float:
         """Return the mean square of the velocity's distance from the line, (m/s)^2."""

@@ -23,6 +23,8 @@ from gravcomp.orientation.guard import REJECTED, RESTARTED, Problem, SampleGuard
 from gravcomp.orientation.last_steps import LastSteps, Step
 from gravcomp.orientation.options import FilterOptions
 from gravcomp.orientation.rest import RestDetector, agrees
+from gravcomp.orientation.swings import Swings
+from gravcomp.orientation.vibration import Vibration
 
 START_TILT_STD = math.radians(5.0)  # of one accelerometer sample taken for gravity; larger where |a| differs from g
 START_YAW_STD = math.radians(0.1)  # yaw is zero by definition
@@ -33,6 +35,7 @@ UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer measures nothing
 CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those of a stuck sensor, not of a sensor at rest
 # Between the mean specific force at rest and the filter's gravity: a larger angle is more than a calibration error explains.
 CONTRADICTED_TILT = math.radians(2.0)
+LOST = math.radians(10.0)  # a gap in which the sensor may have turned farther than the rates around show is not bridged
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -53,6 +56,7 @@ class OrientationFilter:
         self._steps = LastSteps(self.options.spikes)
         self._errors = ErrorCovariance()
         self._alignment = Alignment()
+        self._swings, self._vibration = Swings(), Vibration(means=3)  # of the rate, of the specific force
         self.reset()
 
     def reset(self) -> None:
@@ -60,6 +64,8 @@ class OrientationFilter:
         self._guard.reset()
         self._even.reset()
         self._alignment.reset()
+        self._swings.reset()
+        self._vibration.reset()
         self._started = False
         self._orientation = quat.IDENTITY
         self._velocity = (0.0, 0.0, 0.0)
@@ -103,7 +109,7 @@ class OrientationFilter:
         problem = Problem.GAP if verdict.problem is Problem.NONE and self._is_lost(verdict.dt, rate) else verdict.problem
         if not self._started or problem in RESTARTED:
             self._start(rate, force, verdict.dt)
-            self._alignment.begin(force, self._gravity_norm)
+            self._alignment.begin(force, self._gravity_norm, leads=True)
             self._set_aligned(force)
             self._even.reset()
             self._steps.reset()
@@ -141,15 +147,21 @@ class OrientationFilter:
         else:
             self._rest.reset()
             resting = False
-        self._predict(dt, rate, force, step.gyro_usable, step.accel_usable)
+        bridged, variance = self._is_gap(dt) and step.accel_usable, self._errors.matrix[0, 0]
+        self._predict(step)
+        bridged = bridged and self._errors.matrix[0, 0] > 2.0 * variance  # the inclination is mostly that of the gap
         if step.gyro_usable and step.accel_usable:
-            self._alignment.watch(dt, self._unbiased(rate), force, self.options.gravity)
-        if self._alignment.active and step.gyro_usable:
-            noise = 0.0 if step.accel_usable else UNKNOWN_ACCEL_NOISE
-            self._set_aligned(self._alignment.take(dt, self._unbiased(rate), force, self._gravity_norm, noise))
-            return resting
-        if self._alignment.active:
-            self._alignment.begin(force, self._gravity_norm)
+            self._alignment.watch(dt, force, self.options.gravity)
+        if bridged and not (self._alignment.active and self._alignment.leads):
+            self._alignment.begin(force, self._gravity_norm, leads=False)
+        elif self._alignment.active and step.gyro_usable:
+            noise = math.sqrt(self._vibration.density) if step.accel_usable else UNKNOWN_ACCEL_NOISE
+            upward = self._alignment.take(dt, self._unbiased(rate), force, self._gravity_norm, noise)
+            if self._alignment.leads:
+                self._set_aligned(upward)
+                return resting
+        elif self._alignment.active:
+            self._alignment.begin(force, self._gravity_norm, self._alignment.leads)
         if step.accel_usable:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
@@ -164,7 +176,8 @@ class OrientationFilter:
         """Return the state that steps change, for `_restore`."""
         state = (self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period)
         learned = (self._gravity_norm, self._accel_norm_at_rest, self._errors.matrix.copy())
-        return *state, *learned, self._rest.saved(), self._alignment.saved()
+        parts = (self._rest, self._alignment, self._swings, self._vibration)
+        return *state, *learned, *(part.saved() for part in parts)
 
     def _restore(self, state: tuple) -> None:
         self._orientation, self._velocity, self._bias, self._bias_given, self._last_gyro, self._period = state[:6]
@@ -172,6 +185,8 @@ class OrientationFilter:
         self._errors.reset(state[8].copy())
         self._rest.restore(state[9])
         self._alignment.restore(state[10])
+        self._swings.restore(state[11])
+        self._vibration.restore(state[12])
 
     def _contradicted_tilt(self) -> float:
         """Return the angle (rad) between the mean specific force and the vertical of the estimated orientation.
@@ -214,6 +229,8 @@ class OrientationFilter:
         self._contradicted = False
         self._rest.reset()
         self._alignment.active = False
+        self._swings.interrupt()
+        self._vibration.interrupt()
         self._last_gyro = gyro
         self._period = 0.0
         self._started = True
@@ -224,8 +241,12 @@ class OrientationFilter:
 
     def _is_lost(self, dt: float, gyro: quat.Vector) -> bool:
         """Return whether the sensor may have turned too far meanwhile for a gap of `dt` s to be bridged."""
+        return self._is_gap(dt) and self._missed_in(dt, gyro) > LOST
+
+    def _missed_in(self, gap: float, gyro: quat.Vector) -> float:
+        """Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it show."""
         around = (math.dist(rate, self._bias) for rate in (self._last_gyro, gyro))
-        return self._is_gap(dt) and self._alignment.lost_in(dt, *around)
+        return self._swings.missed_in(gap, self._period, *around)
 
     def _set_aligned(self, upward: quat.Vector) -> None:
         """Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty."""
@@ -248,18 +269,27 @@ class OrientationFilter:
         accel = not verdict.accel_saturated and not (verdict.accel_stuck and self._contradicted)
         return gyro, accel
 
-    def _predict(self, dt: float, gyro: quat.Vector, accel: quat.Vector, gyro_usable: bool, accel_usable: bool) -> None:
+    def _predict(self, step: Step) -> None:
         options = self.options
+        dt, gyro, accel, gyro_usable, accel_usable = step.dt, step.rate, step.force, step.gyro_usable, step.accel_usable
         extra_tilt = extra_velocity = 0.0
         x, y, z = gyro if gyro_usable else self._bias
         if self._is_gap(dt):
-            # The missing samples are replaced by the mean of the rates around them; its uncertainty is their difference.
-            a, b, c = self._last_gyro
-            x, y, z = 0.5 * (x + a), 0.5 * (y + b), 0.5 * (z + c)
-            extra_tilt = (math.dist((x, y, z), self._last_gyro) * dt) ** 2
+            # The mean of the rates around stands in for the missing samples; a rate counts for the period before it. The mean
+            # misses a part of the motion, and it has the noise of two samples.
+            noise = 0.5 * self._swings.noise(self._period) + (0.5 * step.doubt) ** 2
+            extra_tilt = self._missed_in(dt, (x, y, z)) ** 2 / 3.0 + noise * dt * dt
             extra_velocity = UNKNOWN_ACCEL_NOISE**2 * dt
+            share = 0.5 + 0.5 * self._period / dt
+            x, y, z = (share * now + (1.0 - share) * before for now, before in zip((x, y, z), self._last_gyro))
+            self._swings.interrupt()
+            self._vibration.interrupt()
         else:
             self._period = dt if not self._period else self._period + 0.05 * (dt - self._period)
+        if gyro_usable:
+            self._swings.watch(dt, self._unbiased(gyro))
+        if accel_usable:
+            self._vibration.take(dt, accel)
         self._last_gyro = gyro if gyro_usable else self._bias
         wx, wy, wz = x - self._bias[0], y - self._bias[1], z - self._bias[2]
         half = 0.5 * dt
@@ -275,19 +305,24 @@ class OrientationFilter:
         if not gyro_usable:
             tilt += (STUCK_RATE_NOISE if self._contradicted else SATURATED_RATE_NOISE) ** 2 * dt
         walk = options.bias_walk_stable if self.temperature_stable else options.bias_walk
+        # The velocity is a sum of samples: it has their noise where that is more than the data sheet says.
+        force_noise = max(options.accel_noise**2, self._vibration.density) if accel_usable else UNKNOWN_ACCEL_NOISE**2
         self._errors.predict(
             dt,
             middle,
             self._gravity_norm,
             tilt=tilt,
             bias=walk**2 * dt if self.bias_estimation else 0.0,
-            velocity=(options.accel_noise if accel_usable else UNKNOWN_ACCEL_NOISE) ** 2 * dt + extra_velocity,
+            velocity=force_noise * dt + extra_velocity,
             bias_estimation=self.bias_estimation,
         )
 
     def _correct(self, dt: float, measure_bias: bool) -> None:
         options = self.options
-        velocity_variance = options.velocity_noise**2 / dt
+        density = options.velocity_noise
+        if self._alignment.active:  # after a bridged gap
+            density = max(density, self._alignment.velocity_noise(self._gravity_norm))
+        velocity_variance = density * density / dt
         vx, vy, vz = self._velocity
         if measure_bias:
             mean, bias = self._rest.mean_gyro, self._bias

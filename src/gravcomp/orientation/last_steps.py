@@ -4,43 +4,48 @@ A sample is decided some samples later, by `spikes` and `spike_review`. Where an
 back to its state before that step and repeats the steps since then.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
 from gravcomp.orientation.quaternion import Vector
-from gravcomp.orientation.spike_review import AHEAD, SpikeReview
+from gravcomp.orientation.spike_review import AHEAD, SURE_ACCEL, SURE_GYRO, SpikeReview
 from gravcomp.orientation.spikes import SpikeGate, SpikeOptions
 
 # Of the threshold of a spike: an angle lacks for good what a wrong spike removes, a velocity is corrected all the time.
-SURE_GYRO, SURE_ACCEL = 1.5, 1.0
+GATE_SURE_GYRO, GATE_SURE_ACCEL = 1.5, 1.0
 PATIENCE_GYRO = 2.0  # its review finds what the gate overlooks; a wrong suspicion costs samples in fast motion
 
 
 @dataclass
 class Step:
-    """dt in s; rate (3,) in rad/s and specific force (3,) in m/s^2 that count; whether each of them is usable."""
+    """dt in s; rate (3,) in rad/s and specific force (3,) in m/s^2 that count; whether each of them is usable.
+
+    doubt: rad/s, by how much the rate that was measured differs from the one that counts until the next samples decide.
+    """
 
     dt: float
     rate: Vector
     force: Vector
     gyro_usable: bool
     accel_usable: bool
+    doubt: float = 0.0
 
 
 class LastSteps:
     """Keeps as many steps as a decision may change, each with the state of the filter before it."""
 
     def __init__(self, options: SpikeOptions) -> None:
-        self._gyro_gate = SpikeGate(options.gyro, options, SURE_GYRO, PATIENCE_GYRO)
-        self._accel_gate = SpikeGate(options.accel, options, SURE_ACCEL)
-        self._review = SpikeReview(options.gyro, options)
+        self._gyro_gate = SpikeGate(options.gyro, options, GATE_SURE_GYRO, PATIENCE_GYRO)
+        self._accel_gate = SpikeGate(options.accel, options, GATE_SURE_ACCEL)
+        self._gyro_review = SpikeReview(options.gyro, options, SURE_GYRO)
+        self._accel_review = SpikeReview(options.accel, options, SURE_ACCEL)
         self._kept: deque[tuple[tuple, Step]] = deque(maxlen=max(AHEAD, options.longest))
 
     def reset(self) -> None:
         """Forget the signals and the steps."""
-        self._gyro_gate.reset()
-        self._accel_gate.reset()
-        self._review.reset()
+        for part in (self._gyro_gate, self._accel_gate, self._gyro_review, self._accel_review):
+            part.reset()
         self._kept.clear()
 
     def forget(self) -> None:
@@ -56,41 +61,51 @@ class LastSteps:
 
         Returns the last steps since the first one for which another value counts now, the oldest first; they are no longer kept.
         """
-        changed = max(self._decide_rates(step, gap), self._decide_forces(step))
+        changed = max(self._decide_rates(step, gap), self._decide_forces(step, gap))
         return [self._kept.pop() for _ in range(changed)][::-1]
 
     def _decide_rates(self, step: Step, gap: bool) -> int:
         """Set the step's rate; return how many steps are to be repeated."""
         if not step.gyro_usable:
             self._gyro_gate.reset()
-            self._review.reset()
+            self._gyro_review.reset()
             return 0
-        changed, measured = 0, step.rate
-        step.rate, counted = self._gyro_gate.take(step.dt, measured)
-        for age in range(1, min(len(counted), AHEAD - 1) + 1):  # older ones are decided by the review
+        measured = step.rate
+        step.rate, decided = _decided(self._gyro_gate, self._gyro_review, step.dt, measured, gap)
+        step.doubt = math.dist(measured, step.rate)
+        changed = 0
+        for age, value in decided:
             earlier = self._earlier(age)
-            if earlier is not None and earlier.rate != counted[-age]:
-                earlier.rate, changed = counted[-age], age
-        if gap:
-            self._review.reset()
-        decided, earlier = self._review.take(step.dt, measured), self._earlier(AHEAD)
-        if decided is not None and earlier is not None and earlier.rate != decided:
-            earlier.rate, changed = decided, AHEAD
+            if earlier is not None and earlier.rate != value:
+                earlier.rate, earlier.doubt, changed = value, 0.0, max(changed, age)
         return changed
 
-    def _decide_forces(self, step: Step) -> int:
+    def _decide_forces(self, step: Step, gap: bool) -> int:
         """Set the step's specific force; return how many steps are to be repeated."""
         if not step.accel_usable:
             self._accel_gate.reset()
+            self._accel_review.reset()
             return 0
+        step.force, decided = _decided(self._accel_gate, self._accel_review, step.dt, step.force, gap)
         changed = 0
-        step.force, counted = self._accel_gate.take(step.dt, step.force)
-        for age, value in enumerate(reversed(counted), 1):
+        for age, value in decided:
             earlier = self._earlier(age)
             if earlier is not None and earlier.force != value:
-                earlier.force, changed = value, age
+                earlier.force, changed = value, max(changed, age)
         return changed
 
     def _earlier(self, age: int) -> Step | None:
         """Return the step `age` samples ago, None where it is not kept."""
         return self._kept[-age][1] if age <= len(self._kept) else None
+
+
+def _decided(
+    gate: SpikeGate, review: SpikeReview, dt: float, measured: Vector, gap: bool
+) -> tuple[Vector, list[tuple[int, Vector]]]:
+    """Return what counts for a new sample, and for earlier ones: how many samples ago, and the value (3,) that is decided."""
+    value, counted = gate.take(dt, measured)
+    decided = [(age, counted[-age]) for age in range(1, min(len(counted), AHEAD - 1) + 1)]  # the review decides older ones
+    if gap:
+        review.reset()
+    final = review.take(dt, measured)
+    return value, decided if final is None else [*decided, (AHEAD, final)]

@@ -9,7 +9,7 @@ import numpy as np
 from gravcomp.orientation.estimator import GravityEstimator
 from gravcomp.orientation.filter import MISSED_PERIODS
 from gravcomp.orientation.guard import Problem
-from gravcomp.orientation.spike_review import AHEAD, SpikeReview
+from gravcomp.orientation.spike_review import AHEAD, SURE_GYRO, SpikeReview
 from gravcomp.orientation.spikes import SpikeOptions
 from gravcomp.recordings.imu import Recording
 
@@ -69,7 +69,7 @@ def estimate_recording(
 
 def without_rate_spikes(recording: Recording, options: SpikeOptions) -> Recording:
     """Return the recording without single spikes of the rate, for what takes means of samples: a mean would hide them."""
-    review, gyro, longest = SpikeReview(options.gyro, options), recording.gyro.copy(), MISSED_PERIODS / recording.rate
+    review, gyro, longest = SpikeReview(options.gyro, options, SURE_GYRO), recording.gyro.copy(), MISSED_PERIODS / recording.rate
     before = int(recording.stamp_ns[0])
     for i, (stamp_ns, rate, _) in enumerate(recording.samples()):
         dt, before = (stamp_ns - before) * 1e-9, stamp_ns

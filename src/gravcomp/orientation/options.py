@@ -66,7 +66,11 @@ class FilterOptions:
         0.001, unit="sqrt(s)", minimum=0, maximum=1, description="its growth with the rate: scale error and misalignment"
     )
     accel_noise: float = parameter(
-        0.01, unit="m/s^2/sqrt(Hz)", minimum=1e-5, maximum=10, description="noise density of the accelerometer"
+        0.01,
+        unit="m/s^2/sqrt(Hz)",
+        minimum=1e-5,
+        maximum=10,
+        description="noise density of the accelerometer; that of vibration is measured, and counts where it is more",
     )
     accel_error: float = parameter(
         0.03,

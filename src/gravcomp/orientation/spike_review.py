@@ -9,6 +9,8 @@ quadratic: A. Blake, A. Zisserman, Visual Reconstruction, MIT Press 1987, ch. 3)
 Slow motion and vibration are no such curve. There the median of the neighbours is nearer, and three spikes among them do not
 move it, while a polynomial swings with the vibration, and three spikes bend it. So the median counts as long as a curve was not
 nearer to the last samples than the mean of their neighbours.
+
+A spike that is no larger than the vibration cannot be found. It is noise, which `vibration` measures with the rest.
 """
 
 import itertools
@@ -21,7 +23,10 @@ from gravcomp.orientation.spikes import BOUND, SpikeOptions
 
 BEFORE, AHEAD = 5, 4  # samples of the fit before and after the one in question
 DEGREE = 4
-SURE = 2.0  # of the threshold: an angle lacks for good what a wrong spike removes
+# Of the threshold of a curve, as in `last_steps`: an angle lacks for good what a wrong spike removes.
+SURE_GYRO, SURE_ACCEL = 2.0, 1.0
+# Of the threshold of a jump, for the distance from the median: in vibration 1.1 times its RMS, a jump 1.4 times.
+FROM_MEDIAN = 0.75
 WITH_IT = 0.25  # of that: where one axis has a spike, the others are likely to have one
 STRAIGHT = 0.1  # of the floor: by how much a curve may be nearer to the last samples than their mean where the median counts
 _LEFT_OUT = 0.1  # cost of a sample that is left out, in squared thresholds times the residual's share of a single spike
@@ -53,9 +58,9 @@ _COST = _LEFT_OUT * float(_RESIDUALS[0][BEFORE, BEFORE])
 class SpikeReview:
     """One sensor of three axes. What it returns is final, so that the samples before one in question are without spikes."""
 
-    def __init__(self, floor: float, options: SpikeOptions):
-        """floor: a smaller distance from the curve is no spike."""
-        self._floor, self._options = floor, options
+    def __init__(self, floor: float, options: SpikeOptions, sure: float):
+        """floor: a smaller distance is no spike; sure: of the threshold, from which a sample that is far from a curve is one."""
+        self._floor, self._options, self._sure = floor, options, sure
         self._samples: deque[Vector] = deque(maxlen=BEFORE + 1 + AHEAD)
         self.reset()
 
@@ -81,7 +86,7 @@ class SpikeReview:
         self._mean += part * (min(distance, BOUND * threshold) - self._mean)
         self._mean_from_median += part * (min(off, BOUND * from_median) - self._mean_from_median)
         self._bend += part * (max(-self._floor, bend) - self._bend)
-        least = SURE * from_median
+        least = max(self._floor, FROM_MEDIAN * from_median)
         is_far = off > least and distance > self._floor
         if self._bend <= STRAIGHT * self._floor and not (is_far and self._goes_on(middle, least)):
             if not is_far:
@@ -90,7 +95,7 @@ class SpikeReview:
         elif distance <= threshold:
             return ours
         else:
-            decided = self._decided(SURE * threshold)
+            decided = self._decided(self._sure * threshold)
         samples[BEFORE] = decided
         return decided
 

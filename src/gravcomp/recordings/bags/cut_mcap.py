@@ -5,8 +5,10 @@ complete. The reader of rosbags needs the footer at the end of the file; here th
 the records.
 """
 
+from collections.abc import Collection, Generator
 from pathlib import Path
 
+from rosbags.interfaces import Connection
 from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.storage_mcap import McapReader, decompress
 
@@ -15,7 +17,7 @@ _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
 
 
 class CutMcap(McapReader):
-    """Reader of an MCAP file up to its last complete record."""
+    """Reader of an MCAP file up to its last complete record, in the order of the file: a recorder need not write by time."""
 
     def _open(self) -> None:
         assert self.bio is not None  # the base class has opened the file
@@ -25,6 +27,12 @@ class CutMcap(McapReader):
         self.data_end = _end_of_data(Path(str(self.path)))
         # No index is read, so the messages are found by scanning.
         self.meta_scan()
+
+    def messages(
+        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
+    ) -> Generator[tuple[Connection, int, bytes], None, None]:
+        """Yield connection, time (ns) and content of the messages; that of the base class ends where the time goes back."""
+        return self.messages_scan(connections, start, stop)
 
 
 def _end_of_data(path: Path) -> int:

@@ -1,7 +1,7 @@
 """Recovery of bags that were cut off or damaged.
 
-A recorder that was killed leaves neither an index nor metadata.yaml; an interrupted copy ends within a record. What can be read
-is written once into a complete bag in the cache; the recording itself is not changed.
+A recorder that was killed leaves neither an index nor metadata.yaml, which also says how a bag is compressed; an interrupted copy
+ends within a record. What can be read is written once into a complete bag in the cache; the recording itself is not changed.
 """
 
 import contextlib
@@ -22,10 +22,12 @@ from gravcomp.recordings.bags.cut_mcap import CutMcap
 from gravcomp.recordings.bags.cut_sqlite import repaired
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
+from gravcomp.recordings.bags.storage import is_compressed, message_of, storage_files, uncompressed
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
+_VERSION = 2  # of what is saved: 2 has the messages of MCAP files that are not in the order of their times, and none compressed
 _REPORTED = 200  # messages between two reports of progress
 
 
@@ -39,7 +41,7 @@ class ReadableBag:
 
 
 def readable(path: str | Path, progress: Callable[[float], None] | None = None) -> ReadableBag:
-    """Return a complete bag for `path`, a folder or its .mcap or .db3 file; a damaged one is recovered.
+    """Return a complete bag for `path`, a folder or its .mcap or .db3 file (also .zstd); a damaged one is recovered.
 
     Every message is read once, one after the other; `progress` receives the share of the bag's time that is read. Raises BagError
     when nothing can be read.
@@ -53,10 +55,12 @@ def readable(path: str | Path, progress: Callable[[float], None] | None = None) 
         problem = "metadata.yaml is missing"
     except Exception as error:  # any error of a reader on a damaged file
         problem = f"{type(error).__name__}: {error}" if not isinstance(error, ReaderError) else str(error)
-    files = [path] if path.is_file() else sorted([*path.glob("*.mcap"), *path.glob("*.db3")])
+    files = [path] if path.is_file() else storage_files(path)
     if not files:
         raise BagError(f"{path}: is not a bag: there is no .mcap and no .db3 file in it")
-    saved = cache_folder("bags") / _key(files) / path.stem
+    if not any(file.stat().st_size for file in files):
+        raise BagError(f"{path}: is empty: {', '.join(file.name for file in files)} has 0 bytes")
+    saved = cache_folder("bags") / _key(files, path.stem) / path.stem
     if saved.exists():
         return ReadableBag(saved, problem, _read_through(saved))
     return ReadableBag(saved, problem, _save(path, files, saved, problem))
@@ -66,7 +70,9 @@ def _read_through(path: Path, progress: Callable[[float], None] | None = None) -
     """Read every message once and return their number."""
     count = 0
     with Reader(path) as reader:
-        for count, (_, received, _) in enumerate(reader.messages(), 1):
+        for count, (_, received, stored) in enumerate(reader.messages(), 1):
+            if is_compressed(stored):
+                raise ReaderError("metadata.yaml, which says how the messages are compressed, is missing")
             if progress is not None and count % _REPORTED == 0:
                 progress(share_read(reader, received))
     return count
@@ -112,15 +118,14 @@ def _messages(file: Path) -> Iterator[tuple[Connection, int, bytes]]:
     """Yield the messages up to the first that cannot be read."""
     with contextlib.ExitStack() as held:
         try:
+            first, second = (held.enter_context(tempfile.TemporaryDirectory(dir=cache_folder("bags"))) for _ in range(2))
+            plain = uncompressed(file, Path(first))
             reader: CutMcap | Sqlite3Reader
-            if file.suffix == ".mcap":
-                reader = CutMcap(file)
-            else:
-                folder = held.enter_context(tempfile.TemporaryDirectory(dir=cache_folder("bags")))
-                reader = Sqlite3Reader(repaired(file, Path(folder)))
+            reader = CutMcap(plain) if plain.suffix == ".mcap" else Sqlite3Reader(repaired(plain, Path(second)))
             held.callback(_close, reader)
             reader.open()
-            yield from reader.messages(reader.connections)
+            for source, time, stored in reader.messages(reader.connections):
+                yield source, time, message_of(stored)
         except Exception:  # the end of the readable part
             return
 
@@ -130,9 +135,9 @@ def _close(reader: CutMcap | Sqlite3Reader) -> None:
         reader.close()
 
 
-def _key(files: list[Path]) -> str:
-    """Return a name for the content of the files."""
-    digest = hashlib.sha256()
+def _key(files: list[Path], stem: str) -> str:
+    """Return a name for the content of the files of a bag with the name `stem`."""
+    digest = hashlib.sha256(f"{_VERSION} {stem}".encode())
     for file in files:
         with file.open("rb") as data:
             hashlib.file_digest(data, lambda: digest)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.config import from_mapping, load_yaml
+from gravcomp.recordings.bags.storage import storage_files
 from gravcomp.recordings.imu.csv_columns import CsvColumns, Found, by_mapping, by_names
 from gravcomp.recordings.imu.csv_text import Table, read_table
 from gravcomp.recordings.imu.csv_units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
@@ -26,7 +27,7 @@ _NEEDED = "needed: time, rate x y z, specific force x y z; or their names in a f
 def is_csv(path: Path) -> bool:
     """Whether a path is a CSV file, or a folder with some and without a bag."""
     if path.is_dir():
-        bag = (path / "metadata.yaml").exists() or any(path.glob("*.mcap")) or any(path.glob("*.db3"))
+        bag = (path / "metadata.yaml").exists() or bool(storage_files(path))
         return not bag and (any(path.glob("*.csv")) or any((path / place).exists() for place in _TREE))
     return path.suffix.lower() in SUFFIXES
 

@@ -17,16 +17,18 @@ ACCEL_UNITS = {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVIT
 
 _PER = r"[\s/_]*(per|p)?[\s/_]*"
 _SPELT = {
-    "rad/s": rf"rad(ian)?s?{_PER}s(ec)?(\^?-1|⁻¹)?",
+    "rad/s": rf"rad(ian)?s?{_PER}s(ec)?(\^?-1|⁻¹)?|рад\s*/\s*с(ек)?",
     "mdeg/s": rf"m(illi)?-?(deg|°|d){_PER}s(ec)?",
-    "deg/s": rf"(deg(ree)?s?|°|grad|º|d){_PER}s(ec)?(\^?-1|⁻¹)?",
-    "m/s^2": r"m[\s/._·*]*p?s(ec)?\s*(\^?-?2|²|⁻²)|m\s*/\s*s\s*/\s*s|mps2|mpss",
+    "deg/s": rf"(deg(ree)?s?|°|grad|º|d){_PER}s(ec)?(\^?-1|⁻¹)?|(град\w*|°)\s*/\s*с(ек)?|(度|°)\s*/\s*秒",
+    "m/s^2": (
+        r"m[\s/._·*]*p?s(ec)?\s*(\^?-?2|²|⁻²)|m\s*/\s*s\s*/\s*s|mps2|mpss|м\s*/\s*с(ек)?\s*(\^?2|²)|米\s*/\s*秒\s*(\^?2|²)"
+    ),
     "mg": r"mg|milli-?g",
     "g": r"g",
     "ns": r"ns|nsecs?|nanos(ec\w*)?",
-    "us": r"us|µs|μs|usecs?|micros(ec\w*)?",
-    "ms": r"ms|msecs?|millis(ec\w*)?",
-    "s": r"s|secs?|seconds?|sekunden?",
+    "us": r"us|µs|μs|usecs?|micros(ec\w*)?|мкс|微秒",
+    "ms": r"ms|msecs?|millis(ec\w*)?|мс(ек)?|毫秒|ミリ秒|밀리초",
+    "s": r"s|secs?|seconds?|sekunden?|с|сек\w*|秒|초",
 }
 _BRACKET = re.compile(r"[(\[{](.*?)[)\]}]")
 _SEPARATOR = re.compile(r"[\s_,./:\-]+")

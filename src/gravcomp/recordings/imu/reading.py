@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from gravcomp.recordings.bags.storage import is_storage
 from gravcomp.recordings.imu.broad import read_broad
 from gravcomp.recordings.imu.csv_columns import CsvColumns
 from gravcomp.recordings.imu.csv_files import is_csv, read_csv
@@ -26,7 +27,7 @@ def read_recording(
     path = Path(path).expanduser()
     if not path.exists():
         raise RecordingError(f"{path}: does not exist; {_KINDS} is needed")
-    is_bag = path.suffix in (".mcap", ".db3") or (path.is_dir() and not is_csv(path))
+    is_bag = is_storage(path) or (path.is_dir() and not is_csv(path))
     if topic is not None and not is_bag:
         raise RecordingError(f"{path}: is no bag, so that it has no topic '{topic}' to choose")
     if is_csv(path):
