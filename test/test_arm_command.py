@@ -15,7 +15,7 @@ def tour(gravcomp, *words):
 @pytest.mark.graph
 @pytest.mark.timeout(1300)
 def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcomp):
-    answer = tour(gravcomp, *documented("./gravcomp arm --viewer")[1:], "--hold", "2", *QUICK, "--json")
+    answer = tour(gravcomp, *documented("./gravcomp arm --viewer")[1:], "--hold", "1.5", *QUICK, "--json")
     assert answer.code == 0, answer.err
     figures = answer.json
     assert figures["inclination_deg"] == [135.0, 90.0, 45.0, 0.0, -45.0]

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import yaml
 
+from gravcomp.config import ConfigError
 from gravcomp.description import shipped_robots
+from gravcomp.launcher.robot_graph import check_robot_file
 
 
 def changed_robot(tmp_path, change) -> str:
@@ -43,13 +45,28 @@ def test_a_recording_that_cannot_be_used_is_refused(gravcomp, tmp_path):
         (lambda d: d.update(nodes={"fem_simulator": {"marker_speed": 1.0}}), ["marker_speed"]),
     ],
 )
-def test_a_robot_file_with_a_mistake_is_refused(gravcomp, tmp_path, change, words):
-    refused(gravcomp("demo", "--headless", "--robot", changed_robot(tmp_path, change)), *words)
+def test_a_robot_file_with_a_mistake_is_refused(tmp_path, change, words):
+    """By what demo, up and arm ask before they start a node."""
+    with pytest.raises(ConfigError) as error:
+        check_robot_file(changed_robot(tmp_path, change))
+    assert all(word in str(error.value) for word in words), error.value
+
+
+def test_a_mistake_in_the_section_of_a_node_is_refused_before_any_node_starts(gravcomp, tmp_path):
+    wrong = changed_robot(tmp_path, lambda d: d.update(nodes={"fem_simulator": {"marker_rate": 1000.0}}))
+    answer = gravcomp("demo", "--headless", "--robot", wrong)
+    refused(answer, "robot.yaml: nodes.fem_simulator", "marker_rate", "1000")
+    assert "ended with code" not in answer.err  # as a node that refuses it
+
+
+def test_a_device_that_does_not_exist_is_refused_before_any_node_starts(gravcomp):
+    answer = gravcomp("up", "--interface", "socketcan", "--channel", "nocan7")
+    refused(answer, "nocan7", "ip link set")
+    assert "ended with code" not in answer.err
 
 
 @pytest.mark.graph
-def test_a_channel_that_does_not_exist_is_refused(gravcomp):
-    refused(gravcomp("up", "--interface", "socketcan", "--channel", "nocan7"), "nocan7", "can_bridge")
+def test_an_interface_that_does_not_exist_is_refused(gravcomp):
     refused(gravcomp("up", "--interface", "carrier_pigeon", "--channel", "1"), "carrier_pigeon", "can_bridge")
 
 

@@ -75,15 +75,6 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     assert marked(mark) == []
 
 
-@pytest.mark.rates
-def test_a_robot_drawn_by_a_seed_is_compensated(gravcomp):
-    line = documented("./gravcomp demo --robot src/examples/own_robot.yaml --seed 7")[1:]
-    answer = gravcomp(*line, "--headless", "--duration", "12", "--json")
-    assert answer.code == 0, answer.err
-    assert answer.json["sag_mm"] > 20.0
-    assert answer.json["residual_lateral_mm"] < answer.json["sag_mm"] / 3.0
-
-
 @pytest.mark.graph
 def test_a_tracker_of_the_tip_corrects_the_model(gravcomp):
     answer = gravcomp(*documented("./gravcomp demo --tracker 5")[1:], "--headless", "--duration", "14", "--json")

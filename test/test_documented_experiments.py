@@ -1,19 +1,18 @@
 """The documented lines that reproduce the article's experiments, each with --brief."""
 
 import pytest
+from documents import documented
 
-pytestmark = pytest.mark.timeout(1600)
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(1600)]
 
 
-@pytest.mark.parametrize(
-    ("line", "about"),
-    [
-        ("./gravcomp reproduce freefall --brief", "Real to simulation"),
-        pytest.param("./gravcomp reproduce all --write src/doc/figures.md", "index", marks=pytest.mark.graph),
-    ],
-)
-def test_experiments_are_reproduced(made, apart, line, about):
-    """Without --brief all of them take minutes. `test_figures_table` checks what --write does with a document."""
-    code, output = made(line, low=bool(apart))
+def test_experiments_are_reproduced(made):
+    """Without --brief all of them take minutes. `test_figures_table` checks what --write does with a document.
+
+    One of them alone, and its other name, are in `test_reproduce_command`: this run computes it as well.
+    """
+    code, output = made("./gravcomp reproduce all --write src/doc/figures.md", low=False)
     # 1: a figure misses its limit, which can happen in a brief run.
-    assert code in (0, 1) and about in output, output
+    assert code in (0, 1) and "index" in output, output
+    documented("./gravcomp reproduce freefall --brief")
+    assert "Real to simulation" in output, output

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.rates
 
 @pytest.fixture(scope="module")
 def campaign():
-    with RunningGraph({"virtual_robot": {"motion": "tremor"}}) as graph:
+    with RunningGraph({"virtual_robot": {"motion": "tremor", "feedback_rate": 125}}) as graph:
         graph.wait_for_commands()
         campaign = Campaign(graph, seed=7)
         yield campaign

@@ -19,6 +19,8 @@ pytestmark = [pytest.mark.graph, pytest.mark.timeout(1200)]
 # Bend angle and plane in rad; the robot moves to where the model's equilibria end. `bench engine` measures the longest step.
 WITHOUT_EQUILIBRIUM = ((4.5, 0.0), (5.5, 1.0))
 
+AT_THE_END = (ControllerStatus.UNREACHABLE, ControllerStatus.RELAXING)
+
 
 class Found(NamedTuple):
     """What was found in the running graph, each as a future, which raises in the test what was raised while the graph ran.
@@ -51,9 +53,10 @@ def recover(graph: RunningGraph, ros2: Ros2, statuses: list, commands: list, ang
     ros2.until(lambda: commands and statuses, "no commands")
     before = len(statuses)
     ros2.run(f"{pub} '{{bend: true, bend_angle: {angle}, bend_plane: {plane}, tip_position_weight: 1.0}}'")
-    ros2.until(lambda: any(s.code != ControllerStatus.OK for s in statuses[before:]), "the status calls the target reached")
+    # There the robot is where the model's equilibria end, at first it is on its way.
+    ros2.until(lambda: any(s.code in AT_THE_END for s in statuses[before:]), "the status does not call the target out of reach")
     there = len(commands)
-    ros2.until(lambda: len(commands) > there + 300, "no commands follow while the target has no equilibrium")
+    ros2.until(lambda: len(commands) > there + 50, "no commands follow while the target has no equilibrium")
     ros2.run(f"{pub} '{{bend: true, bend_angle: 0.0, tip_position_weight: 1.0, tip_direction_weight: 0.001}}'")
     ros2.until(
         lambda: statuses[-1].code == ControllerStatus.OK and statuses[-1].distance < 3e-3, "the straight target is not reached"

@@ -7,7 +7,15 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from gravcomp.config import ConfigError, DeclaredParameter, convert, declared_parameters, from_mapping, unknown_key
+from gravcomp.config import (
+    ConfigError,
+    DeclaredParameter,
+    check_given,
+    convert,
+    declared_parameters,
+    flattened,
+    from_mapping,
+)
 
 
 def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
@@ -16,8 +24,8 @@ def declare(node: Node, cls: type, defaults: dict, source: str) -> Any:
     `defaults`: nested mapping of edge keys from the robot file; `source`: its origin, for error messages.
     Raises ConfigError when a default or an override has the wrong type or is out of range.
     """
-    check_defaults(cls, defaults, source)
-    given = _flatten(defaults)
+    check_given(cls, defaults, source)
+    given = flattened(defaults)
     for leaf in declared_parameters(cls):
         override = node._parameter_overrides.get(leaf.key) or _by_earlier_name(node, leaf)
         value = given.get(leaf.key, leaf.default)
@@ -74,15 +82,6 @@ def read(node: Node, cls: type, changes: list[Parameter] = ()) -> Any:
     return from_mapping(cls, _without_unset(mapping, cls), source=f"parameter of {node.get_name()}")
 
 
-def check_defaults(cls: type, defaults: dict, source: str) -> None:
-    """Raise ConfigError for unknown keys and values that are not allowed; keys may be missing."""
-    leaves = {leaf.key: leaf for leaf in declared_parameters(cls)}
-    for key, value in _flatten(defaults).items():
-        if key not in leaves:
-            raise ConfigError(f"{source}: {unknown_key(key, {leaf.key: leaf.earlier_key for leaf in leaves.values()})}")
-        convert(value, leaves[key].type, leaves[key].parameter, source=source, key=key)
-
-
 def _is_unset(value: Any, leaf: DeclaredParameter) -> bool:
     """Return whether an optional parameter is unset: null, which `ros2 param dump` writes, may return as text."""
     return _may_be_unset(leaf) and value in (None, "null", "None")
@@ -90,17 +89,6 @@ def _is_unset(value: Any, leaf: DeclaredParameter) -> bool:
 
 def _may_be_unset(leaf: DeclaredParameter) -> bool:
     return type(None) in typing.get_args(leaf.type)
-
-
-def _flatten(mapping: dict, prefix: str = "") -> dict:
-    flat = {}
-    for key, value in (mapping or {}).items():
-        here = f"{prefix}.{key}" if prefix else str(key)
-        if isinstance(value, dict):
-            flat.update(_flatten(value, here))
-        else:
-            flat[here] = value
-    return flat
 
 
 def _without_unset(mapping: dict, cls: type) -> dict:

@@ -1,6 +1,7 @@
 """Forces of a turning base: their place on the robot, their size, and which rates count."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from gravcomp.description import Elements, load_robot_file
 from gravcomp.external_loads import BaseTurnOptions
 from gravcomp.external_loads.base_turn import BaseTurn
+from gravcomp.full_model import modes
 from gravcomp.full_model.modes import first_period
 from gravcomp.full_model.robot_model import RobotModel
 
@@ -125,3 +127,13 @@ def test_it_can_be_switched_off(model):
     for k in range(3):
         off.add(k * PERIOD, np.array([float(k), 0.0, 0.0]))
     assert not off.acceleration(3 * PERIOD).any()
+
+
+def test_the_first_period_of_a_robot_is_computed_once(monkeypatch):
+    """A calibration asks for it at each step."""
+    robot, asked = load_robot_file("article").robot.with_material(youngs_modulus=3.21e5), []
+    monkeypatch.setattr(modes, "_known_period", functools.lru_cache(modes._period))  # other tests keep what is known
+    monkeypatch.setattr(modes, "natural_frequencies", lambda model, count: asked.append(count) or np.array([4.0]))
+    assert first_period(robot) == first_period(dataclasses.replace(robot)) == 0.25
+    assert len(asked) == 1
+    assert first_period(robot.with_material(youngs_modulus=3.22e5)) == 0.25 and len(asked) == 2

@@ -10,8 +10,10 @@ import pytest
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.bus import BusError, open_bus
+from gravcomp.canbus.device import check_device
 from gravcomp.canbus.link import CanLink
 from gravcomp.canbus.multicast import parse_channel, private_channel
+from gravcomp.config import ConfigError
 from gravcomp.description.hardware import CanInterface
 
 FRAME = codec.encode("MotorFeedback1", angle=1, speed=2, current=0.003)
@@ -211,3 +213,10 @@ def test_the_bus_is_reopened_when_the_transmit_queue_stays_full():
         shop.now += 0.01
         shop.link.send([FRAME])
     assert shop.link.counters.lost == 1
+
+
+def test_a_device_that_this_machine_lacks_is_named_with_what_brings_it_up():
+    with pytest.raises(ConfigError, match=r"socketcan nocan7 cannot be opened: no such device.*ip link set nocan7 up"):
+        check_device(CanInterface(interface="socketcan", channel="nocan7"))
+    check_device(CanInterface(interface="socketcan", channel="lo"))  # whether it is a CAN device shows when it is opened
+    check_device(CanInterface(interface="slcan", channel="/dev/none"))

@@ -24,6 +24,7 @@ from gravcomp.sweep import Sweep
 from gravcomp.trials.free_fall import falling_rod, free_fall
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.trials.lumen import Lumen
+from gravcomp.trials.resting_imu import gravity_at_rest
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 
@@ -208,6 +209,15 @@ def test_the_loop_lets_the_robot_sag_and_straightens_it(setup):
     assert np.linalg.norm(held - target.tip_position) < 3e-3
     felt, true = loop.trace.estimated_gravity[-1], loop.trace.gravity[-1]
     assert metrics.angle_between(felt, true) < np.radians(1.0)
+
+
+def test_gravity_of_a_resting_base_is_that_of_the_loop(setup):
+    """To within the noise of another stream; the bias of the accelerometer is the same, and ten times as large."""
+    base = base_orientation(np.radians(45.0), np.radians(30.0))
+    loop = ClosedLoop(setup, StaticMotion(base))
+    loop.run(2.0 - loop.time)
+    apart = gravity_at_rest(setup, base) - loop.trace.estimated_gravity[-50:].mean(axis=0)
+    assert np.linalg.norm(apart) < np.radians(0.1) * 9.81
 
 
 def test_a_free_fall_begins_straight_and_ends_where_the_robot_hangs(setup):

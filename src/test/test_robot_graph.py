@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
-from gravcomp.launcher.robot_graph import COMPOSED, LOOP, RobotGraph
+import pytest
+import yaml
+
+from gravcomp.config import ConfigError
+from gravcomp.launcher.robot_graph import COMPOSED, LOOP, RobotGraph, check_robot_file
 
 JOINTS = Path(__file__).resolve().parents[1] / "examples" / "joint_robot.yaml"
 PARAMETERS = {"imu_estimator": {"prediction.horizon_ms": 5.0}, "can_bridge": {"trace": False}}
@@ -26,3 +30,19 @@ def test_a_robot_with_joints_keeps_its_bridge_and_its_stand_in():
     apart = names(RobotGraph(str(JOINTS)).loop(virtual=True))
     together = names(RobotGraph(str(JOINTS)).loop(virtual=True, composed=True))
     assert together == (apart[0], COMPOSED, apart[-1]) and apart[1:-1] == LOOP[1:]
+
+
+@pytest.mark.parametrize(
+    ("section", "said"),
+    [
+        ({"marker_rate": 1000.0}, "marker_rate is 1000"),
+        ({"marker_speed": 1.0}, "marker_speed"),
+        ([1, 2], r"nodes.fem_simulator is \[1, 2\]; a mapping of keys is needed"),
+    ],
+)
+def test_the_sections_of_nodes_are_checked_before_any_node_starts(tmp_path, section, said):
+    document = yaml.safe_load(JOINTS.read_text(encoding="utf-8")) | {"nodes": {"fem_simulator": section}}
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(yaml.safe_dump(document), encoding="utf-8")
+    with pytest.raises(ConfigError, match=said):
+        check_robot_file(str(robot))

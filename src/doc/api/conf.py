@@ -59,6 +59,8 @@ html_theme = "alabaster"
 html_sidebars = {"**": ["about.html", "searchfield.html", "localtoc.html", "relations.html"]}
 html_title = f"gravcomp {release}"
 html_show_copyright = False
+html_copy_source = False
+smartquotes = False  # for curly quotes each text is taken apart once more
 
 _FOREIGN = {"np", "numpy", "collections", "pathlib", "typing", "enum", "argparse", "subprocess", "scipy"}
 _SECTION = re.compile(r"^\s*-{3,}\s*$")

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gravcomp.confidence import half_width
 from gravcomp.orientation.errors import CalibrationError
 from gravcomp.orientation.known_directions import check_directions
 from gravcomp.orientation.resting_poses import DISTINCT
@@ -54,7 +55,6 @@ def fit_mount(accel: np.ndarray, base: np.ndarray, *, with_tilt: bool = False) -
     CalibrationError where the rests do not determine what is sought, and where no mount fits them.
     """
     from scipy.optimize import least_squares
-    from scipy.stats import t as student
 
     up = np.asarray(accel, float) / np.linalg.norm(accel, axis=1, keepdims=True)
     unknown, equations = (5 if with_tilt else 3), 2 * len(up)
@@ -86,7 +86,7 @@ def fit_mount(accel: np.ndarray, base: np.ndarray, *, with_tilt: bool = False) -
         )
     check_directions(*directions(solution.x))
     freedom = equations - unknown
-    width = student.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * math.sqrt(2.0 * solution.cost / freedom)
+    width = half_width(freedom, CONFIDENCE) * math.sqrt(2.0 * solution.cost / freedom)
     half = width * np.sqrt(np.diag(np.linalg.inv(normal)))
     measured, expected = directions(solution.x)
     roll, pitch, yaw = (Rotation.from_rotvec(solution.x[:3]) * start).as_euler("xyz").tolist()

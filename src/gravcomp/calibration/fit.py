@@ -29,6 +29,7 @@ from gravcomp.calibration.plausible import check_explained, check_frame
 from gravcomp.calibration.problem import Predictor, Problem
 from gravcomp.calibration.statics import StaticPrediction, StaticPredictor
 from gravcomp.calibration.unknowns import Priors, Unknown, parameters_at, prior_rows, unknowns_of
+from gravcomp.confidence import half_width
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
@@ -104,7 +105,6 @@ def fit_statics(
     determine the moduli, if the described robot has no equilibrium in one of them, and if no values describe them better than the
     robot's description does. Other values at which a window has no equilibrium only shorten the fit's steps.
     """
-    from scipy.stats import t as student
 
     priors, noise = priors or Priors(), noise or TipNoise()
     own = predictor is None
@@ -135,7 +135,7 @@ def fit_statics(
     x = problem.solve(np.zeros(len(unknowns)), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     deviation = np.sqrt(np.diag(problem.covariance(x)))
-    quantile = float(student.ppf(0.975, problem.freedom))
+    quantile = half_width(problem.freedom)
     names = [name_of(robot, unknown, creep_times) for unknown in unknowns]
     partners = partners_of(problem.information(x), unknowns, priors)
     reasons = [

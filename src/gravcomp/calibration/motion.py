@@ -17,6 +17,7 @@ import numpy as np
 
 from gravcomp.calibration.course import course_options, predict_course
 from gravcomp.calibration.measured import Measured, rms_distance
+from gravcomp.confidence import half_width
 from gravcomp.description import Robot
 from gravcomp.full_model.generalized_alpha import DynamicsOptions
 from gravcomp.full_model.modes import first_period
@@ -72,7 +73,6 @@ def fit_motion(
     RuntimeError where it cannot be computed with those of the robot.
     """
     from scipy.optimize import least_squares
-    from scipy.stats import t as student
 
     material = robot.materials[0]
     starts = {"damping_time": material.damping_time}
@@ -105,7 +105,7 @@ def fit_motion(
     freedom = max(1, error.size - len(x))
     rho = float(np.clip((error[1:] * error[:-1]).sum() / max((error**2).sum(), 1e-30), 0.0, 0.99))
     variance = float((error**2).sum()) / freedom * (1 + rho) / (1 - rho)
-    deviation = np.sqrt(np.diag(np.linalg.pinv(solution.jac.T @ solution.jac) * variance)) * student.ppf(0.975, freedom)
+    deviation = np.sqrt(np.diag(np.linalg.pinv(solution.jac.T @ solution.jac) * variance)) * half_width(freedom)
     fitted = all_of_them.robot_at(x)
     final = fitted.materials[0]
     half = {name: getattr(final, name) * float(width) for name, width in zip(all_of_them.names, deviation)}

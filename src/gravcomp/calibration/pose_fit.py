@@ -17,6 +17,7 @@ from gravcomp.calibration.measured import MeasurementError, rms_distance
 from gravcomp.calibration.pose_intervals import covariance, mistaken, not_shown, systematic
 from gravcomp.calibration.pose_prediction import PosePredictor
 from gravcomp.calibration.poses import PoseParameters, Poses
+from gravcomp.confidence import half_width
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 
@@ -133,7 +134,6 @@ def fit_poses(
     without equilibrium residuals are NaN: least_squares takes a shorter step then.
     """
     from scipy.optimize import least_squares
-    from scipy.stats import t as student
 
     priors = priors or PosePriors()
     noise = priors.noise_share * robot.length
@@ -177,7 +177,7 @@ def fit_poses(
     predicted = predictor.predict(parameters)
     matrix = covariance(solution.jac[: poses.measured.size], (predicted - poses.measured) / noise, prior)
     variance = np.diag(matrix) + np.where(prior, 0.0, priors.stiffness**2)
-    half = float(student.ppf(0.975, max(1, poses.measured.size - len(unknowns)))) * np.sqrt(variance)
+    half = half_width(max(1, poses.measured.size - len(unknowns))) * np.sqrt(variance)
     progress("what the clamp leaves open")
     loose = (PosePredictor(_without_contraction(robot), poses).predict(parameters) - predicted).ravel() / noise
     half += systematic(solution.jac[: poses.measured.size], loose, prior)

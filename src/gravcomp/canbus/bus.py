@@ -3,6 +3,7 @@
 import can
 from can.typechecking import CanFilters
 
+from gravcomp.canbus.device import advice
 from gravcomp.canbus.multicast import LoopbackMulticastBus, enlarge_receive_buffer
 from gravcomp.description.hardware import CanInterface
 
@@ -31,9 +32,9 @@ def open_bus(settings: CanInterface, frame_ids: list[int] | None = None) -> can.
         known = ", ".join(sorted(can.VALID_INTERFACES))
         raise BusError(f"CAN interface '{settings.interface}' is not available ({error}); known: {known}") from error
     except can.CanError as error:
-        raise BusError(f"{name} cannot be opened: {error}{_advice(settings)}") from error
+        raise BusError(f"{name} cannot be opened: {error}{advice(settings)}") from error
     except (OSError, ValueError, TypeError, ImportError) as error:
-        raise BusError(f"{name} cannot be opened: {error}{_advice(settings)}") from error
+        raise BusError(f"{name} cannot be opened: {error}{advice(settings)}") from error
 
 
 def _options(settings: CanInterface) -> dict:
@@ -44,14 +45,3 @@ def _options(settings: CanInterface) -> dict:
     if settings.interface in ("socketcan", "virtual"):  # the bit rate of a socketcan device is set by `ip link`
         return {"channel": settings.channel}
     return {"channel": settings.channel, "bitrate": settings.bitrate}
-
-
-def _advice(settings: CanInterface) -> str:
-    if settings.interface == "socketcan":
-        return (
-            f"; bring it up: sudo ip link set {settings.channel or 'can0'} up type can bitrate {settings.bitrate}"
-            " restart-ms 100, and sudo ip link set " + (settings.channel or "can0") + " txqueuelen 1000"
-        )
-    if settings.interface == "slcan":
-        return "; is the adapter plugged in, and does this user have access to it (group dialout)?"
-    return ""

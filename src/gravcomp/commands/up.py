@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:
+    from gravcomp.canbus.device import check_device
     from gravcomp.commands.preparation import prepare
     from gravcomp.config import ConfigError
     from gravcomp.description import load_robot_file
@@ -64,16 +65,21 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
     logs = made_logs(args.logs)
     builder = prepare(args.robot, args.virtual, seed_of(args))
-    interface, channel = args.interface, args.channel
+    interface, channel, file = args.interface, args.channel, load_robot_file(args.robot)
+    virtual = {"motion": "topic", **tracker_parameters(args)}
     if args.virtual and not (interface or channel):
         # On the bus of the robot file, several virtual robots on one machine would receive each other's frames.
         interface, channel = "udp_multicast", private_channels(args.robot)
+        # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
+        virtual |= {"truth_rate": 50.0, "feedback_rate": 125}
     if interface and not args.virtual:
-        load_robot_file(args.robot).require_motors(interface)
+        file.require_motors(interface)
+    for device in () if file.has_joints else file.hardware.on(interface, channel).all_buses:
+        check_device(device)  # before the nodes, which start for seconds
     graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
     specs = graph.loop(args.virtual, args.composed)
     if args.virtual:
-        specs.append(graph.node("gravcomp_hw", "virtual_robot", motion="topic", **tracker_parameters(args)))
+        specs.append(graph.node("gravcomp_hw", "virtual_robot", **virtual))
     with builder, Graph(specs, logs, builder.environment, host) as processes:
         if args.viewer:
             processes.start_one(graph.node("gravcomp_fem", "viewer", port=args.port))

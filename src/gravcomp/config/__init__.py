@@ -2,6 +2,7 @@
 
 from gravcomp.config.declaration import Parameter, parameter
 from gravcomp.config.errors import ConfigError
+from gravcomp.config.given import check_given, flattened
 from gravcomp.config.reading import convert, from_mapping, unknown_key
 from gravcomp.config.writing import DeclaredParameter, declared_parameters, to_mapping
 from gravcomp.config.yaml_file import load_yaml
@@ -10,8 +11,10 @@ __all__ = [
     "ConfigError",
     "DeclaredParameter",
     "Parameter",
+    "check_given",
     "convert",
     "declared_parameters",
+    "flattened",
     "from_mapping",
     "load_yaml",
     "parameter",

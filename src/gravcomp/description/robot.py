@@ -88,7 +88,9 @@ class Robot:
             if cable.segment is not None and cable.segment not in segment_names:
                 allowed = ", ".join(segment_names) or "none (the robot has a body)"
                 raise ValueError(f"{key}.segment is '{cable.segment}'; allowed: {allowed}")
-            runs.append(CableRun(cable, self.cable_end(cable), functools.partial(self.cable_place, cable)))
+            # The checks ask for the same places again and again.
+            place = functools.cache(functools.partial(self.cable_place, cable))
+            runs.append(CableRun(cable, self.cable_end(cable), place))
             check_path(key, runs[-1], self.pieces, self.segments, self.length, self._unit_hint)
         if self.body is None:
             check_crossings(runs, self.pieces)

@@ -1,5 +1,7 @@
 """Vibration modes of the straight robot, K phi = omega^2 M phi, by shift-invert Lanczos iteration (SciPy's `eigsh`)."""
 
+import functools
+
 import numpy as np
 
 from gravcomp.description import Robot
@@ -34,4 +36,12 @@ def first_period(robot: Robot) -> float:
 
     Raises MeshError for a body that cannot be meshed.
     """
+    # The file of a body may change.
+    return _known_period(robot) if robot.body is None else _period(robot)
+
+
+def _period(robot: Robot) -> float:
     return float(1.0 / natural_frequencies(RobotModel(with_coarse_elements(robot)), 1)[0])
+
+
+_known_period = functools.lru_cache(maxsize=16)(_period)

@@ -41,7 +41,13 @@ class Node:
     services: tuple[Port, ...] = ()
     tool: bool = False
 
+    @property
+    def parameters_class(self) -> type:
+        """The data class of the node's own parameters."""
+        module, name = self.parameters.split(":")
+        found: type = getattr(importlib.import_module(module), name)
+        return found
+
     def declared_parameters(self) -> list[DeclaredParameter]:
         """The node's parameters; first those that every node has."""
-        module, name = self.parameters.split(":")
-        return declared_parameters(SharedParameters) + declared_parameters(getattr(importlib.import_module(module), name))
+        return declared_parameters(SharedParameters) + declared_parameters(self.parameters_class)

@@ -83,8 +83,10 @@ def check_robot_file(robot: str, seed: int | None = None) -> str:
     Returns what the virtual robot is, in one sentence; `seed` replaces the file's.
     """
     from gravcomp.description import load_robot_file
+    from gravcomp.graph.node_sections import check_node_sections
     from gravcomp.virtual.described import described
 
     file = load_robot_file(robot)
     _ = file.hardware  # reading it checks it
+    check_node_sections(file)
     return described(file, seed).draw().summary()

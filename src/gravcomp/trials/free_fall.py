@@ -5,20 +5,19 @@ from collections.abc import Iterator
 import numpy as np
 
 from gravcomp.calibration.measured import Measured
-from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.standard_gravity import STANDARD_GRAVITY
+from gravcomp.trials.resting_imu import gravity_at_rest
 from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.body import build_friction, build_material, build_rod
 from gravcomp.virtual.dynamics import MovingRod
 from gravcomp.virtual.equilibrium import RodShape
-from gravcomp.virtual.motion import StaticMotion, base_orientation
+from gravcomp.virtual.motion import base_orientation
 
 SAMPLE = 0.010  # s
 FALL, BRIEF_FALL = 5.4, 1.3  # first periods of the robot: falls to which a motion is fitted
 _STEP = 0.002  # s
 _RELEASED = -0.3  # of the length: paid out so far that the cables stay slack
-_IMU_TIME = 1.5  # s of IMU samples from which gravity is estimated
 
 
 def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
@@ -37,7 +36,7 @@ def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
         source="virtual robot",
         trial=np.full(len(tip), trial),
         time=SAMPLE * np.arange(len(tip)),
-        gravity=np.tile(_estimated_gravity(setup, base), (len(tip), 1)),
+        gravity=np.tile(gravity_at_rest(setup, base), (len(tip), 1)),
         displacement=np.full((len(tip), len(setup.nominal.cables)), np.nan),
         tip_position=tip,
         tip_direction=direction,
@@ -61,10 +60,3 @@ def falling_rod(setup: Setup, base: np.ndarray, duration: float) -> Iterator[tup
         rod.step(_STEP, base, np.zeros(3), world_gravity, np.full(model.tendons, _RELEASED * setup.nominal.length))
         if step % round(SAMPLE / _STEP) == 0:
             yield rod.position.copy(), rod.orientation.copy()
-
-
-def _estimated_gravity(setup: Setup, base: np.ndarray) -> np.ndarray:
-    """Return gravity (3,) in soft_base, m/s^2, as the orientation filter estimates it with the base at rest."""
-    loop = ClosedLoop(setup, StaticMotion(base))
-    loop.run(_IMU_TIME)
-    return loop.trace.estimated_gravity[-50:].mean(axis=0)
