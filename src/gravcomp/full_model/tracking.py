@@ -226,6 +226,8 @@ class StaticTracker:
         model = self.model
         longest = self.longest_step if self.contact is None else min(self.longest_step, self.contact.longest)
         damping = min(1.0, longest / size) if size > 0 else 1.0
+        if self.contact is not None:
+            damping = min(damping, self.contact.part_that_passes(state.u, step))
         start = state.u.copy()
         while True:
             model.free(state.u)[:] = model.free(start) + damping * step
