@@ -7,7 +7,8 @@ the part that is farther from the base is a ball around x(s), or a point on the 
 
 Every pair is looked at once, from its farther part. Each station has a place for each part of the robot that it is near; where the
 gap is a minimum along the robot that bends sharply, as where the robot crosses itself, the place moves there (see `places`).
-Towards the tip the balls of the farther part are smaller, so that none reaches out of the tip's face.
+Within a radius of the tip a ball would reach out of its face: there r(s) is that of the section in the direction of the gap, which
+is the same for a part that lies alongside.
 
 Neighbours are left out: a robot of radius r that bends as sharply as it can without folding into itself, with its axis on a circle
 of radius r, is around half a turn, pi r along its axis, when parts of it meet that are across that circle. Parts that are nearer
@@ -45,7 +46,7 @@ class OwnPlaces(NamedTuple):
     kind (c,): FIXED at a station, MOVED along the robot, ROUND: moved around the tip's rim, RIM: fixed on it; slot (c,): station
     of the farther part, or, after all of them, the point of the rim; place (c, 2) in distances of stations; first (c, 2) and
     share (c, 2, 4): first of four stations, and their weights; tilt (c, 2, 4): those for the slope; own (c, 2): point in the
-    farther section, m; turn (c, 2): its change with the angle; gap (c,) in m; distance (c,) of the middles or point; normal
+    farther section, m; turn (c, 2): its change with the angle; gap (c,) in m; distance (c,) of the middles, or of point and middle; normal
     (c, 3): toward the farther part; slope (c, 2, 3): x' and y'; bend (c, 3): d^2/ds^2, d^2/ds dt and d^2/dt^2 of the distance,
     0 for what does not move.
     """
@@ -87,13 +88,14 @@ def find_own(
         if i == n - 1:
             found = _tip(surface, sections, moved, margin, known, far, near, normal, result, found)
             continue
-        gap = middle - surface.ball[i]
+        gap = middle - _far_radius(surface, far, normal)
         if not known and gap >= margin and gap + _approach(moved, far, near, normal) >= margin:
             continue
         kind = FIXED
         before, after = _beside(surface, sections, i - 1, near, low, high), _beside(surface, sections, i + 1, near, low, high)
         sharp = before - 2.0 * gap + after
-        if gap <= before and gap <= after and sharp > 8.0 * _WORTH * surface.radius[i]:
+        lowest = gap <= before and (gap <= after or (i == n - 2 and _rises(sections, near, low, high, surface)))
+        if lowest and sharp > 8.0 * _WORTH * surface.radius[i]:
             _cross(surface, sections, i, far, near, normal)
             kind = MOVED
         _write(surface, sections, kind, i, (0.0, 0.0), (0.0, 0.0), far, near, normal, result, found)
@@ -108,15 +110,20 @@ def apart(surface: OwnSurface, i: int, j: int) -> bool:
 
 
 @njit(cache=True)
-def smallest_own_gap(surface: OwnSurface, sections: np.ndarray) -> float:
-    """Return the smallest gap in m of the balls at the stations of sections (n, 3, 3) that can touch; inf: none can."""
-    smallest, n = np.inf, len(surface.place)
+def may_touch(surface: OwnSurface, sections: np.ndarray, margin: float) -> bool:
+    """Whether any part of the robot is nearer to another than `margin` m; sections (n, k, 3): p of the stations first."""
+    n, longest = len(surface.place), 0.0
     for i in range(1, n):
-        for j in range(n):
-            if not apart(surface, i, j):
-                break
-            smallest = min(smallest, _distance(sections, i, j) - surface.radius[i] - surface.radius[j])
-    return smallest
+        longest = max(longest, _distance(sections, i, i - 1))
+    reach, thickest = margin + longest**2 / (8.0 * surface.radius.min()), surface.radius.max()
+    for i in range(1, n):
+        j = 0
+        while j < n and apart(surface, i, j):
+            distance = _distance(sections, i, j) - surface.radius[i]
+            if distance - surface.radius[j] < reach:
+                return True
+            j += max(1, int((distance - thickest - reach) / longest))
+    return False
 
 
 @njit(cache=True)
@@ -176,7 +183,7 @@ def _candidates(
     # A gap to the curve is smaller than that to its stations by h^2 / 8 d at most.
     sag, thickest = longest**2 / (8.0 * surface.radius.min()), surface.radius.max()
     for i in range(1, n):
-        radius = surface.radius[i] if i == n - 1 else surface.ball[i]
+        radius = surface.radius[i]
         reach = margin + size[i] + fastest + sag
         j = 0
         while j < n and apart(surface, i, j):
@@ -218,7 +225,32 @@ def _distance(sections: np.ndarray, i: int, j: int) -> float:
 def _beside(surface: OwnSurface, sections: np.ndarray, i: int, near: End, low: float, high: float) -> float:
     """Return the gap of the ball at station i to the part of the robot about `near`."""
     end, normal = end_on_curve(), np.empty(3)
-    return nearest(surface, sections, sections[i, 0], near.place[0], low, high, end, normal) - surface.ball[i]
+    middle, far = nearest(surface, sections, sections[i, 0], near.place[0], low, high, end, normal), end_on_curve()
+    curve_at(sections, float(i), far)
+    return middle - _far_radius(surface, far, normal)
+
+
+@njit(cache=True)
+def _rises(sections: np.ndarray, near: End, low: float, high: float, surface: OwnSurface) -> bool:
+    """Whether the gap of the tip grows along the robot, so that it is smaller before."""
+    end, far, normal, tip = end_on_curve(), end_on_curve(), np.empty(3), len(sections) - 1
+    nearest(surface, sections, sections[tip, 0], near.place[0], low, high, end, normal)
+    curve_at(sections, float(tip), far)
+    return normal[0] * far.slope[0] + normal[1] * far.slope[1] + normal[2] * far.slope[2] > 0.0
+
+
+@njit(cache=True)
+def _far_radius(surface: OwnSurface, far: End, normal: np.ndarray) -> float:
+    """Return the radius of the farther part in the direction of the normal: of a ball, but of the section next to the tip."""
+    place = far.place[0]
+    radius, _ = linear(surface.radius, place)
+    if surface.place[-1] - linear(surface.place, place)[0] >= radius:
+        return radius
+    along = square = 0.0
+    for v in range(3):
+        along += normal[v] * far.slope[v]
+        square += far.slope[v] ** 2
+    return radius * math.sqrt(max(1.0 - along**2 / square, 0.0))
 
 
 @njit(cache=True)
@@ -231,7 +263,7 @@ def _cross(surface: OwnSurface, sections: np.ndarray, i: int, far: End, near: En
         low, high = max(near.place[0] - 1.5, 0.0), min(near.place[0] + 1.5, n - 1.0)
         distance = nearest(surface, sections, far.point, near.place[0], low, high, near, normal)
         distance += linear(surface.radius, near.place[0])[0]
-        ahead = -linear(surface.ball, place)[1]
+        ahead = -linear(surface.radius, place)[1]
         for v in range(3):
             ahead += normal[v] * far.slope[v]
         distance_bend(far, near, far.slope, far.bend, normal, distance, second)
@@ -332,7 +364,7 @@ def _write(
     distance = result.distance[i] = math.sqrt(square)
     result.gap[i] = distance - linear(surface.radius, near.place[0])[0]
     if kind == FIXED or kind == MOVED:
-        result.gap[i] -= linear(surface.ball, far.place[0])[0]
+        result.gap[i] -= _far_radius(surface, far, normal)
     distance_bend(far, near, result.slope[i, 0], bend, normal, distance, result.bend[i])
     if not 0.0 < near.place[0] < len(sections) - 1.0:  # it stays at the end
         result.bend[i, 1] = result.bend[i, 2] = 0.0

@@ -11,13 +11,11 @@ from gravcomp.description import Robot
 class OwnSurface(NamedTuple):
     """Stations from base to tip, both included.
 
-    place (n,): m along the robot at rest; radius (n,) m; ball (n,): radius of the ball of the farther part; rim (k, 2): points
-    around the tip's face.
+    place (n,): m along the robot at rest; radius (n,) m; rim (k, 2): points around the tip's face.
     """
 
     place: np.ndarray
     radius: np.ndarray
-    ball: np.ndarray
     rim: np.ndarray
 
 
@@ -29,4 +27,4 @@ def own_surface(robot: Robot, surface: ContactSurface) -> OwnSurface:
             raise ValueError(f"a robot touches itself with round sections only; that {1e3 * s:.0f} mm from the base is not round")
     place = np.concatenate([[0.0], surface.place])
     radius = np.array([outline.half_width for outline in outlines])
-    return OwnSurface(place, radius, np.minimum(radius, place[-1] - place), surface.rim)
+    return OwnSurface(place, radius, surface.rim)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.contact.contacts import Contacts
 from gravcomp.contact.own_curve import linear
-from gravcomp.contact.own_places import MOVED, OwnPlaces, find_own, part_that_passes
+from gravcomp.contact.own_places import MOVED, OwnPlaces, find_own, may_touch, part_that_passes
 from gravcomp.contact.own_rows import own_rows, own_turning
 from gravcomp.contact.own_surface import own_surface
 from gravcomp.contact.surface import ContactSurface
@@ -58,6 +58,25 @@ class OwnContact:
         turning, bend = own_turning(places, guess, len(sections), self._length)
         return OwnRows(places, own_rows(places, len(sections)), turning, bend, guess)
 
+    def warm_up(self) -> None:
+        """Compile what a robot needs that touches itself: it is wound up in rings that touch, twice."""
+        place = self.surface.place[1:]
+        ring = place[-1] / 3.0
+        angle, wide = 2.0 * np.pi * place / ring, 0.5 * ring / np.pi
+        pitch = 2.0 * float(self.surface.radius.max())
+        middle = np.column_stack([wide * (1.0 - np.cos(angle)), pitch * place / ring, wide * np.sin(angle)])
+        one = np.column_stack([np.cos(angle), np.zeros_like(angle), -np.sin(angle)])
+        sections = np.stack([middle, one, np.tile([0.0, 1.0, 0.0], (len(place), 1))], axis=1)
+        touch = None
+        for _ in range(2):
+            rows = self.rows(sections, np.zeros_like(middle), pitch, touch)
+            if rows is not None:
+                count = len(rows.places.kind)
+                touch = OwnTouch(rows.places, np.ones(count), np.zeros((count, 0)))
+        self.contacts(touch, sections, 0, "")
+        self.part_that_passes(sections, middle)
+        may_touch(self.surface, self._with_base(sections)[:, :1], pitch)
+
     def part_that_passes(self, sections: np.ndarray, moved: np.ndarray) -> float:
         """Return the part of a step that moves the stations by moved (s, 3) m in which no part of the robot passes another."""
         part: float = part_that_passes(self.surface, self._with_base(sections), np.vstack([np.zeros(3), moved]))
@@ -74,17 +93,16 @@ class OwnContact:
         whole, (places, force, by_tension) = self._with_base(sections), touch
         middle = [np.einsum("cn,cnij->cij", places.share[:, e], whole[places.first[:, e, None] + np.arange(4)]) for e in range(2)]
         far = middle[0][:, 0] + np.einsum("ci,cij->cj", places.own, middle[0][:, 1:])
-        between = far - middle[1][:, 0]
-        radius = np.array([linear(self.surface.radius, place)[0] for place in places.place[:, 1]])
-        ball = np.array([linear(self.surface.ball, place)[0] for place in places.place[:, 0]]) * ~places.own.any(axis=1)
+        between, apart = far - middle[1][:, 0], places.distance - places.gap
+        radius = apart - np.array([linear(self.surface.radius, place)[0] for place in places.place[:, 1]])
         stations = np.interp(places.place, np.arange(len(whole)), self.surface.place) / self._length
         return Contacts(
             obstacle=np.full(len(pressed), number),
             station=stations[pressed, 0],
-            position=(far - ball[:, None] * places.normal)[pressed],
+            position=(far - radius[:, None] * places.normal)[pressed],
             normal=places.normal[pressed],
             force=(force[:, None] * places.normal)[pressed],
-            gap=(np.linalg.norm(between, axis=1) - radius - ball)[pressed],
+            gap=(np.linalg.norm(between, axis=1) - apart)[pressed],
             sliding=np.ones(len(pressed), dtype=np.bool_),
             by_tension=by_tension[pressed],
             names=(name,) * len(pressed),
