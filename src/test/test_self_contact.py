@@ -1,19 +1,27 @@
-"""A robot that touches itself: the gap and its changes, equilibria of a coiled robot, the virtual robot's rod, what is refused."""
+"""A robot that touches itself: changes of the gap, equilibria of a coiled robot, the virtual robot's rod, what is refused."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gravcomp.bench.sampled_depth import sampled_own_depth
 from gravcomp.config import ConfigError
-from gravcomp.contact.own_places import FIXED, MOVED, RIM, ROUND, find_own, part_that_passes
+from gravcomp.contact.own_pairs import may_touch, part_that_passes
+from gravcomp.contact.own_places import FIXED, MOVED, RIM, ROUND, find_own
 from gravcomp.contact.own_rows import own_rows, own_turning
 from gravcomp.contact.own_surface import OwnSurface
-from gravcomp.description import load_robot_file
+from gravcomp.description import Elements, Section, Segment, load_robot_file
 from gravcomp.scene import PlaneWall, SceneSection
 from gravcomp.scene.scene import Scene
 from gravcomp.simulation import Simulator
+from gravcomp.virtual.body import build_friction, build_material, build_rod
+from gravcomp.virtual.draw import draw
+from gravcomp.virtual.dynamics import MovingRod
+from gravcomp.virtual.equilibrium import equilibrium
+from gravcomp.virtual.parameters import Body, Tendons, VirtualRobotParameters
+from gravcomp.virtual.surroundings import RodSurroundings
 
 ITSELF = Scene(SceneSection(self_contact=True))
 RADIUS, LENGTH, STATIONS = 2e-3, 0.2, 60
@@ -23,7 +31,7 @@ DEPTH = 0.02e-3  # m, as for rigid walls
 
 
 def along(line, count=STATIONS):
-    """Surface and sections of a robot whose axis is `line` (k, 3), of even spacing; its tip is at the last of `count` stations."""
+    """Surface and sections of a robot whose axis is `line` (k, 3), of even spacing; its tip is at station `count`."""
     fine = np.linspace(0.0, LENGTH, len(line))
     place = LENGTH / STATIONS * np.arange(count + 1)
     middle = np.column_stack([np.interp(place, fine, line[:, j]) for j in range(3)])
@@ -56,18 +64,18 @@ def places_near(surface, sections, margin):
     return find_own(surface, sections, np.zeros((len(sections), 3)), margin, *NOTHING)
 
 
-def smooth_motion(rng, surface, sections):
-    """A smooth motion (n, 3, 3) of all sections but that of the base."""
+def smooth_motion(rng, surface, sections, turned_from):
+    """A smooth motion (n, 3, 3) of all sections but that of the base; those from a station on turn."""
     share = surface.place / surface.place[-1]
     middle = sum(np.sin(1.3 * (k + 1) * share)[:, None] * rng.standard_normal(3) for k in range(4)) * 0.05 * LENGTH
-    turn = share[:, None] * rng.standard_normal(3)
+    turn = share[:, None] * rng.standard_normal(3) * (np.arange(len(share)) >= turned_from)[:, None]
     moved = np.stack([middle, np.cross(turn, sections[:, 1]), np.cross(turn, sections[:, 2])], axis=1)
     moved[0] = 0.0
     return moved
 
 
 @pytest.mark.parametrize(
-    "kind, robot",
+    ("kind", "robot"),
     [
         (FIXED, helix(2.3, 4.05e-3)),  # turns side by side
         (MOVED, loop(1.0, 4.05e-3)),  # it crosses itself
@@ -83,7 +91,8 @@ def test_the_gap_changes_by_its_rows_and_by_the_forces_that_turn(kind, robot):
     pressed[i] = 1.0
     turning, bend = own_turning(found, pressed, stations, surface.place[-1])
     for _ in range(3):
-        moved = smooth_motion(rng, surface, sections)
+        # A section that turns in a straight line grows, to second order, and with it the radius of a ball.
+        moved = smooth_motion(rng, surface, sections, stations if kind in (ROUND, RIM) else stations + 1)
         gaps = []
         for side in (-step, 0.0, step):
             other = places_near(surface, sections + side * moved, 1e-3)
@@ -113,12 +122,106 @@ def test_no_part_passes_another_in_a_step():
     assert part_that_passes(surface, sections, 1e-3 * through) == 1.0
 
 
+COILED = load_robot_file(Path(__file__).resolve().parents[1] / "examples" / "coiled_robot.yaml")
+COILED_GRAVITY = np.array([0.3, 0.2, -9.8])  # a little from the axis: it tells the tip to which side of the stem to go
+WINDING = [*range(1, 14), 13.5, 14.0, 15.0, 16.0]  # mm of cable c1
+
+
 @pytest.fixture(scope="module")
 def coiled():
-    """The example's robot with fewer elements, wound up until it touches itself: simulator, shapes from there on, work, energy."""
-    file = load_robot_file("src/examples/coiled_robot.yaml")
-    robot = dataclasses.replace(file.robot, elements=dataclasses.replace(file.robot.elements, around=4, along=14))
-    simulator, shapes = Simulator(robot, reduced=False, scene=file.scene), []
-    for wound in COILED_PATH:
-        shapes.append(simulator.step(COILED_GRAVITY, np.array([1e-3 * wound, np.nan, np.nan])))
-    return simulator, shapes
+    """Simulator of the example's robot, with the shapes and what touches at the last steps of winding up, and back by one."""
+    simulator, found = Simulator(COILED.robot, reduced=False, scene=COILED.scene), {}
+    for step, wound in enumerate([*WINDING, WINDING[-2]]):
+        shape = simulator.step(COILED_GRAVITY, np.array([1e-3 * wound, np.nan, np.nan]))
+        found[step] = shape, simulator.solver.state
+    return simulator, [found[step] for step in sorted(found)[-4:]]
+
+
+def test_a_robot_that_coils_beyond_a_full_turn_does_not_pass_through_itself(coiled):
+    simulator, found = coiled
+    contact = simulator.solver.contact
+    for shape, state in found:
+        sections = contact.sections(state.u)
+        axis = np.cross(sections[:, 1], sections[:, 2])
+        axis /= np.linalg.norm(axis, axis=1)[:, None]
+        assert shape.is_equilibrium
+        assert np.degrees(np.arccos((axis[1:] * axis[:-1]).sum(axis=1)).sum()) > 330.0
+        assert shape.contacts.normal_force.min() > 1e-4
+        assert (shape.contacts.against < 0.4).all() and (shape.contacts.station > 0.9).all()
+        assert set(shape.contacts.names) == {"self"} == set(shape.contacts.by_obstacle().names)
+        assert abs(shape.contacts.gap).max() < 1e-7
+        assert sampled_own_depth(simulator.model, state.u, contact.own.surface) < DEPTH
+
+
+def test_the_forces_on_both_parts_are_equal_and_opposite(coiled):
+    simulator, found = coiled
+    model = simulator.model
+    for shape, state in found:
+        pull = state.touch.pull.reshape(-1, 3)
+        moment = np.cross((model.mesh.nodes + state.u)[: model.n_free], pull).sum(axis=0)
+        size = shape.contacts.normal_force.sum()
+        assert np.abs(pull).sum() > size
+        np.testing.assert_allclose(pull.sum(axis=0), 0.0, atol=1e-9 * size)
+        # Forces along the line between both places: no moment but that of the change of the radii.
+        np.testing.assert_allclose(moment, 0.0, atol=1e-2 * size * RADIUS)
+
+
+def test_a_closed_path_leads_back(coiled):
+    (_, _), (first, _), _, (last, _) = coiled[1]
+    np.testing.assert_allclose(last.tip_position, first.tip_position, atol=1e-5 * COILED.robot.length)
+    np.testing.assert_allclose(last.cable_tension, first.cable_tension, rtol=1e-4)
+
+
+def test_the_rod_touches_itself_as_the_model_does(coiled):
+    (shape, _) = coiled[1][0]
+    material = COILED.robot.segments[0].material
+    body = Body(
+        modulus_ratio=(1.0,), poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(), creep_time=(),
+        damping_time=0.03, slip_ratio=0.0,
+    )  # fmt: skip
+    lines = Tendons(friction=0.0, radius_offset=0.0, angle_offset=0.0, guide_angle=0.0, free_length=0.1, axial_stiffness=1570.0)
+    given = dataclasses.replace(VirtualRobotParameters(), body=body, tendons=lines)
+    true = draw(given, COILED.robot, COILED.hardware)
+    model = build_rod(true)
+    around = RodSurroundings.of(model, true, ITSELF)
+    rod = MovingRod(model, build_material(model, true), build_friction(true), around)
+    wound, start = np.full(3, -0.1 * COILED.robot.length), None
+    for wound[0] in np.arange(1e-3, 13e-3, 1e-3):
+        start = equilibrium(model, COILED_GRAVITY, displacement=wound, start=start)
+    rod.rest(start, np.eye(3), np.zeros(3))
+    end, steps = 1e-3 * WINDING[-3], 250
+    for step in range(steps + 150):
+        wound[0] = end + (12e-3 - end) * max(0.0, 1.0 - step / steps)
+        assert rod.step(2e-3, np.eye(3), np.zeros(3), COILED_GRAVITY, wound)
+    pushed = np.linalg.norm(rod.touches.force, axis=1)
+    assert (rod.touches.row == -1).all() and rod.touches.depth.max() < 1e-6
+    assert np.abs(rod.velocity[:, :3]).max() < 1e-4  # it rests
+    assert pushed.sum() == pytest.approx(shape.contacts.normal_force.sum(), rel=0.1)
+    # Without contact the tip would stay in the plane of the coil, within 0.3 mm.
+    assert rod.position[-1][1] == pytest.approx(shape.tip_position[1], abs=2e-3 * COILED.robot.length)
+
+
+def test_a_robot_that_does_not_touch_itself_is_the_same_with_the_option():
+    robot = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=6, along=8))
+    tips = []
+    for scene in (None, ITSELF):
+        simulator = Simulator(robot, reduced=False, scene=scene)
+        tips.append([simulator.step(G, cables).tip_position for cables in (None, np.full(len(robot.cables), 1e-3))])
+    np.testing.assert_allclose(tips[1], tips[0], atol=1e-12)
+
+
+def test_the_reduced_model_is_left_before_the_robot_touches_itself():
+    surface, sections = helix(2.3, 4.1e-3)
+    assert may_touch(surface, sections, 2e-4) and not may_touch(surface, sections, 2e-5)
+    assert not may_touch(*helix(0.8, 0.0), 2e-4)
+
+
+def test_own_contact_is_refused_where_it_cannot_be_computed():
+    robot = load_robot_file("article").robot
+    flat = Segment("flat", robot.length, section=Section("rectangle", 9e-3, 8e-3), material=robot.segments[0].material)
+    with pytest.raises(ConfigError, match=r"scene: scene.self_contact: .* round sections only; that 0 mm from the base is not"):
+        Simulator(dataclasses.replace(robot, segments=(flat,), cables=()), reduced=False, scene=ITSELF)
+    with pytest.raises(ValueError, match="a body from a file has no outlines"):
+        Simulator(load_robot_file("mesh_body").robot, reduced=False, scene=ITSELF)
+    with pytest.raises(ValueError, match="'self' is that of the robot with self_contact"):
+        SceneSection(planes=(PlaneWall(name="self"),), self_contact=True)

@@ -44,10 +44,11 @@ def sampled_own_depth(model: MeshedModel, u: np.ndarray, surface: OwnSurface) ->
     sections = (section_functionals(model.mesh, place) @ (model.mesh.nodes + u)).reshape(-1, 3, 3)
     radius, angle = np.interp(place, surface.place, surface.radius), 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     around, smallest = np.column_stack([np.cos(angle), np.sin(angle)]), np.inf
+    strained = 0.5 * radius * np.linalg.norm(sections[:, 1:], axis=2).sum(axis=1)
     for i in range(count):
         apart = place[i] - place > 0.5 * np.pi * (radius[i] + radius)
         if apart.any():
             points = sections[i, 0] + radius[i] * around @ sections[i, 1:]
-            distance = np.linalg.norm(points[:, None] - sections[apart, 0], axis=2) - radius[apart]
+            distance = np.linalg.norm(points[:, None] - sections[apart, 0], axis=2) - strained[apart]
             smallest = min(smallest, float(distance.min()))
     return -smallest

@@ -30,6 +30,7 @@ class End(NamedTuple):
 
 @njit(cache=True)
 def end_on_curve() -> End:
+    """Return an end in which nothing is written yet."""
     return End(np.zeros(1), np.zeros(1, np.int64), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
@@ -52,11 +53,13 @@ def curve_at(sections: np.ndarray, place: float, end: End) -> None:
 
 
 @njit(cache=True)
-def linear(values: np.ndarray, place: float) -> tuple[float, float]:
-    """Return a value between the stations, and its slope."""
-    one = min(int(place), len(values) - 2)
-    slope = values[one + 1] - values[one]
-    return values[one] + (place - one) * slope, slope
+def radius_at(surface: OwnSurface, end: End) -> tuple[float, float]:
+    """Return the radius at an end, between those of the stations as the curve is, and its slope."""
+    radius = slope = 0.0
+    for k in range(4):
+        radius += end.share[k] * surface.radius[end.first[0] + k]
+        slope += end.tilt[k] * surface.radius[end.first[0] + k]
+    return radius, slope
 
 
 @njit(cache=True)
@@ -95,7 +98,7 @@ def nearest(
             along += normal[v] * end.slope[v]
             across += normal[v] * end.bend[v]
             square_slope += end.slope[v] ** 2
-        radius, thicker = linear(surface.radius, place)
+        radius, thicker = radius_at(surface, end)
         gap = distance - radius
         following = next_place(place, -along - thicker, (square_slope - along**2) / distance - across, bounds)
         if abs(following - place) < THERE:
@@ -105,7 +108,9 @@ def nearest(
 
 
 @njit(cache=True)
-def distance_bend(far: End, near: End, slope: np.ndarray, bend: np.ndarray, normal: np.ndarray, distance: float, out: np.ndarray) -> None:
+def distance_bend(
+    far: End, near: End, slope: np.ndarray, bend: np.ndarray, normal: np.ndarray, distance: float, out: np.ndarray
+) -> None:
     """Write the second derivatives (3,) of the distance of x with `slope` and `bend` from the curve at `near`."""
     out[0] = out[1] = out[2] = 0.0
     x = y = 0.0

@@ -1,8 +1,8 @@
 """Rows of the model for the places where a robot touches itself: what a displacement changes of their gaps; compiled.
 
 The rows hold for the displacements of p, f_1, f_2 of the stations, those of the base left out: (9 s,) numbers. A force in a row
-pushes both parts of the robot, equal and opposite. How the forces turn and move with the robot is the second change of the gap (see
-`own_places`); it is a quadratic form of four rows, the tangents e_1 . dw and e_2 . dw and the tilts n . dx' and n . dy', and
+pushes both parts of the robot, equal and opposite. How the forces turn and move with the robot is the second change of the gap
+(see `own_places`); it is a quadratic form of four rows, the tangents e_1 . dw and e_2 . dw and the tilts n . dx' and n . dy', and
 its principal axes are rows whose forces are independent. Tilts count with the length of the robot as their arm: then the
 forces of two parts that cross, which do not turn when these slide, are next to nothing.
 """
@@ -21,6 +21,9 @@ def own_rows(places: OwnPlaces, stations: int) -> np.ndarray:
     rows = np.zeros((len(places.kind), 9 * stations))
     for i in range(len(rows)):
         _between_parts(places, i, places.normal[i], 1.0, rows[i])
+        for end in range(2):
+            for k in range(2):
+                _add(places.first[i, end], places.share[i, end], 1 + k, places.swell[i, end, k], -1.0, rows[i])
     return rows
 
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.contact.contacts import Contacts
-from gravcomp.contact.own_curve import linear
-from gravcomp.contact.own_places import MOVED, OwnPlaces, find_own, may_touch, part_that_passes
+from gravcomp.contact.own_pairs import may_touch, part_that_passes
+from gravcomp.contact.own_places import MOVED, OwnPlaces, find_own
 from gravcomp.contact.own_rows import own_rows, own_turning
 from gravcomp.contact.own_surface import own_surface
 from gravcomp.contact.surface import ContactSurface
@@ -94,7 +94,8 @@ class OwnContact:
         middle = [np.einsum("cn,cnij->cij", places.share[:, e], whole[places.first[:, e, None] + np.arange(4)]) for e in range(2)]
         far = middle[0][:, 0] + np.einsum("ci,cij->cj", places.own, middle[0][:, 1:])
         between, apart = far - middle[1][:, 0], places.distance - places.gap
-        radius = apart - np.array([linear(self.surface.radius, place)[0] for place in places.place[:, 1]])
+        radii = np.interp(places.place, np.arange(len(whole)), self.surface.radius)
+        radius = apart * radii[:, 0] / radii.sum(axis=1) * ~places.own.any(axis=1)  # that of the strained section
         stations = np.interp(places.place, np.arange(len(whole)), self.surface.place) / self._length
         return Contacts(
             obstacle=np.full(len(pressed), number),

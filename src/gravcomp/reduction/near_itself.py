@@ -1,10 +1,15 @@
-"""Whether the shape of a reduced model brings the robot near itself, where the full model is used: such shapes are rare, and far
-from those of its training."""
+"""Whether the shape of a reduced model brings the robot near itself.
+
+There the full model is used: such shapes are rare, and far from those of the training.
+"""
 
 import numpy as np
 
-from gravcomp.contact.own_places import may_touch
+from gravcomp.contact.own_pairs import may_touch
 from gravcomp.full_model.contact import FullContact
+
+# Of the margin within which the full model looks for places: sections that are compressed are a little wider.
+_MARGIN = 3.0
 
 
 class NearItself:
@@ -13,7 +18,7 @@ class NearItself:
     def __init__(self, contact: FullContact, section_change: np.ndarray):
         """contact: of the full model, with itself; section_change (s, 3, 3, r): changes of its stations' p, f_1, f_2."""
         assert contact.own is not None
-        self._surface, self._margin = contact.own.surface, contact.margin
+        self._surface, self._margin = contact.own.surface, _MARGIN * contact.margin
         r = section_change.shape[-1]
         self._change = np.vstack([np.zeros((3, r)), section_change[:, 0].reshape(-1, r)])
         self._rest = np.concatenate([np.zeros(3), contact.sections_at_rest[:, 0].ravel()])

@@ -107,7 +107,7 @@ class MeshWall(Wall):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneSection:
-    """The section `scene:`: obstacles by kind. Obstacles are numbered in the order of these lists; the robot itself comes last."""
+    """The section `scene:`: obstacles by kind. Obstacles are numbered in the order of these lists, the robot itself last."""
 
     planes: tuple[PlaneWall, ...] = parameter((), description="half-spaces")
     spheres: tuple[SphereWall, ...] = parameter((), description="balls")

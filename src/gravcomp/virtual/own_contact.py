@@ -291,7 +291,7 @@ def add_own_contacts(
     own: OwnTouching, rigid: float, negligible: float, orientation: np.ndarray, position: np.ndarray, residual: np.ndarray,
     gradient: np.ndarray, spring: np.ndarray,
 ) -> bool:  # fmt: skip
-    """Subtract the forces of the pairs from residual (n + 1, 6); write their gaps, forces, gradients (6 n, c) and spring (c,) N/m.
+    """Subtract the forces of the pairs from residual (n + 1, 6); write gaps, forces, gradients (6 n, c) and spring (c,) N/m.
 
     rigid: stiffness in N/m. Whether two places touch is decided by the force that the last increment led to, where there was one.
     Return whether the forces agree with these decisions, but for `negligible` N.

@@ -45,7 +45,7 @@ class RodSurroundings:
     def of(cls, model: RodModel, true: TrueRobot, scene: Scene) -> "RodSurroundings":
         """Return a scene around a rod.
 
-        Raises ConfigError for a body from a file that has no section somewhere, and for a rod that touches itself and is not round.
+        Raises ConfigError for a body from a file without a section somewhere, and for a rod with self_contact that is not round.
         """
         walls = Walls(scene.turned(np.eye(3)), ~scene.in_world)
         surface, rigid = rod_surface(model, true), rigid_stiffness(model.stiffness, model.length)

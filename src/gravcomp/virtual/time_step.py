@@ -117,8 +117,8 @@ def time_step(
     step, m/N; direction, chord and band are scratch. rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how
     much the planes of the contacts may differ from the walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`;
     checked is scratch. own: pairs of places where the rod touches itself, and own_checked: scratch; None: it does not, and Numba
-    compiles nothing for it. If the state is not possible, pose and material keep their values from before the step, and the caller
-    sets the rest of the state.
+    compiles nothing for it. If the state is not possible, pose and material keep their values from before the step, and the
+    caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
     linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
