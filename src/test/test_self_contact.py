@@ -1,11 +1,12 @@
 """A robot that touches itself: changes of the gap, equilibria of a coiled robot, the virtual robot's rod, what is refused."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gravcomp.bench.contact_itself import COILED as COILED_FILE
+from gravcomp.bench.contact_itself import COILED_FROM, GRAVITY, coiled_rod, wind
 from gravcomp.bench.sampled_depth import sampled_own_depth
 from gravcomp.config import ConfigError
 from gravcomp.contact.own_pairs import may_touch, part_that_passes
@@ -16,12 +17,6 @@ from gravcomp.description import Elements, Section, Segment, load_robot_file
 from gravcomp.scene import PlaneWall, SceneSection
 from gravcomp.scene.scene import Scene
 from gravcomp.simulation import Simulator
-from gravcomp.virtual.body import build_friction, build_material, build_rod
-from gravcomp.virtual.draw import draw
-from gravcomp.virtual.dynamics import MovingRod
-from gravcomp.virtual.equilibrium import equilibrium
-from gravcomp.virtual.parameters import Body, Tendons, VirtualRobotParameters
-from gravcomp.virtual.surroundings import RodSurroundings
 
 ITSELF = Scene(SceneSection(self_contact=True))
 RADIUS, LENGTH, STATIONS = 2e-3, 0.2, 60
@@ -122,9 +117,8 @@ def test_no_part_passes_another_in_a_step():
     assert part_that_passes(surface, sections, 1e-3 * through) == 1.0
 
 
-FILE = load_robot_file(Path(__file__).resolve().parents[1] / "examples" / "coiled_robot.yaml")
+FILE = load_robot_file(str(COILED_FILE))
 COILED = dataclasses.replace(FILE, robot=dataclasses.replace(FILE.robot, elements=Elements(around=4, along=24)))
-COILED_GRAVITY = np.array([0.3, 0.2, -9.8])  # a little from the axis: it tells the tip to which side of the stem to go
 WINDING = [*range(1, 14), 13.5, 14.0, 15.0, 16.0]  # mm of cable c1
 
 
@@ -133,7 +127,7 @@ def coiled():
     """Simulator of the example's robot, with the shapes and what touches at the last steps of winding up, and back by one."""
     simulator, found = Simulator(COILED.robot, reduced=False, scene=COILED.scene), {}
     for step, wound in enumerate([*WINDING, WINDING[-2]]):
-        shape = simulator.step(COILED_GRAVITY, np.array([1e-3 * wound, np.nan, np.nan]))
+        shape = simulator.step(GRAVITY, np.array([1e-3 * wound, np.nan, np.nan]))
         found[step] = shape, simulator.solver.state
     return simulator, [found[step] for step in sorted(found)[-4:]]
 
@@ -175,25 +169,8 @@ def test_a_closed_path_leads_back(coiled):
 
 def test_the_rod_touches_itself_as_the_model_does(coiled):
     (shape, _) = coiled[1][0]
-    material = COILED.robot.segments[0].material
-    body = Body(
-        modulus_ratio=(1.0,), poissons_ratio=material.poissons_ratio, density=material.density, creep_ratio=(), creep_time=(),
-        damping_time=0.03, slip_ratio=0.0,
-    )  # fmt: skip
-    lines = Tendons(friction=0.0, radius_offset=0.0, angle_offset=0.0, guide_angle=0.0, free_length=0.1, axial_stiffness=1570.0)
-    given = dataclasses.replace(VirtualRobotParameters(), body=body, tendons=lines)
-    true = draw(given, COILED.robot, COILED.hardware)
-    model = build_rod(true)
-    around = RodSurroundings.of(model, true, ITSELF)
-    rod = MovingRod(model, build_material(model, true), build_friction(true), around)
-    wound, start = np.full(3, -0.1 * COILED.robot.length), None
-    for wound[0] in np.arange(1e-3, 13e-3, 1e-3):
-        start = equilibrium(model, COILED_GRAVITY, displacement=wound, start=start)
-    rod.rest(start, np.eye(3), np.zeros(3))
-    end, steps = 1e-3 * WINDING[-3], 250
-    for step in range(steps + 150):
-        wound[0] = end + (12e-3 - end) * max(0.0, 1.0 - step / steps)
-        assert rod.step(2e-3, np.eye(3), np.zeros(3), COILED_GRAVITY, wound)
+    rod = coiled_rod(COILED)
+    assert wind(rod, COILED_FROM, 1e-3 * WINDING[-3])
     pushed = np.linalg.norm(rod.touches.force, axis=1)
     assert (rod.touches.row == -1).all() and rod.touches.depth.max() < 1e-6
     assert np.abs(rod.velocity[:, :3]).max() < 1e-4  # it rests
@@ -221,7 +198,11 @@ def test_own_contact_is_refused_where_it_cannot_be_computed():
     robot = load_robot_file("article").robot
     flat = Segment("flat", robot.length, section=Section("rectangle", 9e-3, 8e-3), material=robot.segments[0].material)
     with pytest.raises(ConfigError, match=r"scene: scene.self_contact: .* round sections only; that 0 mm from the base is not"):
-        Simulator(dataclasses.replace(robot, segments=(flat,), cables=(), elements=Elements(around=8, along=4)), reduced=False, scene=ITSELF)
+        Simulator(
+            dataclasses.replace(robot, segments=(flat,), cables=(), elements=Elements(around=8, along=4)),
+            reduced=False,
+            scene=ITSELF,
+        )
     with pytest.raises(ValueError, match="a body from a file has no outlines"):
         Simulator(load_robot_file("mesh_body").robot, reduced=False, scene=ITSELF)
     with pytest.raises(ValueError, match="'self' is that of the robot with self_contact"):

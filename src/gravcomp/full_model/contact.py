@@ -41,6 +41,8 @@ from gravcomp.scene.scene import Scene
 NEAR, TOUCHED = 0.02, 1e-3
 # Part of the radius by which a robot is pushed off an obstacle on which it is balanced.
 KICK = 0.01
+# Part of the radius by which a robot may move that is twice as far from itself.
+_FREE = 0.25
 
 
 class _Rows(NamedTuple):
@@ -94,6 +96,20 @@ class FullContact:
         """Largest step in m that cannot pass over an obstacle."""
         solution = self.touch.solution
         return float(self.surface.radius.min()) if solution is not None and len(solution[0].row) else np.inf
+
+    def free_way(self, u: np.ndarray) -> float:
+        """Return how far in m the robot can go from u (n, 3) without touching anything; 0 where that is not looked at.
+
+        That is where there are no obstacles, and the robot is far from itself: then the equilibrium needs no contact.
+        """
+        if self.own is None or len(self.arrays.kind):
+            return 0.0
+        way = _FREE * float(self.surface.radius.min())
+        return 0.0 if self.own.is_near(self.sections(u), 2.0 * way) else way
+
+    def way(self, u: np.ndarray, other: np.ndarray) -> float:
+        """Return the longest way in m of a station between the displacements u and other (n, 3)."""
+        return float(np.linalg.norm(self.sections(other)[:, 0] - self.sections(u)[:, 0], axis=1).max())
 
     def part_that_passes(self, u: np.ndarray, step: np.ndarray) -> float:
         """Return the part of a step (3 n_free,) from u (n, 3) in which no part of the robot passes another."""

@@ -75,7 +75,12 @@ class OwnContact:
                 touch = OwnTouch(rows.places, np.ones(count), np.zeros((count, 0)))
         self.contacts(touch, sections, 0, "")
         self.part_that_passes(sections, middle)
-        may_touch(self.surface, self._with_base(sections)[:, :1], pitch)
+        self.is_near(sections, pitch)
+
+    def is_near(self, sections: np.ndarray, margin: float) -> bool:
+        """Whether parts of the robot whose stations are at `sections` (s, 3, 3) are nearer than about `margin` m."""
+        near: bool = may_touch(self.surface, self._with_base(sections[:, :1]), margin)
+        return near
 
     def part_that_passes(self, sections: np.ndarray, moved: np.ndarray) -> float:
         """Return the part of a step that moves the stations by moved (s, 3) m in which no part of the robot passes another."""
@@ -111,8 +116,8 @@ class OwnContact:
         )
 
     def _with_base(self, sections: np.ndarray) -> np.ndarray:
-        """Return the sections (s + 1, 3, 3) with that of the base, which does not move."""
-        return np.concatenate([np.vstack([np.zeros(3), np.eye(3)[:2]])[None], sections])
+        """Return the sections (s + 1, v, 3) with that of the base, which does not move."""
+        return np.concatenate([np.vstack([np.zeros(3), np.eye(3)[:2]])[None, : sections.shape[1]], sections])
 
 
 def _remembered(places: OwnPlaces, last: OwnTouch | None) -> np.ndarray:
