@@ -29,8 +29,8 @@ def coiled(progress: Callable[[str], None], brief: bool = False) -> dict:
     """Return figures of the example's robot, wound up beyond a full turn and back.
 
     `self_contact_depth_mm`: deepest place of its surface in itself; `self_contact_energy`: work of the cable over the closed
-    path, as a share of that without sign; `self_contact_force_pct` and `self_contact_tip_pct`: the rod's sum of forces and tip against
-    the model's, of the force and the length, worst; `free_tip_pct`: of the tips just before the robot touches itself.
+    path, as a share of that without sign; `self_contact_force_pct` and `self_contact_tip_pct`: the rod's sum of forces and tip
+    against the model's, of the force and the length, worst; `free_tip_pct`: of the tips just before the robot touches itself.
     """
     file = load_robot_file(str(COILED))
     simulator = Simulator(file.robot, reduced=False, scene=file.scene)

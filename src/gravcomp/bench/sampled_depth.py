@@ -48,8 +48,8 @@ def sampled_own_depth(model: MeshedModel, u: np.ndarray, surface: OwnSurface) ->
     for i in range(count):
         apart = np.flatnonzero(place[i] - place > 0.5 * np.pi * (radius[i] + radius))
         between = np.linalg.norm(sections[apart, 0] - sections[i, 0], axis=1) - strained[i] - strained[apart]
-        smallest = min(smallest, float(between.min(initial=np.inf)))
-        near = apart[between < _NEAR * radius[i]]
+        far = between >= _NEAR * radius[i]
+        smallest, near = min(smallest, float(between[far].min(initial=np.inf))), apart[~far]
         if len(near):
             points = sections[i, 0] + radius[i] * around @ sections[i, 1:]
             distance = np.linalg.norm(points[:, None] - sections[near, 0], axis=2) - strained[near]

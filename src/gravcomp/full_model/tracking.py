@@ -103,6 +103,8 @@ class StaticTracker:
         """
         contact, before = self.contact, (self.state, self.sliding, self._before)
         way = 0.0 if contact is None else contact.free_way(self.state.u)
+        if contact is not None and self._before is not None and contact.way(self._before, self.state.u) > way:
+            way = 0.0  # steps are long
         if contact is not None and way > 0.0:
             self.contact = None  # nothing is near
             try:
