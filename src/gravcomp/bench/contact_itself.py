@@ -21,7 +21,7 @@ COILED = Path(__file__).resolve().parents[2] / "examples" / "coiled_robot.yaml"
 COILED_FROM = 12e-3  # m of cable c1, at which the rod begins
 GRAVITY = np.array([0.3, 0.2, -9.8])  # a little from the axis: it tells the tip to which side of the stem to go
 _UP = (*range(1, 14), 13.5)  # mm of cable c1, until it touches itself
-_STEP, _HIGHEST, _BRIEF = 0.5, 20.0, 14.5  # mm, from there on
+_STEP, _HIGHEST, _BRIEF = 0.5, 20.0, 14.0  # mm, from there on
 _DAMPING, _RATE, _DT, _REST = 0.03, 4e-3, 2e-3, 0.4  # s, changes no equilibrium; m/s of winding; s of a step, and until it rests
 
 
