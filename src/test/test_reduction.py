@@ -292,7 +292,7 @@ def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(ro
 
 
 def test_the_full_model_is_used_where_the_robot_is_near_itself(built):
-    """A robot of this length cannot come near itself: it is told that it does."""
+    """A robot of this length cannot come near itself: the test pretends that it does."""
     simulator, gravity = Simulator(built[0], scene=scene_of(self_contact=True)), np.array([-9.81, 0.0, 0.0])
     assert simulator.step(gravity).model == "reduced"
     simulator._serving._itself.at = lambda q: True
