@@ -38,7 +38,6 @@ MODEL_LINES = (
     "./gravcomp model solve article --gravity -9.81 0 0 --target 0 0 100",
     "./gravcomp model solve article --full --wrench 0 0.02 0",
     "./gravcomp model solve article --full --wrench 0 0 -0.05 0 0.0005 0 --wrench-at 0.5 --wrench-frame follower",
-    "./gravcomp model solve src/examples/coiled_robot.yaml --displacement 15 nan nan --gravity 0.3 0.2 -9.8",
     "./gravcomp model view article --tension 0 0 0 0.3 0 0 --out bent.png",
     "./gravcomp model info src/examples/own_robot.yaml",
     "./gravcomp model info src/examples/own_robot.yaml --picture sphere.png",

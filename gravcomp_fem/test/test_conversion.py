@@ -152,11 +152,11 @@ for _ in range(3):
 assert len(shape.contacts), "the robot does not touch the ball"
 print(sorted(signatures("gravcomp") - before))
 
-from gravcomp.bench.contact_itself import COILED, GRAVITY
+from gravcomp.bench.contact_itself import GRAVITY, coarse, coiled_file
 
 for part in ITSELF:
     run_part(part)
-file = load_robot_file(str(COILED))
+file = coarse(coiled_file())
 before = signatures("gravcomp")
 simulator = Simulator(file.robot, reduced=False, scene=file.scene)
 for wound in [*np.arange(1.0, 14.0), 13.5, 14.0]:

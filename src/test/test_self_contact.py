@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gravcomp.bench.contact_itself import COILED as COILED_FILE
-from gravcomp.bench.contact_itself import COILED_FROM, GRAVITY, coiled_rod, wind
+from gravcomp.bench.contact_itself import COILED_FROM, GRAVITY, coiled_file, coiled_rod, wind
 from gravcomp.bench.sampled_depth import sampled_own_depth
 from gravcomp.config import ConfigError
 from gravcomp.contact.own_pairs import may_touch, part_that_passes
@@ -117,7 +116,7 @@ def test_no_part_passes_another_in_a_step():
     assert part_that_passes(surface, sections, 1e-3 * through) == 1.0
 
 
-FILE = load_robot_file(str(COILED_FILE))
+FILE = coiled_file()
 COILED = dataclasses.replace(FILE, robot=dataclasses.replace(FILE.robot, elements=Elements(around=4, along=24)))
 WINDING = [*range(1, 14), 13.5, 14.0, 15.0, 16.0]  # mm of cable c1
 

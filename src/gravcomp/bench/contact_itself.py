@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gravcomp.bench.sampled_depth import sampled_own_depth
-from gravcomp.description import RobotFile, load_robot_file
+from gravcomp.description import Elements, RobotFile, load_robot_file
 from gravcomp.full_model.shape import Shape
 from gravcomp.simulation import Simulator
 from gravcomp.virtual.body import build_friction, build_material, build_rod
@@ -32,7 +32,7 @@ def coiled(progress: Callable[[str], None], brief: bool = False) -> dict:
     path, as a share of that without sign; `self_contact_force_pct` and `self_contact_tip_pct`: the rod's sum of forces and tip
     against the model's, of the force and the length, worst; `free_tip_pct`: of the tips just before the robot touches itself.
     """
-    file = load_robot_file(str(COILED))
+    file = coarse(coiled_file()) if brief else coiled_file()
     simulator = Simulator(file.robot, reduced=False, scene=file.scene)
     contact = simulator.solver.contact
     assert contact is not None and contact.own is not None
@@ -67,6 +67,16 @@ def coiled(progress: Callable[[str], None], brief: bool = False) -> dict:
     return figures | {
         "self_contact_force_pct": max(force), "self_contact_tip_pct": max(tip.values()), "free_tip_pct": tip[_UP[-2]],
     }  # fmt: skip
+
+
+def coiled_file() -> RobotFile:
+    """Return the robot file of the example."""
+    return load_robot_file(str(COILED))
+
+
+def coarse(file: RobotFile) -> RobotFile:
+    """Return a robot file with few elements: fewer than such a coil needs to be exact."""
+    return dataclasses.replace(file, robot=dataclasses.replace(file.robot, elements=Elements(around=4, along=16)))
 
 
 def coiled_rod(file: RobotFile) -> MovingRod:
