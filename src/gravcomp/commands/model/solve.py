@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 from gravcomp.commands import output
 from gravcomp.commands.model.loading import add_load_arguments, loaded_shape
 from gravcomp.commands.model.wrenches import wrenches_of
-from gravcomp.scene.declared import ITSELF
 
 if TYPE_CHECKING:
     from gravcomp.full_model.wrench import Wrench
@@ -20,6 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: solved, 1: no equilibrium was found. Raises ConfigError, ValueError, MeshError."""
     import numpy as np
+
+    from gravcomp.scene.declared import ITSELF
 
     simulator, shape, command = loaded_shape(args)
     figures = {
