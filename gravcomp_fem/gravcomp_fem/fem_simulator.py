@@ -76,7 +76,7 @@ class FemSimulator(ManagedNode):
         with contextlib.suppress(NotPositiveDefinite, MeshError):  # unstable, or without a section at its end
             self._holdable = holdable_payload(straight, self._simulator.tip_compliance(), robot.limits.tension_max)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
-        around = scene or self.robot_file.zones or not self.parameters.turn.enabled
+        around = scene.walls or self.robot_file.zones or not self.parameters.turn.enabled
         self._turn = None if around else BaseTurn(self._simulator.model, self.parameters.turn)
         self._late_reduction = LateReduction(self._simulator)
         self._builder: subprocess.Popen | None = None

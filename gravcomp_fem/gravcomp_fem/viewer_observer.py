@@ -12,7 +12,7 @@ from rclpy.time import Time
 
 from gravcomp.description import Robot
 from gravcomp.inverse import Holdable, TargetError
-from gravcomp.view.backbone import arc_backbone, rest_backbone
+from gravcomp.view.backbone import Backbone, arc_backbone, rest_backbone
 from gravcomp.view.snapshot import Snapshot, TargetView
 from gravcomp.view.touches import Touch, model_touches
 from gravcomp_fem.conversion import backbone_of, backbone_of_poses, contact_of, pose_target, shape_target, vector_of
@@ -89,7 +89,7 @@ class GraphObserver:
                 backbone=backbone_of(d), gravity=vector_of(d.gravity),
                 tension=np.array(d.cable_tension), displacement=np.array(d.cable_displacement),
                 model=d.model, model_time=d.solve_time)  # fmt: skip
-            shown.update(model_touches=self._model_touches(d))
+            shown.update(model_touches=self._model_touches(d, shown["backbone"]))
         forces, load = self._current("forces"), self._current("load")
         if forces:
             shown.update(virtual_touches=_touches(forces.message), wall=_wall(forces.message))
@@ -141,15 +141,16 @@ class GraphObserver:
         # A latched status is valid until it is replaced.
         return received if name == "status" or time.time_ns() - received.sent < _STALE * 1e9 else None
 
-    def _model_touches(self, message: Deformation) -> tuple[Touch, ...]:
+    def _model_touches(self, message: Deformation, backbone: Backbone | None) -> tuple[Touch, ...]:
         """Return the forces of walls on the model; none where this node does not know the walls, or the message is not valid."""
-        if self._walls is None or not message.contact_obstacle:
+        if self._walls is None or not message.contact_obstacle or backbone is None:
             return ()
         try:
             contact = contact_of(message)
         except ValueError:
             return ()  # the controller refuses it and reports it
-        return model_touches(self._walls, vector_of(message.gravity), contact.names, contact.force, contact.position)
+        gravity, line = vector_of(message.gravity), backbone.position
+        return model_touches(self._walls, gravity, contact.names, contact.force, contact.position, line)
 
     def _delays(self) -> dict[str, float]:
         """Return s from the IMU sample to the message of each stage."""

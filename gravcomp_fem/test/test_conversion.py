@@ -94,7 +94,7 @@ from numba.core.dispatcher import Dispatcher
 from std_msgs.msg import Header
 from gravcomp.description import load_robot_file
 from gravcomp.inverse import InverseController, bend_target, straight_target
-from gravcomp.launcher.compilation import LOOP, SURROUNDED, run_part
+from gravcomp.launcher.compilation import ITSELF, LOOP, SURROUNDED, run_part
 from gravcomp.simulation import Simulator
 from gravcomp_fem.conversion import contact_of, deformation_message, response_of
 
@@ -151,9 +151,21 @@ for _ in range(3):
         contact=shape.contacts.by_obstacle(), gravity=np.array([-9.81, 0.0, 0.0])).displacement
 assert len(shape.contacts), "the robot does not touch the ball"
 print(sorted(signatures("gravcomp") - before))
+
+from gravcomp.bench.contact_itself import GRAVITY, coarse, coiled_file
+
+for part in ITSELF:
+    run_part(part)
+file = coarse(coiled_file())
+before = signatures("gravcomp")
+simulator = Simulator(file.robot, reduced=False, scene=file.scene)
+for wound in [*np.arange(1.0, 14.0), 13.5, 14.0]:
+    shape = simulator.step(GRAVITY, np.array([1e-3 * wound, np.nan, np.nan]))
+assert len(shape.contacts), "the robot does not touch itself"
+print(sorted(signatures("gravcomp") - before))
 """
 
 
 def test_the_warm_up_compiles_everything_that_the_loop_runs():
     ended = subprocess.run([sys.executable, "-c", COMPILED_IN_THE_LOOP], capture_output=True, text=True)
-    assert ended.stdout == "[]\n[]\n[]\n", ended.stdout + ended.stderr
+    assert ended.stdout == "[]\n[]\n[]\n[]\n", ended.stdout + ended.stderr

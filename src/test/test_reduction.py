@@ -291,6 +291,20 @@ def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(ro
     assert max(apart) > 0.05e-3  # what friction changes
 
 
+def test_the_full_model_is_used_where_the_robot_is_near_itself(built):
+    """A robot of this length cannot come near itself: the test pretends that it does."""
+    simulator, gravity = Simulator(built[0], scene=scene_of(self_contact=True)), np.array([-9.81, 0.0, 0.0])
+    assert simulator.step(gravity).model == "reduced"
+    simulator._serving._itself.at = lambda q: True
+    shape = simulator.step(0.9 * gravity)
+    assert (shape.model, shape.status) == ("full", ShapeStatus.FALLBACK) and "touches itself, or nearly" in shape.message
+    assert simulator.step(0.8 * gravity).model == "full"
+    del simulator._serving._itself.at
+    for _ in range(30):
+        shape = simulator.step(0.8 * gravity)
+    assert shape.model == "reduced"
+
+
 @pytest.fixture(scope="module")
 def rubber(robot, cache):
     """A model of a law of rubber that hardly changes its volume, and its reduction."""

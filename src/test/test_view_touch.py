@@ -114,7 +114,8 @@ def test_the_inset_shows_a_wall_on_its_side_and_the_nearer_of_two():
 def test_the_models_forces_point_out_of_the_wall():
     scene = Scene(SceneSection(planes=(PlaneWall(name="table", normal=(0, 0, 1), point=(0, 0, -0.02), frame="world"),)))
     up = np.array([-1.0, 1.0, 0.0]) / math.sqrt(2.0)
-    (touch,) = model_touches(scene, -9.81 * up, ["table"], [0.2], np.array([[0.0, 0.0, 0.1]]) - 0.02 * up)
+    backbone = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    (touch,) = model_touches(scene, -9.81 * up, ["table"], [0.2], np.array([[0.0, 0.0, 0.1]]) - 0.02 * up, backbone)
     np.testing.assert_allclose(touch.force, 0.2 * up, atol=1e-12)
 
 

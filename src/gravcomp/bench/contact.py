@@ -32,13 +32,14 @@ _SMALL = 0.01  # deflection of the closed forms, of the length
 
 
 def run(progress: Progress, *, every: int = 1) -> dict:
-    """Return all figures, with every `every`-th of the scenes; see the functions below, `contact_rods` and `wrong_scene`."""
+    """Return all figures, with every `every`-th of the scenes; see the functions below and the modules imported here."""
+    from gravcomp.bench.contact_itself import coiled
     from gravcomp.bench.contact_rods import rods  # the virtual robot, which tests of `slender_rod` do not need
     from gravcomp.bench.wrong_scene import wrong_scene
 
     return {
         **accuracy(progress), **motion(progress, every), **rods(progress, every), **step_time(progress, every),
-        **wrong_scene(progress),
+        **wrong_scene(progress), **coiled(progress, brief=every > 1),
     }  # fmt: skip
 
 

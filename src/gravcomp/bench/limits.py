@@ -105,6 +105,11 @@ ROWS = {
         Row("wrong_scene_said", "wall 2 mm off the scene's: cases that say so, share", "", 1, at_least=True),
         Row("right_scene_said", "wall where the scene has it: cases that say it is not, share", "", 0),
         Row("wrong_scene_ripple_mm", "wall 2 mm off the scene's or where it has it: motion of the tip at rest, worst", "mm", 0.5),
+        Row("self_contact_depth_mm", "deepest place of a coiled robot in itself", "mm", 0.02),
+        Row("self_contact_energy", "energy gained from itself over a closed path, share of the cable's work", "", 1e-3),
+        Row("self_contact_force_pct", "force of the robot on itself against the virtual robot's rod, worst", "%"),
+        Row("self_contact_tip_pct", "tip of the coiled robot against the virtual robot's rod, share of the length, worst", "%"),
+        Row("free_tip_pct", "the same before it touches itself", "%"),
         Row("unsolved_scenes", "scenes of 200 that are not entered from the straight robot", ""),
     ),
     "robots": (

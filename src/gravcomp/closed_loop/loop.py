@@ -107,7 +107,7 @@ class ClosedLoop:
         self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
         self._simulator = Simulator(setup.robot, scene=setup.modelled_scene)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
-        around = setup.modelled_scene or setup.zones
+        around = (setup.modelled_scene is not None and setup.modelled_scene.walls) or setup.zones
         self._turn = None if around else BaseTurn(self._simulator.model, setup.simulator.turn)
         self._problem = InverseController(
             setup.robot, setup.controller.inverse, setup.hardware.transmission, setup.modelled_scene, setup.zones

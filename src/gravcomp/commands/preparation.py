@@ -27,7 +27,7 @@ def prepare(robot: str, virtual: bool, seed: int | None = None) -> ModelBuilder:
         output.note(summary)
     file = load_robot_file(robot)
     parts = compilation.LOOP + (compilation.VIRTUAL if virtual else ())
-    compile_parts(parts + (compilation.SURROUNDED if file.scene or file.zones else ()))
+    compile_parts(parts + compilation.around(file.scene, file.zones, virtual))
     choose_mesh(file.robot)
     return ModelBuilder(robot)
 

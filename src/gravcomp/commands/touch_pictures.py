@@ -85,6 +85,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
     if truth.hand_force.any():
         touched.append(Touch(HAND, truth.tip_position, truth.hand_force))
     walls, pressed = loop.setup.modelled_scene, shape.contacts.by_obstacle()
+    forces = pressed.names, pressed.force, pressed.position, shape.backbone_position
     return Snapshot(
         time=loop.time,
         backbone=Backbone(shape.backbone_station, shape.backbone_position, shape.backbone_orientation),
@@ -97,7 +98,7 @@ def _snapshot(loop: ClosedLoop) -> Snapshot:
         status=command.message if command is not None else "",
         status_level="ok" if command is not None and command.code == ControllerCode.OK else "warn",
         virtual=True,
-        model_touches=model_touches(walls, shape.gravity, pressed.names, pressed.force, pressed.position) if walls else (),
+        model_touches=model_touches(walls, shape.gravity, *forces) if walls else (),
         virtual_touches=tuple(touched),
         wall=truth.wall,
     )

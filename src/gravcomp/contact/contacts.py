@@ -53,7 +53,8 @@ class Contacts:
 
     obstacle (c,): number in the scene; names (c): of the obstacles; station (c,): 0 at the base to 1 at the tip; position (c, 3)
     on the robot's surface in m; normal (c, 3): out of the obstacle; force (c, 3) on the robot in N; gap (c,) in m; sliding (c,):
-    whether it slides or sticks; by_tension (c, m): change of the normal force by the cables' tensions, in N/N.
+    whether it slides or sticks; by_tension (c, m): change of the normal force by the cables' tensions, in N/N; against (c,): the
+    station of the other part, on which the opposite force acts, where the robot touches itself, else NaN; (0,): it does not.
     """
 
     obstacle: np.ndarray
@@ -65,6 +66,7 @@ class Contacts:
     sliding: np.ndarray
     by_tension: np.ndarray
     names: tuple[str, ...] = ()
+    against: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
     def none() -> "Contacts":
@@ -75,6 +77,17 @@ class Contacts:
     def __len__(self) -> int:
         """Return the number of places."""
         return len(self.obstacle)
+
+    def and_own(self, own: "Contacts") -> "Contacts":
+        """Return these contacts with obstacles, and `own`, those of the robot with itself."""
+        if not len(own) or not len(self):
+            return own if len(own) else self
+        both = {
+            field.name: np.concatenate([getattr(self, field.name), getattr(own, field.name)])
+            for field in dataclasses.fields(self)
+            if field.name not in ("names", "against")
+        }
+        return Contacts(**both, names=self.names + own.names, against=np.concatenate([np.full(len(self), np.nan), own.against]))
 
     def by_obstacle(self) -> ObstacleForces:
         """Return what presses on each obstacle that is touched."""

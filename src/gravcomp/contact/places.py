@@ -183,7 +183,7 @@ def _write_place(
         last, last_ahead, steep = place, 0.0, bend
         for turn in range(_MOVES):
             moved = min(max(moved, low), high)
-            first = _between(moved, stations, share, tilt)
+            first = between(moved, stations, share, tilt)
             _section_at(sections, first, share, section)
             found = deepest(scene, k, surface, s, section, other, across)
             if found < best:
@@ -202,7 +202,7 @@ def _write_place(
                 break
         if 0.0 < min(max(moved, low), high) < end:  # at an end of the robot the place stays when it tilts
             result.rocking[i] = -1.0 / bend
-    result.first[i] = _between(place, stations, share, tilt)
+    result.first[i] = between(place, stations, share, tilt)
     _section_at(sections, result.first[i], share, section)
     _write_frame(scene, surface, section, here, best, there, result, i)
 
@@ -253,7 +253,7 @@ def _cross(a: tuple[float, float, float], b: tuple[float, float, float]) -> tupl
 
 
 @njit(cache=True)
-def _between(place: float, stations: int, share: np.ndarray, tilt: np.ndarray) -> int:
+def between(place: float, stations: int, share: np.ndarray, tilt: np.ndarray) -> int:
     """Write the weights (4,) of four stations for `place`, in distances of stations, and for the slope there; return the first.
 
     Between two stations the parabolas through either of them and its neighbours are blended linearly (A. Overhauser, 1968): the

@@ -6,6 +6,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError
 from gravcomp.contact.outline_gap import deepest
+from gravcomp.contact.own_surface import own_surface
 from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Robot
 from gravcomp.scene.distance import PLANE, TUBE, SceneArrays, gap_to
@@ -20,11 +21,17 @@ _PARALLEL = 1e-3
 def refuse_start(scene: Scene, robot: Robot) -> None:
     """Raise ConfigError where the base is inside an obstacle of soft_base, or where there is less room than the robot needs.
 
-    Room is that of a lumen, or of two planes that face each other.
+    Room is that of a lumen, or of two planes that face each other. Raises ConfigError, too, where a robot that touches itself has
+    sections that are not round.
 
     Raises ValueError for a robot that has no outlines along its axis.
     """
     surface, arrays = contact_surface(robot), scene.arrays
+    if scene.self_contact:
+        try:
+            own_surface(robot, surface)
+        except ValueError as error:
+            raise ConfigError(f"{scene.source}: scene.self_contact: {error}") from error
     base = np.vstack([np.zeros(3), np.eye(3)[:2]])
     thinnest = float(surface.radius.min())
     own, normal = np.zeros(2), np.zeros(3)

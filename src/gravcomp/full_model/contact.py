@@ -5,6 +5,8 @@ right-hand sides of the factor that the step has anyway, A X = C^T, next to thos
 dense: the compliance S of cables and places, from which forces and states follow (`contact.condensed`).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gravcomp.contact.condensed import contact_forces
@@ -26,10 +28,12 @@ from gravcomp.contact.surface import contact_surface
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.equilibrium import Equilibrium
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.own_contact import OwnContact, OwnRows, OwnTouch
 from gravcomp.full_model.supports import SupportedFactor
 from gravcomp.full_model.touch import Touch
 from gravcomp.mechanics.block_matrix import Factor
 from gravcomp.mesh.sections import section_functionals
+from gravcomp.scene.declared import ITSELF
 from gravcomp.scene.distance import SceneArrays
 from gravcomp.scene.scene import Scene
 
@@ -37,6 +41,21 @@ from gravcomp.scene.scene import Scene
 NEAR, TOUCHED = 0.02, 1e-3
 # Part of the radius by which a robot is pushed off an obstacle on which it is balanced.
 KICK = 0.01
+# Part of the radius by which a robot may move that is twice as far from itself.
+_FREE = 0.25
+
+
+class _Rows(NamedTuple):
+    """Rows (r, 3 n_free) of `contact.condensed` in its order, and what it needs to know of them."""
+
+    directions: np.ndarray
+    gap: np.ndarray
+    softness: np.ndarray
+    friction: np.ndarray
+    slid: np.ndarray
+    bend: np.ndarray
+    pressed: np.ndarray
+    rub: np.ndarray
 
 
 class FullContact:
@@ -44,7 +63,8 @@ class FullContact:
 
     Attributes: scene; arrays: its obstacles where gravity last placed them; surface; sections_at_rest (s, 3, 3); margin: m,
     nearer places are candidates; rubbing: whether any obstacle has friction; allowed: depth in m by which obstacles are lowered,
-    for loads applied in steps; touch: what touches in the solution that is sought, from the state at which `begin` started.
+    for loads applied in steps; touch: what touches in the solution that is sought, from the state at which `begin` started; own:
+    contact of the robot with itself, if the scene has it.
     """
 
     def __init__(self, model: MeshedModel, scene: Scene):
@@ -56,6 +76,7 @@ class FullContact:
         rows = section_functionals(model.mesh, self.surface.place)
         self._rows = csr_matrix(rows)
         self._of_vectors = [csr_matrix(rows[v::3, : model.n_free]) for v in range(3)]
+        self._free_rows_transposed = csr_matrix(rows[:, : model.n_free].T) if scene.self_contact else None
         self.margin = NEAR * float(self.surface.radius.min())
         self.sections_at_rest = self.sections(np.zeros_like(model.mesh.nodes))
         self.allowed = 0.0
@@ -64,6 +85,7 @@ class FullContact:
         none_pressed = np.zeros(slots, dtype=np.bool_)
         self._nothing = Touch(self.sections_at_rest, none_pressed, np.zeros((*slots, 3)), np.zeros(3 * model.n_free))
         self.touch = self._nothing
+        self.own = OwnContact(model.robot, self.surface) if scene.self_contact else None
 
     def sections(self, u: np.ndarray) -> np.ndarray:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
@@ -72,7 +94,28 @@ class FullContact:
     @property
     def longest(self) -> float:
         """Largest step in m that cannot pass over an obstacle."""
-        return float(self.surface.radius.min()) if self.touch.solution is not None else np.inf
+        solution = self.touch.solution
+        return float(self.surface.radius.min()) if solution is not None and len(solution[0].row) else np.inf
+
+    def free_way(self, u: np.ndarray) -> float:
+        """Return how far in m the robot can go from u (n, 3) without touching anything; 0 where that is not looked at.
+
+        That is where there are no obstacles, and the robot is far from itself: then the equilibrium needs no contact.
+        """
+        if self.own is None or len(self.arrays.kind):
+            return 0.0
+        way = _FREE * float(self.surface.radius.min())
+        return 0.0 if self.own.is_near(self.sections(u), 2.0 * way) else way
+
+    def way(self, u: np.ndarray, other: np.ndarray) -> float:
+        """Return the longest way in m of a station between the displacements u and other (n, 3)."""
+        return float(np.linalg.norm(self.sections(other)[:, 0] - self.sections(u)[:, 0], axis=1).max())
+
+    def part_that_passes(self, u: np.ndarray, step: np.ndarray) -> float:
+        """Return the part of a step (3 n_free,) from u (n, 3) in which no part of the robot passes another."""
+        if self.own is None:
+            return 1.0
+        return self.own.part_that_passes(self.sections(u), self._of_vectors[0] @ step.reshape(-1, 3))
 
     def begin(self, state: Equilibrium, gravity: np.ndarray) -> None:
         """Start a step from a state with what touches there. gravity (3,) places what is in the world.
@@ -134,41 +177,82 @@ class FullContact:
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
         places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, last.force)
-        if not len(places.row):
+        own = None if self.own is None else self.own.rows(sections, moved, self.margin, last.own)
+        if not len(places.row) and own is None:
             state.compliance, state.answer = compliance, answer
             self.touch = self._nothing._replace(start=last.start, pressed=last.pressed)
             return y + answer @ tension, tension
-        pressed, rub = remembered(places, last.force)
-        turns, moves, bend = turning(places, pressed)
-        directions, friction, slid = self._directions(places, turns, moves), np.zeros(0), np.zeros(0)
-        arrays, count = self.arrays, len(places.row)
-        if self.rubbing:
-            friction, slid = rubbing(arrays, self.surface, places, last.start, sections, TOUCHED, last.pressed)
+        turns, moves, bend = turning(places, remembered(places, last.force)[0])
+        rows = self._place_rows(places, turns, moves, bend, sections)
+        if own is not None:
+            rows = self._with_own(rows, own)
+        directions, count, walls = rows.directions, len(rows.gap), len(places.row)
         columns = np.hstack([answer, factor.solve(directions.T)])
-        rows = np.vstack([jacobian, directions])
-        whole = rows @ columns
+        lines = np.vstack([jacobian, directions])
+        whole = lines @ columns
         whole[:m, :m] += stretch
-        free = rows @ y
+        free = lines @ y
         free[:m] += state.tendons.displacement
-        free[m + count : m + count + len(slid)] += slid
-        softness = yielding(arrays, self.surface, places)
+        turned = m + count + len(rows.slid)
+        free[m + count : turned] += rows.slid
         force, change, held, settled = contact_forces(
-            whole, free, wound, given, state.tension, places.gap + self.allowed,
-            softness, friction, bend, pressed, rub,
-        )  # fmt: skip
+            whole, free, wound, given, state.tension, rows.gap, rows.softness, rows.friction, rows.bend, rows.pressed, rows.rub
+        )
         if supported is not None:
-            soft = np.concatenate([np.zeros(m), softness, np.zeros(len(whole) - m - count)])
-            settled &= not leaves(supported.negative, whole + np.diag(soft), force, friction, bend, wound, given, count)
+            soft = np.concatenate([np.zeros(m), rows.softness, np.zeros(len(whole) - m - count)])
+            settled &= not leaves(supported.negative, whole + np.diag(soft), force, rows.friction, rows.bend, wound, given, count)
         state.compliance, state.answer = whole[:m] @ change, columns @ change
-        forces = forces_at(places, force[m : m + count], force[m + count : m + count + len(slid)])
+        tangential = force[m + count : m + count + 2 * walls] if self.rubbing else np.zeros(0)
+        forces = forces_at(places, force[m : m + walls], tangential)
         by_slot = np.empty_like(last.force)
         remember(places, forces, by_slot)
         step = y + columns @ force
-        if not settled and len(turns):
-            self._kick(step, columns[:, m + count + len(slid) :][:, : len(turns)], bend[: len(turns)])
-        solution = places, forces, held, change[m : m + count]
-        self.touch = Touch(last.start, last.pressed, by_slot, force[m:] @ directions, settled, solution)
+        if not settled:
+            self._kick(step, columns[:, turned:], rows.bend)
+        solution = places, forces, held[:walls], change[m : m + walls]
+        itself = None if own is None else OwnTouch(own.places, force[m + walls : m + count], change[m + walls : m + count])
+        self.touch = Touch(last.start, last.pressed, by_slot, force[m:] @ directions, settled, solution, own=itself)
         return step, force[:m]
+
+    def _place_rows(
+        self, places: Places, turns: np.ndarray, moves: np.ndarray, bend: np.ndarray, sections: np.ndarray
+    ) -> "_Rows":
+        """Return what `contact.condensed` needs to know of the places next to obstacles; the first rows of `bend` are turns."""
+        pressed, rub = remembered(places, self.touch.force)
+        friction, slid = np.zeros(0), np.zeros(0)
+        if self.rubbing:
+            last = self.touch
+            friction, slid = rubbing(self.arrays, self.surface, places, last.start, sections, TOUCHED, last.pressed)
+        softness = yielding(self.arrays, self.surface, places)
+        directions = self._directions(places, turns, moves)
+        return _Rows(directions, places.gap + self.allowed, softness, friction, slid, bend, pressed, rub)
+
+    def _with_own(self, rows: "_Rows", own: OwnRows) -> "_Rows":
+        """Return the rows with those of places where the robot touches itself, which do not rub."""
+        walls, plain, more = len(rows.gap), len(rows.gap) + len(rows.slid), len(own.pressed)
+        tangents = 2 * more if self.rubbing else 0
+        none = np.zeros(more)
+        return _Rows(
+            directions=np.vstack([
+                rows.directions[:walls], self._of_stations(own.gaps), rows.directions[walls:plain],
+                np.zeros((tangents, rows.directions.shape[1])), rows.directions[plain:], self._of_stations(own.turning),
+            ]),
+            gap=np.concatenate([rows.gap, own.places.gap]),
+            softness=np.concatenate([rows.softness, none]),
+            friction=np.concatenate([rows.friction, none[: tangents // 2]]),
+            slid=np.concatenate([rows.slid, np.zeros(tangents)]),
+            bend=np.concatenate([rows.bend, own.bend]),
+            pressed=np.concatenate([rows.pressed, own.pressed]),
+            rub=np.vstack([rows.rub, np.zeros((more, 2))]),
+        )  # fmt: skip
+
+    def _of_stations(self, rows: np.ndarray) -> np.ndarray:
+        """Return rows (k, 9 s) for the displacements of the stations' p, f_1, f_2 as rows (k, 3 n_free) for the unknowns."""
+        if not len(rows):
+            return np.zeros((0, 3 * self._model.n_free))
+        split = rows.reshape(len(rows), -1, 3)
+        parts = [self._free_rows_transposed @ split[:, :, j].T for j in range(3)]
+        return np.stack(parts, axis=-1).swapaxes(0, 1).reshape(len(rows), -1)
 
     def pressed_sections(self) -> list[np.ndarray]:
         """Return the rows (n,) of the middles of the sections that walls pressed in the last solution."""
@@ -191,7 +275,11 @@ class FullContact:
         if state.touch is None or state.touch.solution is None:
             return self.described(None if state.touch is None else state.touch.handed)
         places, forces, held, by_tension = state.touch.solution
-        return self.described(pressed_places(self.arrays, self.surface, places, forces, held, by_tension, self.sections(state.u)))
+        sections = self.sections(state.u)
+        walls = self.described(pressed_places(self.arrays, self.surface, places, forces, held, by_tension, sections))
+        if self.own is None:
+            return walls
+        return walls.and_own(self.own.contacts(state.touch.own, sections, len(self.scene.names), ITSELF))
 
     def described(self, pressed: Pressed | None) -> Contacts:
         """Return the pressed places with their obstacles."""

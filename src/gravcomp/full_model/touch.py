@@ -6,6 +6,7 @@ import numpy as np
 
 from gravcomp.contact.place_forces import Pressed
 from gravcomp.contact.places import Places
+from gravcomp.full_model.own_contact import OwnTouch
 
 
 class Touch(NamedTuple):
@@ -15,7 +16,7 @@ class Touch(NamedTuple):
     force (k, slots, 3) in N: of `place_forces.remember`; pull (3 n_free,): forces on the unknowns in N; settled: whether all
     conditions of contact hold; solution: its places, their forces (c, 3) in N, states (c,) of `contact.condensed`, and changes
     (c, m) of the normal forces by the tensions; None where no place is near an obstacle. handed: what presses at a state of
-    another model, which has no solution here.
+    another model, which has no solution here. own: where the robot touches itself, None where it is not near itself.
     """
 
     start: np.ndarray
@@ -25,3 +26,4 @@ class Touch(NamedTuple):
     settled: bool = True
     solution: tuple[Places, np.ndarray, np.ndarray, np.ndarray] | None = None
     handed: Pressed | None = None
+    own: OwnTouch | None = None

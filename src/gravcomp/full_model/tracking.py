@@ -101,10 +101,37 @@ class StaticTracker:
         exact: use a thousandth of the tolerance and new factors of the present shape, for reference results. stable: stop where
         the tangent is not positive definite. loads: act in addition, by `fraction` of their value.
         """
+        contact, before = self.contact, (self.state, self.sliding, self._before)
+        way = 0.0 if contact is None else contact.free_way(self.state.u)
+        if contact is not None and self._before is not None and contact.way(self._before, self.state.u) > way:
+            way = 0.0  # steps are long
+        if contact is not None and way > 0.0:
+            self.contact = None  # nothing is near
+            try:
+                state = self._tracked(gravity, cables, iterations, exact, stable, loads, fraction)
+            finally:
+                self.contact = contact
+            if state.converged and contact.way(before[0].u, state.u) < way:
+                return state
+            (self.state, self.sliding, self._before), self._kept = before, None
+        return self._tracked(gravity, cables, iterations, exact, stable, loads, fraction)
+
+    def _tracked(
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        iterations: int,
+        exact: bool,
+        stable: bool,
+        loads: PointLoads | None,
+        fraction: float,
+    ) -> Equilibrium:
+        """Do as `track`, with contact if there is any."""
         previous = self.state
         if exact:
             self._kept = None
-        state = dataclasses.replace(previous, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
+        touch = None if self.contact is None else previous.touch
+        state = dataclasses.replace(previous, touch=touch, u=previous.u.copy(), converged=False, iterations=0, load_fraction=1.0)
         if self.model.tendons.friction.any():
             stretched = self.model.tendons.stretch(state.tendons) * state.tension
             self.sliding = cables.sliding(self.sliding, state.tension, state.tendons.displacement + stretched)
@@ -226,6 +253,8 @@ class StaticTracker:
         model = self.model
         longest = self.longest_step if self.contact is None else min(self.longest_step, self.contact.longest)
         damping = min(1.0, longest / size) if size > 0 else 1.0
+        if self.contact is not None:
+            damping = min(damping, self.contact.part_that_passes(state.u, step))
         start = state.u.copy()
         while True:
             model.free(state.u)[:] = model.free(start) + damping * step

@@ -49,6 +49,14 @@ class Release:
         tension (m,) in N: present ones; way (3,): from the tip to its target in m; gravity (3,) in m/s^2 places what is in the
         world, None: the horizontal robot.
         """
+        walls = np.array([name in scene.names for name in forces.names], dtype=bool)  # all but the robot itself
+        forces = ObstacleForces(
+            tuple(name for name in forces.names if name in scene.names),
+            forces.force[walls], forces.position[walls], forces.change[walls],
+        )  # fmt: skip
+        if not len(forces):
+            self.forget()
+            return ReleaseErrors.none(len(tension))
         self._largest = {name: max(force, self._largest.get(name, 0.0)) for name, force in zip(forces.names, forces.force)}
         _, normal, _ = scene.nearest(forces.position, None if gravity is None else scene.under_gravity(gravity))
         left, largest = normal @ way, np.array(list(self._largest.values()))

@@ -20,6 +20,7 @@ from gravcomp.environment.end_with_parent import end_with_parent
 if TYPE_CHECKING:
     from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.reduction.reduced_model import ReducedModel
+    from gravcomp.scene.scene import Scene
 
 LOOP = ("model", "controller")
 """Parts of the nodes of the loop."""
@@ -33,8 +34,20 @@ SURROUNDED = ("contact", "surroundings")
 REDUCED = ("reduced",)
 """Part of the reduced model, at rest and in motion, which is otherwise compiled when one is built."""
 
-PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED
+ITSELF = ("self_contact",)
+"""Part of the model of a robot that touches itself, in addition to SURROUNDED."""
+
+VIRTUAL_ITSELF = ("virtual_self_contact",)
+"""Part of a virtual robot that touches itself."""
+
+PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED + ITSELF + VIRTUAL_ITSELF
 """All parts."""
+
+
+def around(scene: "Scene", zones: "Scene", virtual: bool) -> tuple[str, ...]:
+    """Return the parts that a robot with these obstacles and forbidden zones, and a virtual one, need in addition."""
+    itself = ITSELF + (VIRTUAL_ITSELF if virtual else ())
+    return (SURROUNDED if scene or zones else ()) + (itself if scene.self_contact else ())
 
 
 def missing(parts: Iterable[str]) -> list[str]:
@@ -103,6 +116,29 @@ def _contact() -> None:
     ReducedServing(simulator.model, _small_reduced_model(simulator.model), simulator.solver).warm_up()
 
 
+def _itself() -> None:
+    """Let the article's robot be ready to touch itself."""
+    import numpy as np
+
+    from gravcomp.description import load_robot_file
+    from gravcomp.scene import SceneSection
+    from gravcomp.scene.scene import Scene
+    from gravcomp.simulation import Simulator
+
+    scene = Scene(SceneSection(self_contact=True))
+    simulator = Simulator(load_robot_file("article").robot, reduced=False, scene=scene)
+    simulator.warm_up()
+    simulator.step(np.array([-9.81, 0.0, 0.0]))
+
+
+def _virtual_itself() -> None:
+    from gravcomp.scene import SceneSection
+    from gravcomp.scene.scene import Scene
+    from gravcomp.virtual.warm_up import warm_up
+
+    warm_up(Scene(SceneSection(self_contact=True)))
+
+
 def _reduced() -> None:
     import numpy as np
 
@@ -163,6 +199,8 @@ _WORK = {
     "reduced": _reduced,
     "contact": _contact,
     "surroundings": _surroundings,
+    "self_contact": _itself,
+    "virtual_self_contact": _virtual_itself,
 }
 
 

@@ -25,6 +25,7 @@ from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.memory import Memory
+from gravcomp.reduction.near_itself import NearItself
 from gravcomp.reduction.reduced_loads import ReducedLoads
 from gravcomp.reduction.reduced_model import ReducedModel, fields
 from gravcomp.reduction.tracking import ReducedState, ReducedTracker
@@ -38,6 +39,7 @@ _RETURN_AFTER = 25
 # Iterations in which the reduced model may find the forces of contact at a shape of the full one.
 _TO_AGREE = 30
 _DIFFERENT_CREEP = "the materials creep differently, which the reduced model does not have"
+_NEAR_ITSELF = "the robot touches itself, or nearly, which the reduced model does not have"
 _UNTRAINED = "the shape is outside the range that the reduced model was trained for"
 
 
@@ -59,8 +61,13 @@ class ReducedServing:
         self._tolerance = _TOLERANCE * model.length
         self._tracker = ReducedTracker(reduced, model.length)
         self._loads = ReducedLoads(model, reduced.basis)
+        self._itself: NearItself | None = None
         if full.contact is not None:
-            self._tracker.contact = ReducedContact(full.contact, full.contact.changes(fields(model, reduced.basis)))
+            change = full.contact.changes(fields(model, reduced.basis))
+            if len(full.contact.arrays.kind):
+                self._tracker.contact = ReducedContact(full.contact, change)
+            if full.contact.own is not None:
+                self._itself = NearItself(full.contact, change)
         self.reset()
 
     def reset(self) -> None:
@@ -115,12 +122,17 @@ class ReducedServing:
         if h is not None and not self._uniform:
             self._leave(_DIFFERENT_CREEP, wait=_RETURN_AFTER)
             return None
+        before, sliding = self._tracker.state, self._tracker.sliding
         state = self._tracked(gravity, cables, h, loads)
         if not state.converged:
             self._leave("the reduced model did not converge", wait=0)
             return None
         if self.reduced.outside(state.q) > 1.0:
             self._leave(_UNTRAINED, wait=_RETURN_AFTER)
+            return None
+        if self._itself is not None and self._itself.at(state.q):
+            self._tracker.place(before.q, before.tension, sliding)  # the step may have passed through
+            self._leave(_NEAR_ITSELF, wait=_RETURN_AFTER)
             return None
         self._since_check += 1
         moved = state.q - self._checked_at
@@ -166,6 +178,10 @@ class ReducedServing:
         self._tracker.place(q, state.tension, self._full.sliding)
         if self._tracker.contact is not None and state.touch is not None:
             self._tracker.contact.take_over(state.touch, self.reduced.basis)
+        if self._itself is not None and self._itself.at(q):
+            self.reason = _NEAR_ITSELF
+            self._remember(q, strain, h)
+            return
         own = self._tracked(gravity, cables, h, loads, iterations=_TO_AGREE)
         self._remember(q, strain, h)
         if h is not None and not self._uniform:

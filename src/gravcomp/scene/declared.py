@@ -12,6 +12,8 @@ _Point = tuple[float, float, float]
 _RIGID = "wall that yields: force per length of robot and depth; rigid when not given"
 _FRAMES = ("soft_base", "world")
 _SIDES = ("inside", "outside")
+ITSELF = "self"
+"""Name of the robot itself as an obstacle."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -105,19 +107,22 @@ class MeshWall(Wall):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SceneSection:
-    """The section `scene:`: obstacles by kind. Obstacles are numbered in the order of these lists."""
+    """The section `scene:`: obstacles by kind. Obstacles are numbered in the order of these lists, the robot itself last."""
 
     planes: tuple[PlaneWall, ...] = parameter((), description="half-spaces")
     spheres: tuple[SphereWall, ...] = parameter((), description="balls")
     boxes: tuple[BoxWall, ...] = parameter((), description="cuboids")
     tubes: tuple[TubeWall, ...] = parameter((), description="tubes along curves")
     meshes: tuple[MeshWall, ...] = parameter((), description="closed surfaces from files")
+    self_contact: bool = parameter(False, description="the robot touches itself where it is bent enough; without friction")
 
     def __post_init__(self) -> None:
         names = [wall.name for wall in self.walls if wall.name]
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"the name '{name}' is given {names.count(name)} times; names must differ")
+        if self.self_contact and ITSELF in names:
+            raise ValueError(f"the name '{ITSELF}' is that of the robot with self_contact; give the obstacle another one")
 
     @property
     def walls(self) -> tuple[Wall, ...]:

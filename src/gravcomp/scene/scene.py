@@ -21,8 +21,8 @@ class Scene:
     """Obstacles around a robot, or the zones that are forbidden to it. It does not change after it is made.
 
     Attributes: names and walls of the obstacles; arrays: `SceneArrays` in soft_base of the horizontal robot, for compiled
-    functions (`distance.nearest`, `distance.gap_to`); in_world (k,): whether a row of them is in the world; source: the file in
-    errors; notes: sentences on what was repaired in files.
+    functions (`distance.nearest`, `distance.gap_to`); in_world (k,): whether a row of them is in the world; self_contact: whether
+    the robot touches itself too; source: the file in errors; notes: sentences on what was repaired in files.
     """
 
     def __init__(self, section: SceneSection, source: str = "scene", forbidden: bool = False):
@@ -33,6 +33,7 @@ class Scene:
         """
         self.walls: tuple[Wall, ...] = tuple(wall for wall in section.walls if wall.forbidden == forbidden)
         self.names = tuple(_name(section, wall) for wall in self.walls)
+        self.self_contact = section.self_contact and not forbidden
         self.notes: list[str] = []
         self.source = source
         self._rows: list[_Row] = []
@@ -46,8 +47,8 @@ class Scene:
         self.arrays = self.turned(_UPRIGHT)
 
     def __bool__(self) -> bool:
-        """Whether there are obstacles."""
-        return bool(self.walls)
+        """Whether there are obstacles; the robot itself is one with `self_contact`."""
+        return bool(self.walls) or self.self_contact
 
     def turned(self, rotation: np.ndarray) -> SceneArrays:
         """Return the obstacles in soft_base where `rotation` (3, 3) turns soft_base into the world."""

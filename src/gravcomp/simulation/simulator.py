@@ -107,6 +107,8 @@ class Simulator:
 
         Cables that are released, slack, pulled in and paid out again use different functions; so does a body that creeps.
         """
+        if self.solver.contact is not None and self.solver.contact.own is not None:
+            self.solver.contact.own.warm_up()
         slack = np.zeros(self.model.tendons.count)
         for displacement in (None, slack, slack + _SMALL_PULL * self.model.length, slack):
             shape = self.step(np.zeros(3), displacement, duration=_SHORT_STEP)

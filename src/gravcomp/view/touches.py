@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gravcomp.scene.declared import ITSELF
+
 if TYPE_CHECKING:
     from gravcomp.scene.scene import Scene
 
@@ -28,14 +30,32 @@ class Touch:
 
 
 def model_touches(
-    scene: "Scene", gravity: np.ndarray, obstacles: Sequence[str], sizes: Sequence[float] | np.ndarray, places: np.ndarray
+    scene: "Scene",
+    gravity: np.ndarray,
+    obstacles: Sequence[str],
+    sizes: Sequence[float] | np.ndarray,
+    places: np.ndarray,
+    backbone: np.ndarray,
 ) -> tuple[Touch, ...]:
     """Return the normal forces of obstacles on the model.
 
-    gravity (3,) in soft_base; sizes (o,) N; places (o, 3) m: of the largest force of each obstacle, where its normal is taken.
+    gravity (3,) in soft_base; sizes (o,) N; places (o, 3) m: of the largest force of each obstacle, where its normal is taken;
+    backbone (n, 3) m: where the robot touches itself, the force on the part whose backbone is nearer is shown, toward that.
     """
     normals = scene.nearest(places, scene.under_gravity(gravity))[1]
+    for index, name in enumerate(obstacles):
+        if name == ITSELF:
+            normals[index] = _toward(backbone, places[index])
     return tuple(Touch(name, place, size * normal) for name, place, size, normal in zip(obstacles, places, sizes, normals))
+
+
+def _toward(backbone: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the direction (3,) from a place (3,) to the nearest one on the lines between the points (n, 3) of a backbone."""
+    start, way = backbone[:-1], np.diff(backbone, axis=0)
+    share = np.clip(((place - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    nearest = start + share[:, None] * way - place
+    nearest = nearest[np.argmin((nearest**2).sum(axis=1))]
+    return nearest / max(float(np.linalg.norm(nearest)), 1e-300)
 
 
 def resultants(touches: Sequence[Touch]) -> list[Touch]:

@@ -6,11 +6,12 @@ import numpy as np
 
 from gravcomp.config import from_mapping
 from gravcomp.scene import SceneSection
+from gravcomp.scene.declared import ITSELF as OWN_NAME
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.dynamics import MovingRod
 from gravcomp.virtual.hand import Hand, HandOrder
 from gravcomp.virtual.placed_wall import PlacedWall, parse_wall
-from gravcomp.virtual.surroundings import RodSurroundings
+from gravcomp.virtual.surroundings import ITSELF, RodSurroundings
 from gravcomp.virtual.true_robot import TrueRobot
 
 
@@ -57,11 +58,11 @@ class Bystander:
         return None if self._wall is None else self._wall.plane
 
     def names(self, rows: np.ndarray) -> tuple[str, ...]:
-        """Return the names of the obstacles of so many rows of the rod's scene."""
+        """Return the names of the obstacles of so many rows of the rod's scene; ITSELF: the rod itself."""
         if self._around is None:
             numbers = np.zeros(0, int)
         else:
             numbers = self._around.walls.scene.obstacle
-        return tuple(
-            self._obstacles[numbers[row]] if row < len(numbers) else self._wall.name if self._wall else "" for row in rows
-        )
+        placed = self._wall.name if self._wall else ""
+        known = [*(self._obstacles[number] for number in numbers), *([placed] * (rows.max(initial=-1) + 1 - len(numbers)))]
+        return tuple(OWN_NAME if row == ITSELF else known[row] for row in rows)

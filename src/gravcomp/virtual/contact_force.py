@@ -170,7 +170,7 @@ def _add_force(touching: Touching, c: int, orientation: np.ndarray, part: float,
     for side in range(2):
         if touching.weight[c, side] == 0.0 or a + side == 0:
             continue
-        _section_motion(orientation[a + side], touching.weight[c, side], touching.arm[c, side], jacobian[side])
+        section_motion(orientation[a + side], touching.weight[c, side], touching.arm[c, side], jacobian[side])
         for j in range(6):
             residual[a + side, j] -= (
                 jacobian[side, 0, j] * force[0] + jacobian[side, 1, j] * force[1] + jacobian[side, 2, j] * force[2]
@@ -209,7 +209,7 @@ def expect(touching: Touching, orientation: np.ndarray, position: np.ndarray, in
             section = touching.section[c] + side
             if touching.weight[c, side] == 0.0 or section == 0:
                 continue
-            _section_motion(orientation[section], touching.weight[c, side], touching.arm[c, side], jacobian)
+            section_motion(orientation[section], touching.weight[c, side], touching.arm[c, side], jacobian)
             for i in range(3):
                 for j in range(6):
                     x[i] += jacobian[i, j] * increment[6 * (section - 1) + j]
@@ -224,7 +224,7 @@ def expect(touching: Touching, orientation: np.ndarray, position: np.ndarray, in
 
 
 @njit(cache=True, error_model="numpy")
-def _section_motion(r: np.ndarray, weight: float, arm: np.ndarray, out: np.ndarray) -> None:
+def section_motion(r: np.ndarray, weight: float, arm: np.ndarray, out: np.ndarray) -> None:
     """Write how a surface point moves with a section, d x / d eta, to out (3, 6)."""
     for i in range(3):
         for j in range(3):

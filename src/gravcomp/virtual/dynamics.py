@@ -9,10 +9,11 @@ from gravcomp.virtual.contact_force import touching_of
 from gravcomp.virtual.equilibrium import RodShape
 from gravcomp.virtual.forces import half_bandwidth
 from gravcomp.virtual.material import RodMaterial
+from gravcomp.virtual.own_contact import OwnTouching, own_touching_of
 from gravcomp.virtual.rod import RodModel, strains
 from gravcomp.virtual.routing import tendon_lengths
 from gravcomp.virtual.se3 import rotation_exp, rotation_log
-from gravcomp.virtual.surroundings import RodSurroundings, Touches, touches_of
+from gravcomp.virtual.surroundings import RodSurroundings, Touches, own_touches_of, touches_of
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
 from gravcomp.virtual.time_step import time_step
 
@@ -71,8 +72,11 @@ class MovingRod:
 
     @property
     def touches(self) -> Touches:
-        """The places where the rod touches walls at present."""
-        return touches_of(self._touching, self.orientation, self.position)
+        """The places where the rod touches walls and itself at present."""
+        walls = touches_of(self._touching, self.orientation, self.position)
+        if self._own is None or not self._own.force[: self._own.count[0]].any():
+            return walls
+        return walls.and_more(own_touches_of(self._own, self.orientation, self.position))
 
     def surround(self, around: RodSurroundings) -> None:
         """Put other obstacles around the rod; the rows that they and the present ones begin with are the same."""
@@ -82,6 +86,10 @@ class MovingRod:
         held[:, :kept], rim[:kept] = self._held[:, :kept], self._rim[:kept]
         self._around, self._held, self._rim = around, held, rim
         self._touching, self._checked = (touching_of(points * rows) for _ in range(2))
+        self._own: OwnTouching | None = None
+        self._own_checked: OwnTouching | None = None
+        if around.itself:
+            self._own, self._own_checked = (own_touching_of(self.model.elements) for _ in range(2))
 
     def move_plane(self, row: int, point: np.ndarray, normal: np.ndarray) -> None:
         """Move the plane of a row of the scene to a point (3,) m and a normal (3,), in the frame of the row."""
@@ -130,7 +138,7 @@ class MovingRod:
         self.tension = shape.tension.copy()
         self._compliance[:] = 0.0
         self._held[:] = 0.0
-        self._touching.count[0] = 0
+        self._forget_touching()
         taut = (self.tension > 0.0) & (self.tendon_stiffness > 0.0)
         self._wound[taut] = self.shortened[taut] + self.tension[taut] / self.tendon_stiffness[taut]
 
@@ -143,7 +151,7 @@ class MovingRod:
         is pulled in then; gravity (3,) m/s^2 is in the fixed frame. If the state at the end is not possible, the rod moves
         rigidly with the base and is at rest. A step at a wall that does not converge is taken again in parts.
         """
-        if not len(self._around.walls.moving):
+        if not self._around.exist:
             return self._step(dt, base_orientation, base_position, gravity, wound)
         state, pose = self._state(), (self.orientation[0].copy(), self.position[0].copy())
         if self._step(dt, base_orientation, base_position, gravity, wound):
@@ -173,7 +181,7 @@ class MovingRod:
         return [
             self.orientation, self.position, self.velocity, self._acceleration, self._velocity_rate, self.strain,
             self._branch_strain, self._slip_strain, self._sliding, self._path, self._wound, self.tension, self.shortened,
-            self._compliance, self._held, self._rim, *self._touching,
+            self._compliance, self._held, self._rim, *self._touching, *(self._own or ()),
         ]  # fmt: skip
 
     def _step(
@@ -232,6 +240,8 @@ class MovingRod:
             self._rim,
             self._touching,
             self._checked,
+            self._own,
+            self._own_checked,
         )
         self._wound[:] = wound
         if not possible:
@@ -253,6 +263,11 @@ class MovingRod:
         self.orientation[0] = base_orientation  # exactly: otherwise its rounding error grows with each call
         self.position = base_position + (self.position - self.position[0]) @ turn.T
 
+    def _forget_touching(self) -> None:
+        self._touching.count[0] = 0
+        if self._own is not None:
+            self._own.count[0] = 0
+
     def _measure(self) -> None:
         model = self.model
         strains(self.orientation, self.position, model.length, self.strain)
@@ -267,6 +282,6 @@ class MovingRod:
             rates[:] = 0.0
         self._sliding[:] = 0.0
         self._held[:] = 0.0
-        self._touching.count[0] = 0
+        self._forget_touching()
         self.tension[:] = 0.0
         self._measure()

@@ -26,6 +26,14 @@ from gravcomp.virtual.contact import Walls, find_contacts, keep_friction
 from gravcomp.virtual.contact_force import Touching, add_contacts, difference, expect, forget_friction, take_over
 from gravcomp.virtual.forces import assemble
 from gravcomp.virtual.material import step_law, update_history
+from gravcomp.virtual.own_contact import (
+    OwnTouching,
+    add_own_contacts,
+    expect_own,
+    find_own_contacts,
+    own_difference,
+    take_own_over,
+)
 from gravcomp.virtual.rod import strains
 from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
@@ -99,6 +107,8 @@ def time_step(
     rim: np.ndarray,
     touching: Touching,
     checked: Touching,
+    own: OwnTouching | None,
+    own_checked: OwnTouching | None,
 ) -> tuple[bool, bool]:
     """Advance the rod by dt s in place; return whether the state at the end is possible, and whether the iteration converged.
 
@@ -106,8 +116,9 @@ def time_step(
     the displacements at the beginning and at the end of the step; compliance (m,) receives that of each tendon's path in one
     step, m/N; direction, chord and band are scratch. rigid (N/m) is the stiffness of a point on a rigid wall, depth (m) by how
     much the planes of the contacts may differ from the walls, held (slots, k, 3) N and rim (k, 3) m are those of `find_contacts`;
-    checked is scratch. If the state is not possible, pose and material keep their values from before the step, and the caller
-    sets the rest of the state.
+    checked is scratch. own: pairs of places where the rod touches itself, and own_checked: scratch; None: it does not, and Numba
+    compiles nothing for it. If the state is not possible, pose and material keep their values from before the step, and the
+    caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
     linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
@@ -120,12 +131,14 @@ def time_step(
     start_orientation, start_position = orientation.copy(), position.copy()
     copy_pose(base_orientation, base_position, orientation[0], position[0])
     turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-    obstacles = walls.moving.shape[0]
+    obstacles = walls.moving.shape[0] + (0 if own is None else 1)
     reach = 0.0
     if obstacles > 0:
         way = _way(dt, velocity, start_orientation, start_position, orientation, position)
         reach = _NEAR * float(surface.size[n]) + 2.0 * way
     meets = touching.count[0] > 0 and np.any(touching.force[: touching.count[0]] != 0.0)
+    if own is not None:
+        meets = meets or np.any(own.force[: own.count[0]] != 0.0)
     start_velocity = velocity.copy()
     total_increment = _predict_free(dt, velocity, acceleration, velocity_rate)
     _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
@@ -135,6 +148,9 @@ def time_step(
             touching,
         )  # fmt: skip
         meets = meets or np.any(touching.gap[: touching.count[0]] < 0.0)
+    if own is not None:  # both places move
+        find_own_contacts(surface, length, 2.0 * reach, orientation, position, own)
+        meets = meets or np.any(own.gap[: own.count[0]] < 0.0)
     beta, gamma = (1.0 - _ALPHA_M) / (dt * dt * _BETA * (1.0 - _ALPHA_F)), _GAMMA / (dt * _BETA)
     if meets:
         beta, gamma = 1.0 / (dt * dt), 1.0 / dt
@@ -190,6 +206,15 @@ def time_step(
             band,
         )
         admissible = add_contacts(touching, orientation, position, _LOOSER * tolerances[0], residual, band)
+        all_gradients, all_pulls, all_springs = gradient, pull, active
+        if own is not None:
+            pairs = own.count[0]
+            of_gap, stiff = np.empty((6 * n, pairs)), np.empty(pairs)
+            admissible &= add_own_contacts(
+                own, rigid, _LOOSER * tolerances[0], orientation, position, residual, of_gap, stiff
+            )  # fmt: skip
+            all_gradients, all_pulls = np.hstack((gradient, of_gap)), np.hstack((pull, of_gap))
+            all_springs = np.concatenate((active, stiff))
         worst = 0.0
         for k in range(1, n + 1):
             for i in range(6):
@@ -208,13 +233,23 @@ def time_step(
                 searches += 1
                 if slides:
                     forget_friction(checked)
-            if obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth:
+            agree = obstacles == 0 or searches >= _SEARCHES or difference(touching, checked, orientation, position) < depth
+            if own is not None and own_checked is not None and not searches >= _SEARCHES:
+                find_own_contacts(surface, length, 2.0 * reach, orientation, position, own_checked)
+                agree &= own_difference(own, own_checked, orientation, position) < depth
+            if agree:
                 converged = True
                 break
             take_over(checked, touching)
+            if own is not None and own_checked is not None:
+                take_own_over(own_checked, own)
             continue
-        increment = newton_step(band, residual, gradient, pull, active, compliance)
+        all_compliances = np.empty(len(all_springs))
+        increment = newton_step(band, residual, all_gradients, all_pulls, all_springs, all_compliances)
+        compliance[:] = all_compliances[:m]
         expect(touching, orientation, position, increment)
+        if own is not None:
+            expect_own(own, rigid, all_gradients[:, m:], increment)
         for k in range(1, n + 1):
             for i in range(6):
                 change = increment[6 * (k - 1) + i]

@@ -60,7 +60,8 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     file = load_robot_file(args.robot)
     wanted = _wanted(args, file.robot.length)
     if file.scene or file.zones:
-        compile_parts(("model", "contact") if wanted is None else compilation.LOOP + compilation.SURROUNDED)
+        parts = ("model", "contact") if wanted is None else compilation.LOOP + compilation.SURROUNDED
+        compile_parts(parts + (compilation.ITSELF if file.scene.self_contact else ()))
     choose_mesh(file.robot)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)

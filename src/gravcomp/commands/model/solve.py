@@ -20,6 +20,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the subcommand. Returns 0: solved, 1: no equilibrium was found. Raises ConfigError, ValueError, MeshError."""
     import numpy as np
 
+    from gravcomp.scene.declared import ITSELF
+
     simulator, shape, command = loaded_shape(args)
     figures = {
         "robot": simulator.robot.name,
@@ -48,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
             {
                 "obstacle": contacts.names[i],
                 "station": contacts.station[i],
+                **({"against_station": contacts.against[i]} if contacts.names[i] == ITSELF else {}),
                 "position_mm": (1e3 * contacts.position[i]).tolist(),
                 "gap_mm": 1e3 * contacts.gap[i],
                 "force_n": contacts.force[i].tolist(),
@@ -77,6 +80,10 @@ def _described(wrench: "Wrench") -> dict[str, Any]:
     }
 
 
+def _against(contact: dict[str, Any]) -> str:
+    return f" against {contact['against_station']:.3f}" if "against_station" in contact else ""
+
+
 def _text(figures: dict[str, Any]) -> str:
     def row(values: list, digits: int = 3) -> str:
         return ", ".join(f"{value:.{digits}f}" for value in values)
@@ -103,7 +110,7 @@ def _text(figures: dict[str, Any]) -> str:
     if "contacts" in figures:
         lines.append(f"  {len(figures['contacts'])} contacts (station: x, y, z in mm; gap; force in N)")
         lines += [
-            f"    {c['obstacle']}, {c['station']:.3f}: {row(c['position_mm'])}; {1e3 * c['gap_mm']:+.2f} um;"
+            f"    {c['obstacle']}, {c['station']:.3f}{_against(c)}: {row(c['position_mm'])}; {1e3 * c['gap_mm']:+.2f} um;"
             f" {row(c['force_n'], 4)} ({c['normal_force_n']:.4f} N normal{', slides' if c['sliding'] else ''})"
             for c in figures["contacts"]
         ]
