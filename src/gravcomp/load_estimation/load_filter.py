@@ -28,13 +28,13 @@ class LoadFilter:
     def __init__(self, options: LoadEstimationOptions, limits: Limits, cables: int, numbers: int, sag: float):
         """limits: of the cables; sag in m: by which the tip hangs without them."""
         self._options, self._k, self._m = options, numbers, cables
-        size = numbers + 5 + 2 * cables
+        size = numbers + 5 + 3 * cables
         self.state = np.zeros(size)
         self.learning = True  # of the errors
         tip, offset = options.drift * sag + options.tip_std, options.tension_offset * limits.tension_max
         self._displacement = options.displacement_error * limits.displacement_max
         deviations = [*[0.0] * numbers, options.stiffness_error, options.weight_error, *[tip] * 3, *[offset] * cables]
-        deviations += [self._displacement] * cables
+        deviations += [self._displacement] * cables + [0.0] * cables
         self.covariance = np.diag(np.square(deviations))
         self._sag, self._floor = sag, options.tension_floor * limits.tension_max
         self._largest = limits.tension_max
@@ -80,22 +80,25 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(self, elapsed: float, around: np.ndarray, deviation: float, time: float, tension_change: np.ndarray) -> None:
+    def diffuse(
+        self, elapsed: float, deviation: float, time: float, tension: np.ndarray, change: np.ndarray
+    ) -> None:
         """Let what walks walk, for `elapsed` s.
 
-        The load forgets what it was within `time` s and is then anything of this standard deviation around a load (k,), so that
-        what no sensor sees of it stays bounded. tension_change (m,) N: since the last call.
+        The load forgets what it was within `time` s and is then anything of this standard deviation, so that what no sensor sees
+        of it stays bounded. tension (m,) N: of the cables; change (m,) N: of the model's since the last call.
         """
-        k, m = self._k, self._m
-        step = np.zeros(len(self.state))
-        kept = np.exp(-elapsed / time)
-        self.state[:k] = around + kept * (self.state[:k] - around)
-        self.covariance[:k] *= kept
-        self.covariance[:, :k] *= kept
-        step[:k] = (1.0 - kept**2) * deviation**2
-        step[k + 2 : k + 5] = (self._options.drift * self._sag) ** 2 * elapsed
-        step[k + 5 : k + 5 + m] = (self._options.cable_friction * tension_change) ** 2
-        step[k + 5 + m :] = self._displacement**2 * np.minimum(1.0, np.abs(tension_change) / self._largest)
+        k, m, options = self._k, self._m, self._options
+        friction = slice(k + 5 + 2 * m, None)
+        step, kept = np.zeros(len(self.state)), np.ones(len(self.state))
+        kept[:k] = np.exp(-elapsed / time)
+        kept[friction] = np.exp(-elapsed / options.friction_time)
+        self.state *= kept
+        self.covariance *= np.outer(kept, kept)
+        step[:k] = (1.0 - kept[:k] ** 2) * deviation**2
+        step[k + 2 : k + 5] = (options.drift * self._sag) ** 2 * elapsed
+        step[k + 5 + m : k + 5 + 2 * m] = self._displacement**2 * np.minimum(1.0, np.abs(change) / self._largest)
+        step[friction] = (1.0 - kept[friction] ** 2) * (options.cable_friction * tension) ** 2
         self.covariance[np.diag_indices(len(step))] += step
 
     def take_tip(
@@ -113,7 +116,7 @@ class LoadFilter:
             rows[:, :k] = at.tip_force @ direction
             rows[:, k] = rows[:, k + 1] = at.tip_error
             rows[:, k + 2 : k + 5] = np.eye(3)
-            rows[:, k + 5 + self._m :] = at.tip_cables
+            rows[:, k + 5 + self._m : k + 5 + 2 * self._m] = at.tip_cables
             return residual, at.tip, rows, noise
 
         return self._take(seen, robot, direction, carried)
@@ -135,8 +138,8 @@ class LoadFilter:
             rows = np.zeros((m, len(self.state)))
             rows[:, :k] = at.tension_force @ direction
             rows[:, k], rows[:, k + 1] = at.tension_stiffness, at.tension_weight
-            rows[:, k + 5 : k + 5 + m] = np.eye(m)
-            rows[:, k + 5 + m :] = at.tension_cables
+            rows[:, k + 5 : k + 5 + m] = rows[:, k + 5 + 2 * m :] = np.eye(m)
+            rows[:, k + 5 + m : k + 5 + 2 * m] = at.tension_cables
             return residual[at.taut], at.tension[at.taut], rows[at.taut], noise[np.ix_(at.taut, at.taut)]
 
         return self._take(seen, robot, direction, carried)
