@@ -1,9 +1,14 @@
 """Kalman filter of a load and of the errors that look like one.
 
-The state is x = (load, s_E, s_w, b_e, b_lambda, b_u): the load in k numbers that give the force D x, the relative errors of
-compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (friction, zeros of the
-sensors) and in the cables' displacements (backlash, stretch). All of it walks at random (Kalman 1960). As a load makes cables
-slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+The state is x = (load, s_E, s_w, b_e, b_lambda, b_u, b_f): the load in k numbers that give the force D x, the relative errors of
+compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (zeros of the sensors), in
+the cables' displacements (backlash, stretch), and in the tensions by friction. Load, b_e and b_u walk at random (Kalman 1960). As
+a load makes cables slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+
+Friction adds a share mu of the tension T to what a sensor reads, or takes it away, and turns round with the cable's motion,
+however small. So b_f is a coloured noise of standard deviation mu T that is forgotten within a time t_f (Bryson and Johansen
+1965): db_f = -b_f dt / t_f + mu T sqrt(2 / t_f) dw. If it were taken for white, it would be averaged away, and its turns would be
+explained by what else changes with the tension, such as s_E.
 
 The errors are learnt while the robot is known to carry nothing. Afterwards they only count in the variances (Schmidt 1966): a
 load that comes must not be taken for an error, nor the robot's lag behind the model.
@@ -80,9 +85,7 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(
-        self, elapsed: float, deviation: float, time: float, tension: np.ndarray, change: np.ndarray
-    ) -> None:
+    def diffuse(self, elapsed: float, deviation: float, time: float, tension: np.ndarray, change: np.ndarray) -> None:
         """Let what walks walk, for `elapsed` s.
 
         The load forgets what it was within `time` s and is then anything of this standard deviation, so that what no sensor sees

@@ -300,7 +300,7 @@ class LoadObserver:
         return self._released and newest is not None and newest.anchored
 
     def _diffuse(self, then: Prediction, pull: np.ndarray) -> None:
-        """Let the filter forget with the time and the change of tensions since the last measurement. pull (m,) N: of the cables."""
+        """Let the filter forget with the time and the change of tensions since the last measurement. pull (m,): tensions, N."""
         assert self._filter is not None
         if self._last_change is not None:
             before, tension = self._last_change

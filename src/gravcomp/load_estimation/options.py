@@ -57,7 +57,7 @@ class LoadEstimationOptions:
         unit="s",
         minimum=0.01,
         maximum=1e5,
-        description="time in which a force may change unnoticed by as much as the cables can hold; what changes faster shows in the"
+        description="time in which a force may change unnoticed by as much as the cables can hold; faster changes show in the"
         " sensors, and the estimate begins anew",
     )
     zero_time: float = parameter(
