@@ -32,6 +32,7 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     held, without = runs[::2], runs[1::2]
     ratio = _peak_ratio(without, held)
     n = len(held)
+    light: list[Steered] = []
     if not context.brief:  # a brief run is given up before a person can reach the target
         result.figures += [
             Figure(f"steered: reached with compensation, of {n}", sum(r.reached for r in held), "", limit=np.ceil(_NEEDED * n),
@@ -55,10 +56,11 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     ]  # fmt: skip
     header = ("seed", "lumen", "compensation", "reached", "time, s", "peak force, N", "mean force, N", "path of the tip, mm",
               "time at pain, %", "deepest in the wall, mm")  # fmt: skip
+    ways = [(r, "with" if r.compensated else "without") for r in runs] + [(r, "hardly any weight") for r in light]
     rows = [
-        (r.seed, r.passage.name, "with" if r.compensated else "without", "yes" if r.reached else "no", r.time, r.peak, r.mean,
-         1e3 * r.path, 1e2 * r.hurt, 1e3 * r.worst)
-        for r in runs
+        (r.seed, r.passage.name, way, "yes" if r.reached else "no", r.time, r.peak, r.mean, 1e3 * r.path, 1e2 * r.hurt,
+         1e3 * r.worst)
+        for r, way in ways
     ]  # fmt: skip
     result.parts += [
         Plot(
