@@ -36,7 +36,7 @@ class LoadEstimationOptions:
         description="zero error of a tension sensor before ~/zero_load, share of limits.tension_max",
     )
     cable_friction: float = parameter(
-        0.05, minimum=0.0, maximum=1.0, description="part of a tension that friction may keep from the sensor"
+        0.03, minimum=0.0, maximum=1.0, description="part of a tension that friction may keep from the sensor, standard deviation"
     )
     friction_time: float = parameter(
         1.0, unit="s", minimum=0.01, maximum=1e4, description="time in which the friction of a held cable may turn round"
