@@ -15,6 +15,7 @@ from gravcomp.description import load_robot_file
 from gravcomp.evaluation import metrics
 from gravcomp.experiments import EXPERIMENTS, experiment
 from gravcomp.experiments.deflection import tube_robot
+from gravcomp.experiments.steering import nearly_weightless
 from gravcomp.mesh.tube import tube_mesh
 from gravcomp.references import calculix
 from gravcomp.references.beams import Tube, elastica, euler_bernoulli
@@ -177,6 +178,15 @@ def test_a_sweep_goes_over_a_cluster_when_given_its_address(monkeypatch):
     assert asked == ["tcp://here:8786", "closed"]
     assert told == [(1, 2), (2, 2)]
     assert "tcp://here:8786" in sweep.place
+
+
+@pytest.mark.parametrize("robot", ["article", "tentacle"])  # its true values are given, or drawn
+def test_a_robot_of_hardly_any_weight_differs_in_its_weight_only(robot):
+    setup = Setup.of(load_robot_file(robot), 3)
+    true, light = setup.true_robot, nearly_weightless(setup).true_robot
+    assert [one.youngs_modulus for one in light.robot.materials] == [one.youngs_modulus for one in true.robot.materials]
+    assert light.robot.materials[0].density == pytest.approx(true.robot.materials[0].density / 20.0, rel=0.021)  # drawn: +- 2 %
+    assert light.robot.cables == true.robot.cables and light.materials == true.materials
 
 
 @pytest.mark.parametrize("lumen", [Lumen(0.04, 0.07, 0.3, 0.02), Lumen(0.1, 0.0, 0.0, 0.02)])

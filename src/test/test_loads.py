@@ -10,6 +10,7 @@ from gravcomp.description import Elements, MaxWrench, Payload, load_robot_file
 from gravcomp.external_loads import ExternalLoadOptions, LivePayload, WrenchInput, holdable_payload
 from gravcomp.full_model.shape import Response, Shape
 from gravcomp.load_estimation import LoadEstimationOptions, LoadObserver
+from gravcomp.load_estimation.load_filter import LoadFilter
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.load_estimation.tension_check import TensionCheck
 from gravcomp.simulation import Simulator
@@ -17,6 +18,7 @@ from gravcomp.simulation import Simulator
 ROBOT = dataclasses.replace(load_robot_file("article").robot, max_wrench=MaxWrench(0.5, 0.01))
 GRAVITY = np.array([-9.81, 0.0, 0.0])
 ZERO = np.zeros(3)
+REST = np.array([0.0, 0.0, 0.1])  # m, tip of `shape` at rest
 
 
 def taken(**changes):
@@ -149,7 +151,7 @@ def shape():
 
 def test_derivatives_of_a_held_robot_are_those_of_its_tensions_and_tip(shape):
     tip, shape = shape
-    robot = HeldRobot(shape, tip, shape.cable_displacement, np.array([0, 0, 0.1]))
+    robot = HeldRobot(shape, tip, shape.cable_displacement, REST)
     at, h = np.array([0.01, -0.02, 0.005]), 1e-6
     here = robot.under(at)
     for axis in range(3):
@@ -196,20 +198,20 @@ def test_a_payload_is_found_after_zeroing_whatever_the_models_errors(shape, sour
             effector_free=1.2 * (shape.response.effector_free - [0, 0, 0.1, 0, 0, 0]) + [0, 0, 0.1, 0, 0, 0],
         ),
     )
-    truth, start = HeldRobot(soft, 1.2 * tip, wound, np.array([0, 0, 0.1])), soft.response.effector_free[:3]
-    for k in range(600):
-        now, carried = 0.02 * k, mass * GRAVITY * (k >= 300)
+    truth, start = HeldRobot(soft, 1.2 * tip, wound, REST), soft.response.effector_free[:3]
+    for k in range(300):
+        now, carried = 0.04 * k, mass * GRAVITY * (k >= 150)
         observer.predict(now, shape, tip, ZERO, wound)
-        if k == 100:
+        if k == 50:
             observer.zero(now)
         here = truth.under(carried)
         tension = soft.cable_tension + here.tension
         if sources != "tip":
             observer.measure_tensions(now, tension * (1 + 0.01 * random.normal(size=3)))
-        if sources != "tensions" and k % 10 == 0:
+        if sources != "tensions" and k % 5 == 0:
             place = start + soft.response.compliance_ea[:3] @ soft.cable_tension + here.tip
             observer.measure_tip(now, place + 5e-4 * random.normal(size=3))
-        if k == 299:
+        if k == 149:
             assert abs(observer.estimate(GRAVITY, now).mass) < 0.05 * mass + 2 * observer.estimate(GRAVITY, now).mass_std
     found = observer.estimate(GRAVITY, now)
     low, high = found.mass_interval
@@ -218,12 +220,77 @@ def test_a_payload_is_found_after_zeroing_whatever_the_models_errors(shape, sour
     assert found.force == pytest.approx(found.mass * GRAVITY)
 
 
+def with_tension(shape, tension):
+    """Return the shape with its cables wound so that they have this tension."""
+    response = shape.response
+    return dataclasses.replace(
+        shape,
+        cable_tension=tension,
+        cable_displacement=response.compliance_aa @ tension + response.displacement_free,
+        tip_position=response.effector_free[:3] + response.compliance_ea[:3] @ tension,
+    )
+
+
+def test_friction_that_turns_round_while_the_errors_are_learnt_is_not_taken_for_stiffness(shape):
+    """The robot is its model; its load cells are at the capstans, so that friction adds to or takes from what they read."""
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="force"))
+    random, force = np.random.default_rng(1), np.array([-0.1, 0.05, 0.0])
+    pulled, paid_out = (with_tension(shape, share * np.array([1.5, 0.1, 0.1])) for share in (1.0, 0.98))
+    for k in range(400):
+        now, load = 0.02 * k, force * (k >= 240)
+        held, friction = (pulled, 1.04) if k % 75 < 38 else (paid_out, 0.96)
+        observer.predict(now, held, tip, ZERO, held.cable_displacement)
+        if k == 120:
+            observer.zero(now)
+        tension = held.cable_tension + HeldRobot(held, tip, held.cable_displacement, REST).under(load).tension
+        observer.measure_tensions(now, friction * tension * (1 + 0.01 * random.normal(size=3)) + 1e-3 * random.normal(size=3))
+    found = observer.estimate(GRAVITY, now)
+    error = (found.force - force)[:2]
+    assert error @ np.linalg.solve(found.covariance[:2, :2], error) < 9.2  # 1 in 100 is beyond
+    assert np.sqrt(found.covariance[1, 1]) < 0.5 * abs(force[1])  # and something is known
+
+
+def test_what_a_slow_tracker_has_seen_of_a_force_is_kept_between_its_samples(shape):
+    """One taut cable tells one part of the force; the tracker tells the others, that along the robot to 0.25 N."""
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="force"))
+    random, force = np.random.default_rng(5), np.array([-0.5, 0.0, 0.0])
+    loaded = HeldRobot(shape, tip, shape.cable_displacement, REST).under(force)
+    assert loaded.taut.sum() == 1
+    for k in range(199):
+        now, there = 0.04 * k, k >= 120
+        observer.predict(now, shape, tip, ZERO, shape.cable_displacement)
+        if k == 60:
+            observer.zero(now)
+        tension = shape.cable_tension + there * loaded.tension
+        observer.measure_tensions(now, tension * (1 + 0.01 * random.normal(size=3)) + 1e-3 * random.normal(size=3))
+        if k % 20 == 0:
+            observer.measure_tip(now, shape.tip_position + there * loaded.tip + 5e-4 * random.normal(size=3))
+    found = observer.estimate(GRAVITY, now)
+    assert np.linalg.norm((found.force - force)[:2]) < 0.1 * np.linalg.norm(force)
+    assert np.sqrt(found.covariance[2, 2]) < 1.0
+
+
+def test_what_friction_hides_does_not_depend_on_the_rate_of_the_samples():
+    once, often = (LoadFilter(LoadEstimationOptions(kind="force"), ROBOT.limits, 6, 3, 0.02) for _ in range(2))
+    tension, still = np.full(6, 0.8), np.zeros(6)
+    once.diffuse(1.0, 0.5, 1000.0, tension, still)
+    for _ in range(100):
+        often.diffuse(0.01, 0.5, 1000.0, tension, still)
+    assert often.covariance == pytest.approx(once.covariance)
+    for _ in range(20):
+        once.diffuse(1.0, 0.5, 1000.0, tension, still)
+    hidden = np.sqrt(np.diag(once.covariance)[-6:])
+    assert hidden == pytest.approx(LoadEstimationOptions().cable_friction * tension, rel=1e-3)
+
+
 def test_what_a_sensor_has_said_before_it_was_found_to_be_wrong_is_forgotten(shape):
     tip, shape = shape
     robot = dataclasses.replace(ROBOT, cables=ROBOT.cables[:3])
     observer = LoadObserver(robot, LoadEstimationOptions(kind="payload", compensate=False))
     random, carried = np.random.default_rng(3), 0.004 * GRAVITY
-    tension = shape.cable_tension + HeldRobot(shape, tip, shape.cable_displacement, np.array([0, 0, 0.1])).under(carried).tension
+    tension = shape.cable_tension + HeldRobot(shape, tip, shape.cable_displacement, REST).under(carried).tension
 
     def measure(k, signs):
         observer.predict(0.01 * k, shape, tip, ZERO, shape.cable_displacement)

@@ -1,5 +1,7 @@
 """Runs, figures, tables and drawings of a person who steers through a lumen; shared by the two experiments in lumens."""
 
+import dataclasses
+
 import numpy as np
 
 from gravcomp.closed_loop.setup import Setup
@@ -16,6 +18,7 @@ _SECONDS, _BRIEF_SECONDS = 20.0, 1.0  # until a run is given up
 _FIRST, _DEPTHS = 0.35, (0.85, 1.0)  # of the robot's length: the tip at the start, the target
 _NEEDED = 0.95  # share of the seeds that compensation is to bring to the target
 _FORCE_RATIO = 3.0
+_LIGHTER = 20.0  # times: a robot whose sag presses on no wall, but whose inertia still lets it be simulated
 
 
 def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -> None:
@@ -27,13 +30,23 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     jobs = [(setup, passage, way, seed) for passage, seed in zip(passages, seeds) for way in (True, False)]
     runs = context.map(steer, jobs, "a person steers through lumens")
     held, without = runs[::2], runs[1::2]
-    ratio = float(np.median([b.peak / max(a.peak, 1e-6) for a, b in zip(held, without)]))
+    ratio = _peak_ratio(without, held)
     n = len(held)
+    light: list[Steered] = []
     if not context.brief:  # a brief run is given up before a person can reach the target
         result.figures += [
             Figure(f"steered: reached with compensation, of {n}", sum(r.reached for r in held), "", limit=np.ceil(_NEEDED * n),
                    at_least=True),
             Figure(f"steered: reached without compensation, of {n}", sum(r.reached for r in without), ""),
+        ]  # fmt: skip
+        # What the person presses even if gravity does nothing: no compensation can make the peak less than that.
+        jobs = [(nearly_weightless(setup), passage, False, seed) for passage, seed in zip(passages, seeds)]
+        light = context.map(steer, jobs, "a person steers a robot of hardly any weight")
+        least = float(np.median([r.peak for r in light]))
+        result.figures += [
+            Figure("steered: peak force of the wall, without compensation / robot of hardly any weight, median of the seeds",
+                   _peak_ratio(without, light), ""),
+            Figure("steered: peak force of the wall, robot of hardly any weight, median", least, "N"),
         ]  # fmt: skip
     result.figures += [
         Figure("steered: peak force of the wall, without / with compensation, median of the seeds", ratio, "", limit=_FORCE_RATIO,
@@ -43,10 +56,11 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
     ]  # fmt: skip
     header = ("seed", "lumen", "compensation", "reached", "time, s", "peak force, N", "mean force, N", "path of the tip, mm",
               "time at pain, %", "deepest in the wall, mm")  # fmt: skip
+    ways = [(r, "with" if r.compensated else "without") for r in runs] + [(r, "hardly any weight") for r in light]
     rows = [
-        (r.seed, r.passage.name, "with" if r.compensated else "without", "yes" if r.reached else "no", r.time, r.peak, r.mean,
-         1e3 * r.path, 1e2 * r.hurt, 1e3 * r.worst)
-        for r in runs
+        (r.seed, r.passage.name, way, "yes" if r.reached else "no", r.time, r.peak, r.mean, 1e3 * r.path, 1e2 * r.hurt,
+         1e3 * r.worst)
+        for r, way in ways
     ]  # fmt: skip
     result.parts += [
         Plot(
@@ -68,6 +82,19 @@ def add_steering(result: Result, context: Context, reaches: tuple[Reach, ...]) -
         " sees the picture of a camera at the tip, bends the tip, pushes the handle, and pulls back at pain. The wall is rigid,"
         " with friction. The machine lets the body follow the path of the tip; the controller's model does not know the wall.",
     ]
+
+
+def nearly_weightless(setup: Setup) -> Setup:
+    """Return a setup whose virtual robot has a twentieth of its density: as if gravity were compensated perfectly."""
+    body = setup.truth.body
+    density = body.density or setup.nominal.materials[0].density
+    light = dataclasses.replace(body, density=density / _LIGHTER)
+    return dataclasses.replace(setup, truth=dataclasses.replace(setup.truth, body=light))
+
+
+def _peak_ratio(runs: list[Steered], others: list[Steered]) -> float:
+    """Return the median of the ratios of the peak forces of runs to those of others, with the same seeds."""
+    return float(np.median([one.peak / max(other.peak, 1e-6) for one, other in zip(runs, others)]))
 
 
 def _passage(setup: Setup, reach: Reach, seed: int, seconds: float) -> Passage:

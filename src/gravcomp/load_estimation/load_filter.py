@@ -1,9 +1,14 @@
 """Kalman filter of a load and of the errors that look like one.
 
-The state is x = (load, s_E, s_w, b_e, b_lambda, b_u): the load in k numbers that give the force D x, the relative errors of
-compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (friction, zeros of the
-sensors) and in the cables' displacements (backlash, stretch). All of it walks at random (Kalman 1960). As a load makes cables
-slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+The state is x = (load, s_E, s_w, b_e, b_lambda, b_u, b_f): the load in k numbers that give the force D x, the relative errors of
+compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (zeros of the sensors), in
+the cables' displacements (backlash, stretch), and in the tensions by friction. Load, b_e and b_u walk at random (Kalman 1960). As
+a load makes cables slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+
+Friction adds a share mu of the tension T to what a sensor reads, or takes it away, and turns round with the cable's motion,
+however small. So b_f is a coloured noise of standard deviation mu T that is forgotten within a time t_f (Bryson and Johansen
+1965): db_f = -b_f dt / t_f + mu T sqrt(2 / t_f) dw. If it were taken for white, it would be averaged away, and its turns would be
+explained by what else changes with the tension, such as s_E.
 
 The errors are learnt while the robot is known to carry nothing. Afterwards they only count in the variances (Schmidt 1966): a
 load that comes must not be taken for an error, nor the robot's lag behind the model.
@@ -28,13 +33,13 @@ class LoadFilter:
     def __init__(self, options: LoadEstimationOptions, limits: Limits, cables: int, numbers: int, sag: float):
         """limits: of the cables; sag in m: by which the tip hangs without them."""
         self._options, self._k, self._m = options, numbers, cables
-        size = numbers + 5 + 2 * cables
+        size = numbers + 5 + 3 * cables
         self.state = np.zeros(size)
         self.learning = True  # of the errors
         tip, offset = options.drift * sag + options.tip_std, options.tension_offset * limits.tension_max
         self._displacement = options.displacement_error * limits.displacement_max
         deviations = [*[0.0] * numbers, options.stiffness_error, options.weight_error, *[tip] * 3, *[offset] * cables]
-        deviations += [self._displacement] * cables
+        deviations += [self._displacement] * cables + [0.0] * cables
         self.covariance = np.diag(np.square(deviations))
         self._sag, self._floor = sag, options.tension_floor * limits.tension_max
         self._largest = limits.tension_max
@@ -80,22 +85,23 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(self, elapsed: float, around: np.ndarray, deviation: float, time: float, tension_change: np.ndarray) -> None:
+    def diffuse(self, elapsed: float, deviation: float, time: float, tension: np.ndarray, change: np.ndarray) -> None:
         """Let what walks walk, for `elapsed` s.
 
-        The load forgets what it was within `time` s and is then anything of this standard deviation around a load (k,), so that
-        what no sensor sees of it stays bounded. tension_change (m,) N: since the last call.
+        The load forgets what it was within `time` s and is then anything of this standard deviation, so that what no sensor sees
+        of it stays bounded. tension (m,) N: of the cables; change (m,) N: of the model's since the last call.
         """
-        k, m = self._k, self._m
-        step = np.zeros(len(self.state))
-        kept = np.exp(-elapsed / time)
-        self.state[:k] = around + kept * (self.state[:k] - around)
-        self.covariance[:k] *= kept
-        self.covariance[:, :k] *= kept
-        step[:k] = (1.0 - kept**2) * deviation**2
-        step[k + 2 : k + 5] = (self._options.drift * self._sag) ** 2 * elapsed
-        step[k + 5 : k + 5 + m] = (self._options.cable_friction * tension_change) ** 2
-        step[k + 5 + m :] = self._displacement**2 * np.minimum(1.0, np.abs(tension_change) / self._largest)
+        k, m, options = self._k, self._m, self._options
+        friction = slice(k + 5 + 2 * m, None)
+        step, kept = np.zeros(len(self.state)), np.ones(len(self.state))
+        kept[:k] = np.exp(-elapsed / time)
+        kept[friction] = np.exp(-elapsed / options.friction_time)
+        self.state *= kept
+        self.covariance *= np.outer(kept, kept)
+        step[:k] = (1.0 - kept[:k] ** 2) * deviation**2
+        step[k + 2 : k + 5] = (options.drift * self._sag) ** 2 * elapsed
+        step[k + 5 + m : k + 5 + 2 * m] = self._displacement**2 * np.minimum(1.0, np.abs(change) / self._largest)
+        step[friction] = (1.0 - kept[friction] ** 2) * (options.cable_friction * tension) ** 2
         self.covariance[np.diag_indices(len(step))] += step
 
     def take_tip(
@@ -113,7 +119,7 @@ class LoadFilter:
             rows[:, :k] = at.tip_force @ direction
             rows[:, k] = rows[:, k + 1] = at.tip_error
             rows[:, k + 2 : k + 5] = np.eye(3)
-            rows[:, k + 5 + self._m :] = at.tip_cables
+            rows[:, k + 5 + self._m : k + 5 + 2 * self._m] = at.tip_cables
             return residual, at.tip, rows, noise
 
         return self._take(seen, robot, direction, carried)
@@ -135,8 +141,8 @@ class LoadFilter:
             rows = np.zeros((m, len(self.state)))
             rows[:, :k] = at.tension_force @ direction
             rows[:, k], rows[:, k + 1] = at.tension_stiffness, at.tension_weight
-            rows[:, k + 5 : k + 5 + m] = np.eye(m)
-            rows[:, k + 5 + m :] = at.tension_cables
+            rows[:, k + 5 : k + 5 + m] = rows[:, k + 5 + 2 * m :] = np.eye(m)
+            rows[:, k + 5 + m : k + 5 + 2 * m] = at.tension_cables
             return residual[at.taut], at.tension[at.taut], rows[at.taut], noise[np.ix_(at.taut, at.taut)]
 
         return self._take(seen, robot, direction, carried)

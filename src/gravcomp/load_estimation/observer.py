@@ -36,7 +36,8 @@ from gravcomp.standard_gravity import STANDARD_GRAVITY
 # Squared Mahalanobis distance of an outlier: 1 in 10000 good measurements is farther (chi-square, 3 and about 6 numbers).
 _GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
 _TOPICS = {"tip": "measured/tip", "tensions": "measured/tension"}
-_OUTLIERS = 6  # in a row: then it is the load that has changed
+# Outliers in a row: then it is the load that has changed. A tracker has fewer samples, and its spikes are single ones.
+_OUTLIERS = {"tip": 3, "tensions": 6}
 _REACH = 1.5  # lengths of the robot from its base: a tip that is measured beyond is none, however far the body stretches
 _CONSTANT = 1e5  # s: a payload changes at once or not at all
 
@@ -157,7 +158,7 @@ class LoadObserver:
             self._far = away or then.anchored
             if away:  # the anchored model comes to it first
                 return
-        self._diffuse(then)
+        self._diffuse(then, then.tension)
         moved, _ = self._predictions.moved(then, self.options.lag)
         direction = self._direction(then.gravity)
         self._take(
@@ -189,7 +190,7 @@ class LoadObserver:
         if fault or not self._check.is_known:
             return
         self._before.append(self._filter.copy())
-        self._diffuse(then)
+        self._diffuse(then, np.abs(tension))
         _, moved = self._predictions.moved(then, self.options.lag)
         residual, direction = tension - then.tension, self._direction(then.gravity)
         self._take(
@@ -280,7 +281,7 @@ class LoadObserver:
         taken = self._filter.copy()
         if step(taken) > gate:
             self._outliers[source] = self._outliers.get(source, 0) + 1
-            if self._outliers[source] < _OUTLIERS:
+            if self._outliers[source] < _OUTLIERS[source]:
                 return
             taken = self._filter.copy()
             if self._released:
@@ -298,15 +299,14 @@ class LoadObserver:
         newest = self._predictions.newest
         return self._released and newest is not None and newest.anchored
 
-    def _diffuse(self, then: Prediction) -> None:
-        """Let the filter forget with the time and the change of tensions since the last measurement."""
+    def _diffuse(self, then: Prediction, pull: np.ndarray) -> None:
+        """Let the filter forget with the time and the change of tensions since the last measurement. pull (m,): tensions, N."""
         assert self._filter is not None
         if self._last_change is not None:
             before, tension = self._last_change
             time = _CONSTANT if self.options.kind == "payload" else self.options.change_time
-            # Nothing is known of a load but that the cables hold it, or what the anchored model needs to be where it is.
-            around = then.carried if then.anchored and self._released else np.zeros(self._numbers)
-            self._filter.diffuse(
-                max(0.0, then.stamp - before), around, self._scale if self._released else 0.0, time, then.tension - tension
-            )
+            deviation = self._scale if self._released else 0.0
+            self._filter.diffuse(max(0.0, then.stamp - before), deviation, time, pull, then.tension - tension)
+            if then.anchored and self._released:  # nothing else is known than what the anchored model needs to be where it is
+                self._filter.set_load(then.carried, self._scale**2 * np.eye(self._numbers))
         self._last_change = then.stamp, then.tension

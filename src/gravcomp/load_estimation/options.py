@@ -36,7 +36,10 @@ class LoadEstimationOptions:
         description="zero error of a tension sensor before ~/zero_load, share of limits.tension_max",
     )
     cable_friction: float = parameter(
-        0.05, minimum=0.0, maximum=1.0, description="part of a change of tension that friction may keep from the sensor"
+        0.03, minimum=0.0, maximum=1.0, description="part of a tension that friction may keep from the sensor, standard deviation"
+    )
+    friction_time: float = parameter(
+        1.0, unit="s", minimum=0.01, maximum=1e4, description="time in which the friction of a held cable may turn round"
     )
     displacement_error: float = parameter(
         0.005, minimum=1e-6, maximum=1.0,
@@ -50,11 +53,12 @@ class LoadEstimationOptions:
         0.0015, minimum=1e-5, maximum=0.1, description="growth of the model's tip error in 1 s, share of the released sag"
     )
     change_time: float = parameter(
-        1.0,
+        1000.0,
         unit="s",
         minimum=0.01,
-        maximum=1e4,
-        description="time in which the load may change by as much as the cables can hold",
+        maximum=1e5,
+        description="time in which a force may change unnoticed by as much as the cables can hold; faster changes show in the"
+        " sensors, and the estimate begins again",
     )
     zero_time: float = parameter(
         2.0, unit="s", minimum=0.1, maximum=600.0, description="duration of ~/zero_load, in which the robot carries no load"

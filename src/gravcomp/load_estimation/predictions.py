@@ -59,7 +59,12 @@ class Predictions:
             return None
         if not self._kept[0].stamp - _APART <= stamp <= self._kept[-1].stamp + _APART:
             return None
-        return min(self._kept, key=lambda entry: abs(entry.stamp - stamp))
+        nearest = self._kept[-1]
+        for entry in reversed(self._kept):  # what is asked for is nearly always among the newest
+            if abs(entry.stamp - stamp) > abs(nearest.stamp - stamp):
+                break
+            nearest = entry
+        return nearest
 
     def moved(self, then: Prediction, lag: float) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much a robot that is `lag` s late may be behind a prediction: tip (3,) m and tensions (m,) N."""

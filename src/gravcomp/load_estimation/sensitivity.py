@@ -63,6 +63,7 @@ class HeldRobot:
         tip, cables = from_rest if by_loads is None else by_loads
         self._tip_by_loads: np.ndarray = tip
         self._cables_by_loads: np.ndarray = cables
+        self._inverse: tuple[np.ndarray, np.ndarray] | None = None  # of the taut cables' compliance, for these cables
 
     def by_winding(self, before: "HeldRobot") -> tuple[np.ndarray, np.ndarray]:
         """Return what the winches have changed since another shape: of the tip (3,) in m and of the tensions (m,) in N."""
@@ -80,7 +81,9 @@ class HeldRobot:
         m = len(taut)
         by_force, stiffness, weight, cables = np.zeros((m, 3)), np.zeros(m), np.zeros(m), np.zeros((m, m))
         if taut.any():
-            inverse = np.linalg.pinv(compliance[np.ix_(taut, taut)], rcond=1e-9)
+            if self._inverse is None or (self._inverse[0] != taut).any():  # an iteration seldom changes which cables are taut
+                self._inverse = taut, np.linalg.pinv(compliance[np.ix_(taut, taut)], rcond=1e-9)
+            inverse = self._inverse[1]
             cables[np.ix_(taut, taut)] = inverse
             by_force[taut] = -inverse @ to_tip[:, taut].T
             weight[taut] = -inverse @ (self._cables_by_loads + to_tip.T @ force)[taut]
