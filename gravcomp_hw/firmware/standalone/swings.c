@@ -29,7 +29,9 @@ void gc_swings_watch(gc_swings *swings, float dt, const float *rate) {
   swings->changing += gain * (square_of(change) - swings->changing);
   if (swings->known > 0u) {
     swings->change += gain * (square_of(slope) - swings->change);
-    gc_copy(swings->slope, slope, sizeof slope);
+    for (uint32_t i = 0; i < 3u; ++i) {
+      swings->slope[i] = slope[i];
+    }
   }
   if (swings->known > 1u) {
     swings->bend += gain * (square_of(bend) - swings->bend);
