@@ -23,8 +23,8 @@ void gc_alignment_watch(gc_alignment *alignment, float dt, const float *force, f
 // Begin with the first specific force (3,) after a gap. leads: the line gives the inclination.
 void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity, bool leads);
 
-// Take a sample dt s after the last one, with the rate (3,) in rad/s without bias; write a vector (3,) that points up. noise in m/s^2/sqrt(Hz): of the specific force,
-// by vibration, or where it cannot be measured and `force` is the likeliest one.
+// Take a sample dt s after the last one, with the rate (3,) in rad/s without bias; write a vector (3,) that points up. noise in
+// m/s^2/sqrt(Hz): of the specific force, by vibration, or where it cannot be measured and `force` is the likeliest one.
 void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity,
                        float noise, float *up);
 

@@ -6,7 +6,7 @@ from gravcomp.description.hardware import Hardware
 from gravcomp.motors.fault_watch import FaultWatch
 from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.rotors import Rotors
-from gravcomp.motors.take_up import TakeUp
+from gravcomp.motors.take_up import TakeUp, targets_to_hold
 
 
 class CableLoops:
@@ -48,10 +48,7 @@ class CableLoops:
 
     def hold(self) -> None:
         """Keep the cables where their setpoints are now; the expected tensions stay."""
-        self.target = [
-            target if take_up is not None and take_up.moves else loop.setpoint
-            for target, take_up, loop in zip(self.target, self._take_up, self._loops)
-        ]
+        self.target = targets_to_hold(self.target, self._take_up, [loop.setpoint for loop in self._loops])
 
     def pay_out(self) -> None:
         """Move all cables to `displacement_min`; motors with antagonists go to zero, where no cable is pulled in."""

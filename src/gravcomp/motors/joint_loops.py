@@ -22,7 +22,7 @@ from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.loop_delay import LoopDelay
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.setpoint import Setpoint
-from gravcomp.motors.take_up import TakeUp
+from gravcomp.motors.take_up import TakeUp, targets_to_hold
 
 _AWAY = 0.1  # of the following error, at rest away from the setpoint
 _AWAY_TIME = 4.0  # stall times
@@ -89,10 +89,7 @@ class JointLoops:
 
     def hold(self) -> None:
         """Keep the cables where their setpoints are now; the expected tensions stay."""
-        self.target = [
-            target if take_up is not None and take_up.moves else position
-            for target, take_up, position in zip(self.target, self._take_up, self._positions())
-        ]
+        self.target = targets_to_hold(self.target, self._take_up, self._positions())
 
     def pay_out(self) -> None:
         """Move all cables to the smallest displacement; motors with antagonists go to zero, where no cable is pulled in."""

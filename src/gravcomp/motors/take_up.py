@@ -18,6 +18,7 @@ is not taken up: a parabola spends at most (1 + sqrt(2))^2 times as long in the 
 
 import enum
 import math
+from collections.abc import Sequence
 
 from gravcomp.description.hardware import Drive
 
@@ -96,3 +97,11 @@ class TakeUp:
     def _is_due(self, target: float) -> bool:
         rests = not self._done and self._since >= self._rest
         return rests and self._loose > self._least and target - self._over >= self._farthest
+
+
+def targets_to_hold(targets: Sequence[float], take_ups: Sequence[TakeUp | None], setpoints: Sequence[float]) -> list[float]:
+    """Return targets (m) that keep motors at their setpoints (m); one that takes up its backlash goes on to its target."""
+    return [
+        target if take_up is not None and take_up.moves else setpoint
+        for target, take_up, setpoint in zip(targets, take_ups, setpoints)
+    ]
