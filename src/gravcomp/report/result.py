@@ -34,7 +34,7 @@ class Figure:
         """The limit as text."""
         if self.limit is None:
             return ""
-        return f"{'≥' if self.at_least else '≤'} {self.limit:g} {self.unit}".rstrip()
+        return f"{'≥' if self.at_least else '≤'} {self.limit:.4g} {self.unit}".rstrip()
 
     @property
     def text(self) -> str:

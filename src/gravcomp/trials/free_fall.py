@@ -1,5 +1,6 @@
 """Free fall of the virtual robot: unloaded and at rest at first, with released cables and a base at rest."""
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -21,25 +22,33 @@ _RELEASED = -0.3  # of the length: paid out so far that the cables stay slack
 
 
 def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
-    """Return the true tip motion of a fall and the gravity estimated from the IMU.
+    """Return the tip of a fall as a tracker sees it, to which a model is fitted, and the gravity estimated from the IMU.
 
     job: (setup, inclination and roll in deg, duration in s, number of the trial).
     """
+    setup, *_, trial = job
+    fall = true_fall(job)
+    assert fall.tip_direction is not None
+    random = np.random.default_rng([setup.seed, trial])
+    tip, direction = Tracker().seen(setup.nominal.length, fall.tip_position, fall.tip_direction, random)
+    return dataclasses.replace(fall, tip_position=tip, tip_direction=direction)
+
+
+def true_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
+    """Return the true tip of a fall, by which a model is judged, and the gravity estimated from the IMU; job: see `free_fall`."""
     setup, inclination, roll, duration, trial = job
     base = base_orientation(np.radians(inclination), np.radians(roll))
     tips, directions = zip(
         *((position[-1], orientation[-1, :, 2]) for position, orientation in falling_rod(setup, base, duration))
     )
-    random = np.random.default_rng([setup.seed, trial])
-    tip, direction = Tracker().seen(setup.nominal.length, np.array(tips) @ base, np.array(directions) @ base, random)
     return Measured(
         source="virtual robot",
-        trial=np.full(len(tip), trial),
-        time=SAMPLE * np.arange(len(tip)),
-        gravity=np.tile(gravity_at_rest(setup, base), (len(tip), 1)),
-        displacement=np.full((len(tip), len(setup.nominal.cables)), np.nan),
-        tip_position=tip,
-        tip_direction=direction,
+        trial=np.full(len(tips), trial),
+        time=SAMPLE * np.arange(len(tips)),
+        gravity=np.tile(gravity_at_rest(setup, base), (len(tips), 1)),
+        displacement=np.full((len(tips), len(setup.nominal.cables)), np.nan),
+        tip_position=np.array(tips) @ base,
+        tip_direction=np.array(directions) @ base,
     )
 
 
