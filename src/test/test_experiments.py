@@ -11,10 +11,9 @@ import pytest
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
-from gravcomp.description import load_robot_file
+from gravcomp.description import Material, load_robot_file
 from gravcomp.evaluation import metrics
 from gravcomp.experiments import EXPERIMENTS, experiment
-from gravcomp.experiments.deflection import tube_robot
 from gravcomp.experiments.steering import nearly_weightless
 from gravcomp.mesh.tube import tube_mesh
 from gravcomp.references import calculix
@@ -86,8 +85,15 @@ def test_elastica_hangs_where_calculix_says_and_euler_bernoulli_does_not():
     assert np.linalg.norm(euler_bernoulli(tube, 0.0) - row.tip) > 4e-3
 
 
+def test_the_tube_of_the_table_has_its_density_and_constants_of_laws_are_named():
+    material = calculix.tube_robot("svk", 0.8e6).segments[0].material
+    assert (material.density, material.c01_ratio) == (calculix.REFERENCE["density"], Material().c01_ratio)
+    with pytest.raises(TypeError, match="positional"):
+        Material("svk", 0.8e6, 0.45, 1150.0)  # type: ignore[misc]
+
+
 def test_calculix_deck_describes_the_mesh_and_its_output_is_read():
-    mesh = tube_mesh(tube_robot(0.8e6), around=6, along=4)
+    mesh = tube_mesh(calculix.tube_robot("svk", 0.8e6), around=6, along=4)
     lines = calculix.deck(mesh, np.pi / 2).splitlines()
     first = lines.index("*ELEMENT, TYPE=C3D20R, ELSET=BODY")
     assert first == len(mesh.nodes) + 1

@@ -39,6 +39,7 @@ class Material:
     )
     youngs_modulus: float = parameter(0.8, edge="MPa", minimum=1e-3, maximum=1e6, description="Young's modulus")
     poissons_ratio: float = parameter(0.45, minimum=0.0, maximum=0.4999, description="Poisson's ratio")
+    _: dataclasses.KW_ONLY  # by position, a density once was taken for the constant of a law
     c01_ratio: float = parameter(0.25, minimum=0.0, maximum=100.0, description="Mooney-Rivlin: c01 / c10")
     c20_ratio: float = parameter(0.18, minimum=-1.0, maximum=100.0, description="Yeoh: c20 / c10")
     c30_ratio: float = parameter(0.0, minimum=-1.0, maximum=100.0, description="Yeoh: c30 / c10")

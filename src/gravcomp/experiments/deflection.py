@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gravcomp.description import Elements, Material, Robot, Segment
+from gravcomp.description import Elements
 from gravcomp.mesh.tube import tube_mesh
 from gravcomp.references import calculix
 from gravcomp.references.beams import Tube, elastica, euler_bernoulli
@@ -25,14 +25,6 @@ SOFA = {0.5: -35.32, 0.65: -28.27, 0.8: -23.47, 1.0: -19.07, 1.2: -16.03}
 METHODS = ("this model", "linear tetrahedra", "Euler-Bernoulli", "elastica")
 
 
-def tube_robot(youngs_modulus: float, poissons_ratio: float = 0.45, law: str = "svk", grading: float = 4.0) -> Robot:
-    """Return the tube of the stored CalculiX table as a robot without cables."""
-    r = calculix.REFERENCE
-    material = Material(law, youngs_modulus, poissons_ratio, r["density"])
-    segment = Segment("tube", r["length"], r["outer_diameter"], r["inner_diameter"], material)
-    return Robot(name="tube", segments=(segment,), elements=Elements(grading=grading))
-
-
 def run(context: Context) -> Result:
     """Run the experiment."""
     rows = [r for r in calculix.stored_rows() if r.law == "svk" and r.poissons_ratio == 0.45]
@@ -44,7 +36,7 @@ def run(context: Context) -> Result:
     source = "stored results of CalculiX 2.20"
     if calculix.installed():
         context.progress("CalculiX")
-        mesh = tube_mesh(tube_robot(0.8e6), around=10, along=24)
+        mesh = tube_mesh(calculix.tube_robot("svk", 0.8e6), around=10, along=24)
         for inclination in inclinations:
             reference[0.8e6, inclination] = calculix.solve(mesh, inclination)
         source = "CalculiX, run in this experiment for 0.8 MPa and stored for the other moduli"
@@ -147,7 +139,7 @@ def run(context: Context) -> Result:
 def _solve(job: tuple[float, list[float]]) -> list[tuple[str, list, float]]:
     """Return for one modulus each method's name, tips at the inclinations, and computing time per pose in s."""
     modulus, inclinations = job
-    robot = tube_robot(modulus)
+    robot = calculix.tube_robot("svk", modulus)
     r = calculix.REFERENCE
     tube = Tube(r["length"], r["outer_diameter"], r["inner_diameter"], modulus, r["density"])
     tetrahedra = RobotModel(robot, tube_mesh(dataclasses.replace(robot, elements=Elements(grading=1.0)), **TETRAHEDRA))
@@ -173,7 +165,7 @@ def _gravity(inclination: float) -> np.ndarray:
 
 
 def _shapes(inclinations: list[float], tips: dict, reference: dict) -> str:
-    simulator = Simulator(tube_robot(0.8e6), reduced=False)
+    simulator = Simulator(calculix.tube_robot("svk", 0.8e6), reduced=False)
     rest = np.array([0.0, 0.0, simulator.robot.length])
     straight = np.linspace(0, 1, 11)[:, None] * rest
     with Drawing(1, len(inclinations), width=11.0, height=3.1, squeeze=False) as drawing:

@@ -16,16 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from gravcomp.description import Material
+from gravcomp.description import Material, Robot, Segment
+from gravcomp.description.robot_file import load_robot_file
 from gravcomp.mesh import Mesh
 
 GRAVITY = 9.81  # m/s^2
 REFERENCE = {"length": 0.1, "outer_diameter": 9e-3, "inner_diameter": 3e-3, "density": 1150.0}
+_LAWS = {"svk": "svk", "nh": "neo_hookean"}  # of the names in the table
 
 
 @dataclass(frozen=True)
 class Row:
-    """A solved case: law 'svk' or 'nh', modulus Pa, Poisson's ratio, inclination rad, displacement (3,) m of the end face."""
+    """A solved case: law, modulus Pa, Poisson's ratio, inclination rad, displacement (3,) m of the end face."""
 
     law: str
     youngs_modulus: float
@@ -33,13 +35,18 @@ class Row:
     inclination: float
     tip: np.ndarray
 
+    @property
+    def robot(self) -> Robot:
+        """The tube of the case, see `tube_robot`."""
+        return tube_robot(self.law, self.youngs_modulus, self.poissons_ratio)
+
 
 def stored_rows() -> list[Row]:
     """Return the stored table."""
     text = (resources.files("gravcomp.references") / "calculix_h20r.csv").read_text(encoding="utf-8")
     return [
         Row(
-            line["material"],
+            _LAWS[line["material"]],
             float(line["E_MPa"]) * 1e6,
             float(line["nu"]),
             math.radians(float(line["incl_deg"])),
@@ -47,6 +54,14 @@ def stored_rows() -> list[Row]:
         )
         for line in csv.DictReader(text.splitlines())
     ]
+
+
+def tube_robot(law: str, youngs_modulus: float, poissons_ratio: float = 0.45) -> Robot:
+    """Return the tube of the table as a robot without cables, with the elements of the article's robot; youngs_modulus: Pa."""
+    r = REFERENCE
+    material = Material(law, youngs_modulus, poissons_ratio, density=r["density"])
+    segment = Segment("tube", r["length"], r["outer_diameter"], r["inner_diameter"], material)
+    return Robot("tube", segments=(segment,), elements=load_robot_file("article").robot.elements)
 
 
 def installed() -> str | None:
