@@ -10,10 +10,11 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-QOS = "\n".join((
-    "- history: 3", "  depth: 0", "  reliability: 1", "  durability: 2", "  deadline:", "    sec: 9223372036", "    nsec: 854775807",
-    "  lifespan:", "    sec: 9223372036", "    nsec: 854775807", "  liveliness: 1", "  liveliness_lease_duration:",
-    "    sec: 9223372036", "    nsec: 854775807", "  avoid_ros_namespace_conventions: false"))  # fmt: skip
+_QOS_TIME = "\n    sec: 9223372036\n    nsec: 854775807"
+QOS = (
+    f"- history: 3\n  depth: 0\n  reliability: 1\n  durability: 2\n  deadline:{_QOS_TIME}\n  lifespan:{_QOS_TIME}"
+    f"\n  liveliness: 1\n  liveliness_lease_duration:{_QOS_TIME}\n  avoid_ros_namespace_conventions: false"
+)
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,8 @@ def write_mcap(folder: Path, release: Release, topics: list[Topic]) -> Path:
     data = b"\x89MCAP0\r\n" + _record(0x01, _text("ros2") + _text("libmcap 0.4.0"))
     for number, topic in enumerate(topics, 1):
         definition = topic.definition.encode()
-        data += _record(
-            0x03, struct.pack("<H", number) + _text(topic.kind) + _text("ros2msg") + struct.pack("<I", len(definition)) + definition
-        )
+        schema = struct.pack("<H", number) + _text(topic.kind) + _text("ros2msg")
+        data += _record(0x03, schema + struct.pack("<I", len(definition)) + definition)
         about = _text("offered_qos_profiles") + _text(QOS)
         about += _text("topic_type_hash") + _text(topic.digest) if release.types else b""
         ids = struct.pack("<HH", number, number)

@@ -95,7 +95,8 @@ def simulated_kinds(progress: Callable[[str], None], seed: int, seeds: int) -> d
 
 def _rms(errors: list[np.ndarray]) -> list[float]:
     """Return the RMS of the rows of the arrays (k, n): n values."""
-    return np.round(np.sqrt(np.mean(np.square(np.concatenate(errors)), axis=0)), 2).tolist()
+    squares = np.square(np.concatenate(errors))
+    return [round(float(value), 2) for value in np.sqrt(squares.mean(axis=0))]
 
 
 def outcome(fault: Fault, recording: Recording, seed: int) -> tuple[list[str], float | None]:

@@ -22,7 +22,8 @@ SURE = math.radians(1.0)  # at this standard deviation, too
 START_STD = math.radians(5.0)  # of one specific force at rest
 LARGEST_STD = math.radians(90.0)  # nothing is known
 LEAST_SURE = math.radians(15.0)  # standard deviation of an earlier inclination that tells nothing
-_TRUSTED = 2.0  # s: the line is surer than its standard deviation says, which is that of the slowest motion, more with each second
+# s: the line is surer than its standard deviation says, which is that of the slowest motion, and more so with each second.
+_TRUSTED = 2.0
 _SWING = 0.3  # s, about the time that a motion goes in one direction
 _MEMORY = 1.0  # s, of the motion before the gap
 _SMOOTHING = 0.05  # s, of the specific force: noise hardly moves the sensor
@@ -134,7 +135,7 @@ class Alignment:
         return (x, y, z), math.sqrt(variance)
 
     def _share(self, std: float) -> tuple[float, float]:
-        """Return the share of the earlier inclination, with the line's standard deviation (rad), and the variance of both, rad^2."""
+        """Return the share of the earlier inclination, for a line with this standard deviation, rad; and the variance, rad^2."""
         sure = max(1.0 / self._earlier_variance - 1.0 / LEAST_SURE**2, 0.0)
         if not sure:
             return 0.0, std * std
@@ -148,11 +149,11 @@ class Alignment:
         return x, y, z
 
     def motion(self, gravity: float) -> tuple[quat.Vector, float, float]:
-        """Return the newest velocity (3,) beyond the line through its mean, along the inclination, m/s; its standard deviation on
-        each axis; and the correlation of each horizontal one with the error of the inclination by which gravity causes it.
+        """Return the newest velocity (3,) beyond the line along the inclination, m/s, its standard deviation and a correlation.
 
-        The error is that of the mean, and that of the slope since the middle of the time t. For evenly spread errors of v the mean
-        has the variance of the fitted line's slope times t^2 / 12.
+        The standard deviation is that on each axis; the correlation is that of each horizontal velocity with the error of the
+        inclination by which gravity causes it. The velocity's error is that of the mean, and that of the slope since the middle
+        of the time t. For evenly spread errors of v the mean has the variance of the fitted line's slope times t^2 / 12.
         """
         t, std = self._elapsed, self.std(gravity)
         share, variance = self._share(std)

@@ -6,8 +6,8 @@ The motion is taken for a smooth random one (a Gaussian process). Over a time t 
 
 with the angular frequency f = RMS of w' / RMS of w (C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning,
 MIT Press 2006, ch. 2 and 4: Matern, 5/2). Then the angle turned in the gap and the rates around it have a joint normal
-distribution: the likeliest angle is a weighted sum of those rates, and its variance is known. In a gap that is long for the motion
-the weights approach a limit, because the rates decay as fast as they swing, and the variance grows to that of any such motion.
+distribution: the likeliest angle is a weighted sum of those rates, and its variance is known. In a gap that is long for the
+motion the weights approach a limit, because the rates decay as fast as they swing, and the variance is that of any such motion.
 """
 
 import math

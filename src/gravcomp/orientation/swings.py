@@ -1,8 +1,8 @@
 """How fast the rates of a sensor swing, and so what it likely turned in a gap.
 
 A motion has slow and fast swings. The slow ones are those of the smoothed rate, with the angular frequency f = w' / w, of RMS
-values. The fast ones, such as a tremor, show in the second derivative: f = w'' / w' and w = w'^2 / w''. Vibration (`vibration`) is
-no swing; of it, only the noise of the rates counts. What that says of a gap is in `missing_rates`.
+values. The fast ones, such as a tremor, show in the second derivative: f = w'' / w' and w = w'^2 / w''. Vibration
+(`vibration`) is no swing; of it, only the noise of the rates counts. What that says of a gap is in `missing_rates`.
 """
 
 import math
@@ -74,7 +74,7 @@ class Swings:
         return self._noise.variance(period)
 
     def across(self, gap: float, period: float, after: Vector, doubt: float) -> tuple[Vector, float]:
-        """Return the likeliest mean rate (3,) in a gap (s), rad/s, and the variance of the angle turned in it, rad^2 on each axis.
+        """Return the likeliest mean rate (3,) in a gap (s), rad/s, and the variance of the angle turned, rad^2 on each axis.
 
         period: s between two samples; after (3,): the rate after the gap, and doubt: its error beyond noise, rad/s.
         """
