@@ -15,7 +15,7 @@ WATCHED = 8.0  # s after a gap
 
 
 def after_gaps(recording: Recording, gap: float) -> tuple[np.ndarray, float]:
-    """Return the errors (places, times) in deg at TIMES after gaps of `gap` s, and the largest within WATCHED over its deviation."""
+    """Return the errors (places, times) in deg at TIMES after gaps of `gap` s, and the largest within WATCHED, over its std."""
     keep, begins = np.ones(len(recording), bool), []
     for place in PLACES:
         begin, missing = round(place * len(recording)), round(gap * recording.rate)
