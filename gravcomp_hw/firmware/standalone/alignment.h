@@ -31,16 +31,17 @@ void gc_alignment_watch(gc_alignment *alignment, float dt, const float *force, f
 // Begin with the first specific force (3,); earlier: the inclination from before a gap, or a null pointer.
 void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity, const gc_earlier *earlier);
 
-// Take a sample dt s after the last one, with the rate (3,) in rad/s without bias. noise in m/s^2/sqrt(Hz): of the specific force,
-// by vibration, or where it cannot be measured and `force` is the likeliest one; turned: variance of the turn by the rate, rad^2.
+// Take a sample dt s after the last one, with the rate (3,) in rad/s without bias. noise in m/s^2/sqrt(Hz): of the specific
+// force, by vibration, or where it cannot be measured and `force` is the likeliest one; turned: variance of the turn by the
+// rate, rad^2.
 void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float noise,
                        float turned);
 
 // Write a vector (3,) that points up; return its standard deviation about each horizontal axis, rad.
 float gc_alignment_inclination(const gc_alignment *alignment, float gravity, float *up);
 
-// Write the newest velocity (3,) beyond the line along the inclination in m/s, and the correlation of each horizontal one with the
-// error of the inclination by which gravity causes it; return the velocity's standard deviation on each axis.
+// Write the newest velocity (3,) beyond the line along the inclination in m/s, and the correlation of each horizontal one with
+// the error of the inclination by which gravity causes it; return the velocity's standard deviation on each axis.
 float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity, float *together);
 
 #endif

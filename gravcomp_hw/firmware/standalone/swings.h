@@ -20,7 +20,7 @@ void gc_swings_interrupt(gc_swings *swings);
 // Follow the rate (3,) in rad/s over dt s.
 void gc_swings_watch(gc_swings *swings, float dt, const float *rate);
 
-// Write the likeliest mean rate (3,) in a gap of `gap` s, rad/s; return the variance of the angle turned in it, rad^2 on each axis.
+// Write the likeliest mean rate (3,) in a gap of `gap` s, rad/s; return the variance of the angle turned, rad^2 on each axis.
 // period: s between two samples; after (3,): the rate after the gap, and doubt: its error beyond noise, rad/s.
 float gc_swings_across(const gc_swings *swings, float gap, float period, const float *after, float doubt, float *mean);
 
