@@ -10,7 +10,6 @@
 #define GC_LARGEST_STD 1.57079633f    // rad
 #define GC_LEAST_SURE 0.261799388f    // rad: an earlier inclination that tells nothing
 #define GC_TRUSTED 2.0f               // s: the line is surer than its standard deviation says, more with each second
-#define GC_SWING 0.3f                 // s
 #define GC_MEMORY 1.0f                // s
 #define GC_SMOOTHING 0.05f            // s
 #define GC_SLOWEST 0.4f               // of the time since the start: the longest time scale that a line leaves

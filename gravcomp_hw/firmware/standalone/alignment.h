@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#define GC_SWING 0.3f  // s, about the time that a motion goes in one direction: no line goes on over a longer gap
+
 // The inclination from before a gap, at its end: a vector that points up, in the sensor's frame; variance in rad^2 about each
 // horizontal axis; that of the gyroscope's bias in (rad/s)^2 on each axis.
 typedef struct {

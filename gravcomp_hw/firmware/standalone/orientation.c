@@ -259,7 +259,8 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
   if (step->gyro_usable && step->accel_usable) {
     gc_alignment_watch(&state->alignment, step->dt, step->accel, s->gravity);
   }
-  if (gap && (state->alignment.active || state->errors.matrix[0][0] > 2.0f * variance)) {  // it is mostly that of the gap
+  const bool broken = state->alignment.active && step->dt > GC_SWING;
+  if (gap && (broken || state->errors.matrix[0][0] > 2.0f * variance)) {  // it is mostly that of the gap
     align_anew(state, step->accel);
     set_aligned(state);
     return true;

@@ -24,7 +24,7 @@ LARGEST_STD = math.radians(90.0)  # nothing is known
 LEAST_SURE = math.radians(15.0)  # standard deviation of an earlier inclination that tells nothing
 # s: the line is surer than its standard deviation says, which is that of the slowest motion, and more so with each second.
 _TRUSTED = 2.0
-_SWING = 0.3  # s, about the time that a motion goes in one direction
+SWING = 0.3  # s, about the time that a motion goes in one direction: no line goes on over a longer gap
 _MEMORY = 1.0  # s, of the motion before the gap
 _SMOOTHING = 0.05  # s, of the specific force: noise hardly moves the sensor
 
@@ -124,7 +124,7 @@ class Alignment:
         self._elapsed += dt
         self.active = self._elapsed < LONGEST and self.std(gravity) > SURE
         # Within a swing of the motion the mean is surer than the slope.
-        share = min(max(0.5 * (self._elapsed / _SWING - 1.0), 0.0), 1.0)
+        share = min(max(0.5 * (self._elapsed / SWING - 1.0), 0.0), 1.0)
         x, y, z = (share * s + (1.0 - share) * v / self._elapsed for s, v in zip(self._slope(), self._velocity))
         self._line = _unit((x, y, z))
 
@@ -174,11 +174,11 @@ class Alignment:
         if not t:
             return min(at_rest, LARGEST_STD)
         scatter = self._scatter()
-        before = self._shaken * (_SWING * gravity) ** 2 * _SWING / (_SWING + t)
-        resolved = 12.0 * (scatter + before) / (1.0 + t / _SWING)
+        before = self._shaken * (SWING * gravity) ** 2 * SWING / (SWING + t)
+        resolved = 12.0 * (scatter + before) / (1.0 + t / SWING)
         # A step of v by d turns the slope by 1.5 d / t at most.
         variance = resolved + 2.25 * self._unsure + (t * self._hidden(scatter)) ** 2
-        return min(max(math.sqrt(variance) / (gravity * t), START_STD * _SWING / t if t > _SWING else at_rest), LARGEST_STD)
+        return min(max(math.sqrt(variance) / (gravity * t), START_STD * SWING / t if t > SWING else at_rest), LARGEST_STD)
 
     def _hidden(self, scatter: float) -> float:
         """Return the RMS on each axis of the acceleration that is too slow to be left by the line, m/s^2."""

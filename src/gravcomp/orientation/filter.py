@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.orientation import quaternion as quat
-from gravcomp.orientation.alignment import Alignment, Earlier
+from gravcomp.orientation.alignment import SWING, Alignment, Earlier
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.even_steps import EvenSteps
@@ -149,7 +149,8 @@ class OrientationFilter:
         self._predict(step)
         if step.gyro_usable and step.accel_usable:
             self._alignment.watch(dt, force, self.options.gravity)
-        if missing and (self._alignment.active or self._errors.matrix[0, 0] > 2.0 * variance):  # it is mostly that of the gap
+        broken = self._alignment.active and dt > SWING
+        if missing and (broken or self._errors.matrix[0, 0] > 2.0 * variance):  # it is mostly that of the gap
             self._align_anew(force)
             self._set_aligned()
             return resting
