@@ -100,7 +100,8 @@ def test_what_is_no_robot_file_is_refused(capsys, line, robot, said):
         ("bench track article folder", "folder: is a folder; give the path of a robot file"),
         ("estimate TRIAL --bias-model folder", "folder: cannot be read: Is a directory"),
         ("estimate TRIAL --bias-model binary.yaml", "binary.yaml: is not a bias model: it is not a UTF-8 text file"),
-        ("estimate TRIAL --topic imu/data", "TRIAL.npz: is no bag, so that it has no topic 'imu/data' to choose"),
+        ("estimate TRIAL --imu-topic a --topic b", "--topic and its new name --imu-topic are both given"),
+        ("estimate TRIAL --imu-topic imu/data", "TRIAL.npz: is no bag, so that it has no topic 'imu/data' to choose"),
     ],
 )
 def test_a_place_that_cannot_be_used_is_named(capsys, line, said):

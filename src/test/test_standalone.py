@@ -258,8 +258,8 @@ def test_the_estimator_looks_at_rates_twice_and_evens_stamps_as_that_of_the_host
             accel += 4.0 * np.sin(k * np.array([2.9, 2.7, 2.5]))  # vibration
             accel += rng.choice([-20.0, 20.0], 3) if k % 53 == 50 else 0.0
         stamp = 10_000 * k + int(rng.integers(-3000, 3000))
-        if 1150 <= k < 1180 or 1500 <= k < 1503:
-            continue  # the inclination is lost, and is bridged
+        if 1150 <= k < 1180 or 1500 <= k < 1503 or 1850 <= k < 1940:
+            continue  # in fast motion, at rest, and while the motion ends
         estimate = host.update(1000 * stamp, gyro.tolist(), accel.tolist())
         assert loop.weigh(stamp, gyro, accel)
         worst = max(worst, float(np.linalg.norm(np.subtract(loop.gravity, estimate.gravity))))

@@ -8,13 +8,16 @@
 #define GC_SURE 0.0174532925f         // rad
 #define GC_START_STD 0.0872664626f    // rad
 #define GC_LARGEST_STD 1.57079633f    // rad
-#define GC_SWING 0.3f                 // s
+#define GC_LEAST_SURE 0.261799388f    // rad: an earlier inclination that tells nothing
+#define GC_TRUSTED 2.0f               // s: the line is surer than its standard deviation says, more with each second
 #define GC_MEMORY 1.0f                // s
 #define GC_SMOOTHING 0.05f            // s
 #define GC_SLOWEST 0.4f               // of the time since the start: the longest time scale that a line leaves
 #define GC_HIDDEN 1.5f                // RMS of the acceleration in the line, of that left by it, where the motion is as slow
 #define GC_PI 3.14159265f
 #define GC_ROOT_OF_THREE 1.73205081f
+
+static float std_of(const gc_alignment *alignment, float gravity);
 
 static float squared(float x) { return x * x; }
 
@@ -25,8 +28,15 @@ void gc_alignment_watch(gc_alignment *alignment, float dt, const float *force, f
   alignment->shaken += dt / (GC_MEMORY + dt) * (shaken - alignment->shaken);
 }
 
-void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity, bool leads) {
-  alignment->leads = leads;
+// Write the vector (3,) with length 1; zero stays.
+static void set_unit(float *unit, const float *vector) {
+  const float length = gc_sqrt(square_of(vector)), scale = length > 0.0f ? 1.0f / length : 0.0f;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    unit[i] = scale * vector[i];
+  }
+}
+
+void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravity, const gc_earlier *earlier) {
   alignment->shaken = gc_max(alignment->shaken, squared(gc_sqrt(square_of(force)) / gravity - 1.0f));
   alignment->active = true;
   alignment->elapsed = alignment->square = 0.0f;
@@ -35,6 +45,11 @@ void gc_alignment_begin(gc_alignment *alignment, const float *force, float gravi
   gc_zero(alignment->velocity, sizeof alignment->velocity);
   gc_zero(alignment->sum, sizeof alignment->sum);
   gc_zero(alignment->moment, sizeof alignment->moment);
+  set_unit(alignment->line, force);
+  alignment->has_earlier = earlier != 0;
+  if (earlier != 0) {
+    alignment->earlier = *earlier;
+  }
 }
 
 // Write the slope (3,) of the line that fits the velocity best, m/s^2.
@@ -65,11 +80,11 @@ static float hidden(const gc_alignment *alignment, float scatter) {
   return GC_HIDDEN * slow * slow * gc_sqrt(left) / GC_ROOT_OF_THREE;
 }
 
-void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity,
-                       float noise, float *up) {
+void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, const float *force, float gravity, float noise,
+                       float turned) {
   const gc_quaternion turn = gc_quaternion_exponential(-rate[0] * dt, -rate[1] * dt, -rate[2] * dt);
   const float middle = alignment->elapsed + 0.5f * dt;
-  float mean[3], slope[3];
+  float mean[3], slope[3], line[3];
   gc_quaternion_rotate(turn, alignment->velocity, alignment->velocity);
   gc_quaternion_rotate(turn, alignment->sum, alignment->sum);
   gc_quaternion_rotate(turn, alignment->moment, alignment->moment);
@@ -87,33 +102,61 @@ void gc_alignment_take(gc_alignment *alignment, float dt, const float *rate, con
   }
   alignment->force_square += dt * square_of(alignment->force);
   alignment->unsure += squared(noise) * dt;
+  if (alignment->has_earlier) {
+    gc_earlier *earlier = &alignment->earlier;
+    gc_quaternion_rotate(turn, earlier->upward, earlier->upward);
+    earlier->variance += turned + earlier->bias_variance * dt * (2.0f * alignment->elapsed + dt);
+  }
   alignment->elapsed += dt;
-  alignment->active = alignment->elapsed < GC_LONGEST && gc_alignment_std(alignment, gravity) > GC_SURE;
+  alignment->active = alignment->elapsed < GC_LONGEST && std_of(alignment, gravity) > GC_SURE;
   // Within a swing of the motion the mean is surer than the slope.
   const float share = gc_clamp(0.5f * (alignment->elapsed / GC_SWING - 1.0f), 0.0f, 1.0f);
   slope_of(alignment, slope);
   for (uint32_t i = 0; i < 3u; ++i) {
-    up[i] = share * slope[i] + (1.0f - share) * alignment->velocity[i] / alignment->elapsed;
+    line[i] = share * slope[i] + (1.0f - share) * alignment->velocity[i] / alignment->elapsed;
   }
+  set_unit(alignment->line, line);
 }
 
-float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity) {
-  const float t = alignment->elapsed;
-  float slope[3];
+// Return the share of the earlier inclination, with the line's standard deviation in rad; write the variance of both in rad^2.
+static float share_of(const gc_alignment *alignment, float std, float *variance) {
+  const float earlier = alignment->earlier.variance;
+  *variance = std * std;
+  if (!alignment->has_earlier || !(earlier < squared(GC_LEAST_SURE))) {
+    return 0.0f;
+  }
+  const float sure = 1.0f / earlier - 1.0f / squared(GC_LEAST_SURE);
+  const float share = sure / (sure + squared((1.0f + squared(alignment->elapsed / GC_TRUSTED)) / std));
+  *variance = squared(share) * earlier + squared((1.0f - share) * std);
+  return share;
+}
+
+float gc_alignment_inclination(const gc_alignment *alignment, float gravity, float *up) {
+  float variance;
+  const float share = share_of(alignment, std_of(alignment, gravity), &variance);
+  for (uint32_t i = 0; i < 3u; ++i) {
+    up[i] = share * alignment->earlier.upward[i] + (1.0f - share) * alignment->line[i];
+  }
+  return gc_sqrt(variance);
+}
+
+float gc_alignment_motion(const gc_alignment *alignment, float gravity, float *velocity, float *together) {
+  const float t = alignment->elapsed, std = std_of(alignment, gravity);
+  float slope[3], variance;
+  const float share = share_of(alignment, std, &variance);
   slope_of(alignment, slope);
   for (uint32_t i = 0; i < 3u; ++i) {
-    velocity[i] = alignment->velocity[i] - alignment->sum[i] / t - 0.5f * t * slope[i];
+    const float along = slope[i] + share * (gravity * alignment->earlier.upward[i] - slope[i]);
+    velocity[i] = alignment->velocity[i] - alignment->sum[i] / t - 0.5f * t * along;
   }
-  return gc_alignment_std(alignment, gravity) * gravity * t / GC_ROOT_OF_THREE;
+  // The error is that of the mean, and that of the slope since the middle of the time t.
+  const float in_all = gc_sqrt(std * std / 12.0f + 0.25f * variance);
+  *together = 0.5f * gc_sqrt(variance) / in_all;
+  return in_all * gravity * t;
 }
 
-float gc_alignment_velocity_noise(const gc_alignment *alignment, float gravity) {
-  const float t = alignment->elapsed;
-  // The line that fits white noise of a density d best over the time t has a slope with the variance 12 d^2 / t^3.
-  return gc_alignment_std(alignment, gravity) * gravity * gc_sqrt(t * t * t / 12.0f);
-}
-
-float gc_alignment_std(const gc_alignment *alignment, float gravity) {
+// Return the standard deviation of the line's inclination about each horizontal axis, rad.
+static float std_of(const gc_alignment *alignment, float gravity) {
   const float t = alignment->elapsed, at_rest = gc_sqrt(squared(GC_START_STD) + alignment->shaken);
   if (!(t > 0.0f)) {
     return gc_min(at_rest, GC_LARGEST_STD);

@@ -12,7 +12,6 @@
 #define GC_UNKNOWN_ACCEL_NOISE 5.0f       // m/s^2/sqrt(Hz)
 #define GC_CONTRADICTION 0.5f             // m/s
 #define GC_CONTRADICTED_TILT 0.0349065850f  // rad
-#define GC_LOST 0.174532925f  // rad: a gap that may hide a larger turn is not bridged
 #define GC_GATE_SURE_GYRO 1.5f
 #define GC_GATE_SURE_ACCEL 1.0f
 #define GC_REVIEW_SURE_GYRO 2.0f
@@ -103,20 +102,10 @@ static bool is_gap(const gc_filter_state *state, float dt) {
   return state->period > 0.0f && dt > GC_MISSED_PERIODS * state->period;
 }
 
-// Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it show.
-static float missed_in(const gc_filter_state *state, float gap, const float *gyro) {
-  return gc_swings_missed_in(&state->swings, gap, state->period, distance(state->last_gyro, state->bias),
-                             distance(gyro, state->bias));
-}
-
-// Return whether the sensor may have turned too far meanwhile for a gap of dt s to be bridged.
-static bool is_lost(const gc_filter_state *state, float dt, const float *gyro) {
-  return is_gap(state, dt) && missed_in(state, dt, gyro) > GC_LOST;
-}
-
-// Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty.
-static void set_aligned(gc_filter_state *state, const float *upward) {
-  float up[3], velocity_std = GC_START_VELOCITY_STD, together = 0.0f;
+// Set the inclination to that of the alignment, with its uncertainty.
+static void set_aligned(gc_filter_state *state) {
+  float upward[3], up[3], velocity_std = GC_START_VELOCITY_STD, together = 0.0f;
+  const float tilt_std = gc_alignment_inclination(&state->alignment, state->gravity_norm, upward);
   gc_quaternion_rotate(state->orientation, upward, up);
   const float across = gc_sqrt(up[0] * up[0] + up[1] * up[1]);
   if (across > 0.0f) {
@@ -126,12 +115,27 @@ static void set_aligned(gc_filter_state *state, const float *upward) {
   }
   gc_zero(state->velocity, sizeof state->velocity);
   if (!state->alignment.active) {
-    together = GC_TOGETHER;
-    velocity_std = gc_alignment_motion(&state->alignment, state->gravity_norm, state->velocity);
+    velocity_std = gc_alignment_motion(&state->alignment, state->gravity_norm, state->velocity, &together);
     gc_quaternion_rotate(state->orientation, state->velocity, state->velocity);
   }
-  const float tilt_std = gc_alignment_std(&state->alignment, state->gravity_norm);
   gc_covariance_set_tilt_and_velocity(&state->errors, tilt_std, velocity_std, together);
+}
+
+// Begin the alignment with the inclination of the state, as sure as that is.
+static void align_anew(gc_filter_state *state, const float *force) {
+  const float vertical[3] = {0.0f, 0.0f, 1.0f};
+  float(*p)[GC_ERRORS] = state->errors.matrix;
+  gc_earlier earlier;
+  gc_quaternion_rotate(gc_quaternion_conjugate(state->orientation), vertical, earlier.upward);
+  earlier.variance = p[0][0];
+  earlier.bias_variance = gc_max(0.0f, gc_max(p[3][3], gc_max(p[4][4], p[5][5])));
+  gc_alignment_begin(&state->alignment, force, state->gravity_norm, &earlier);
+}
+
+// Return the variance on each axis of a turn by a measured rate (3,) in rad/s for dt s, rad^2.
+static float turn_variance(const gc_settings *s, float dt, const float *rate) {
+  const float rate_squared = (rate[0] * rate[0] + rate[1] * rate[1]) + rate[2] * rate[2];
+  return (squared(s->gyro_noise) + squared(s->gyro_noise_per_rate) * rate_squared) * dt;
 }
 
 // Return the angle in rad between the mean specific force at rest and the vertical of the orientation.
@@ -145,37 +149,25 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
   const gc_settings *s = filter->settings;
   gc_filter_state *state = &filter->state;
   const float dt = step->dt;
-  const float *usable = step->gyro_usable ? step->gyro : state->bias;
-  float rate[3], extra_tilt = 0.0f, extra_velocity = 0.0f;
-  gc_copy(rate, usable, sizeof rate);
+  float unbiased[3], rate[3], extra_tilt = 0.0f, extra_velocity = 0.0f;
+  for (uint32_t i = 0; i < 3u; ++i) {
+    unbiased[i] = step->gyro_usable ? step->gyro[i] - state->bias[i] : 0.0f;
+  }
+  gc_copy(rate, unbiased, sizeof rate);
   if (is_gap(state, dt)) {
-    // The mean of the rates around stands in for the missing samples; a rate counts for the period before it. The mean misses a
-    // part of the motion, and it has the noise of two samples.
-    const float noise = 0.5f * gc_vibration_variance(&state->swings.noise, state->period) + squared(0.5f * step->doubt);
-    extra_tilt = squared(missed_in(state, dt, usable)) / 3.0f + noise * (dt * dt);
-    const float share = 0.5f + 0.5f * state->period / dt;
-    for (uint32_t i = 0; i < 3u; ++i) {
-      rate[i] = share * rate[i] + (1.0f - share) * state->last_gyro[i];
-    }
+    extra_tilt = gc_swings_across(&state->swings, dt, state->period, unbiased, step->doubt, rate);
     extra_velocity = squared(GC_UNKNOWN_ACCEL_NOISE) * dt;
     interrupt(state);
   } else {
     state->period = state->period > 0.0f ? state->period + 0.05f * (dt - state->period) : dt;
   }
   if (step->gyro_usable) {
-    float unbiased[3];
-    for (uint32_t i = 0; i < 3u; ++i) {
-      unbiased[i] = step->gyro[i] - state->bias[i];
-    }
     gc_swings_watch(&state->swings, dt, unbiased);
   }
   if (step->accel_usable) {
     gc_vibration_take(state->vibration, GC_FORCE_MEANS, dt, step->accel);
   }
-  gc_copy(state->last_gyro, usable, sizeof state->last_gyro);
-  for (uint32_t i = 0; i < 3u; ++i) {
-    rate[i] -= state->bias[i];
-  }
+  gc_copy(state->last_gyro, step->gyro_usable ? step->gyro : state->bias, sizeof state->last_gyro);
   const float half = 0.5f * dt;
   const gc_quaternion before = state->orientation;
   const gc_quaternion middle =
@@ -189,8 +181,7 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
     state->velocity[1] += force[1] * dt;
     state->velocity[2] += (force[2] - state->gravity_norm) * dt;
   }
-  const float rate_squared = (rate[0] * rate[0] + rate[1] * rate[1]) + rate[2] * rate[2];
-  float tilt = (squared(s->gyro_noise) + squared(s->gyro_noise_per_rate) * rate_squared) * dt + extra_tilt;
+  float tilt = turn_variance(s, dt, rate) + extra_tilt;
   if (!step->gyro_usable) {
     tilt += squared(filter->contradicted ? GC_STUCK_RATE_NOISE : GC_SATURATED_RATE_NOISE) * dt;
   }
@@ -211,11 +202,7 @@ static void predict(gc_orientation *filter, const gc_filter_step *step) {
 static void correct(gc_orientation *filter, float dt, bool measure_bias) {
   const gc_settings *s = filter->settings;
   gc_filter_state *state = &filter->state;
-  float density = s->velocity_noise;
-  if (state->alignment.active) {  // after a bridged gap
-    density = gc_max(density, gc_alignment_velocity_noise(&state->alignment, state->gravity_norm));
-  }
-  const float variance = squared(density) / dt;
+  const float variance = squared(s->velocity_noise) / dt;
   float error[GC_ERRORS];
   if (measure_bias) {
     float residual[3];
@@ -269,27 +256,29 @@ static bool advance(gc_orientation *filter, const gc_filter_step *step) {
   const float variance = state->errors.matrix[0][0];
   const bool gap = is_gap(state, step->dt) && step->accel_usable;
   predict(filter, step);
-  const bool bridged = gap && state->errors.matrix[0][0] > 2.0f * variance;  // the inclination is mostly that of the gap
-  float rate[3];
-  for (uint32_t i = 0; i < 3u; ++i) {
-    rate[i] = step->gyro[i] - state->bias[i];
-  }
   if (step->gyro_usable && step->accel_usable) {
     gc_alignment_watch(&state->alignment, step->dt, step->accel, s->gravity);
   }
-  if (bridged && !(state->alignment.active && state->alignment.leads)) {
-    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm, false);
-  } else if (state->alignment.active && step->gyro_usable) {
+  const bool broken = state->alignment.active && step->dt > GC_SWING;
+  if (gap && (broken || state->errors.matrix[0][0] > 2.0f * variance)) {  // it is mostly that of the gap
+    align_anew(state, step->accel);
+    set_aligned(state);
+    return true;
+  }
+  if (state->alignment.active && step->gyro_usable) {
     const float noise = step->accel_usable ? gc_sqrt(gc_vibration_density(state->vibration, GC_FORCE_MEANS))
                                            : GC_UNKNOWN_ACCEL_NOISE;
-    float up[3];
-    gc_alignment_take(&state->alignment, step->dt, rate, step->accel, state->gravity_norm, noise, up);
-    if (state->alignment.leads) {
-      set_aligned(state, up);
-      return true;
+    float turn[3];
+    for (uint32_t i = 0; i < 3u; ++i) {
+      turn[i] = step->gyro[i] - state->bias[i];
     }
-  } else if (state->alignment.active) {
-    gc_alignment_begin(&state->alignment, step->accel, state->gravity_norm, state->alignment.leads);
+    gc_alignment_take(&state->alignment, step->dt, turn, step->accel, state->gravity_norm, noise,
+                      turn_variance(s, step->dt, turn));
+    set_aligned(state);
+    return true;
+  }
+  if (state->alignment.active) {
+    align_anew(state, step->accel);
   }
   if (step->accel_usable) {
     correct(filter, step->dt, resting && s->bias_estimation > 0.0f);
@@ -349,6 +338,9 @@ static uint32_t decide(gc_orientation *filter, gc_filter_step *step, bool accele
   gc_copy(measured, value, sizeof measured);
   if (is_gap(&filter->state, step->dt)) {
     gc_spike_review_reset(review);
+    if (step->dt > filter->settings->spike_time_constant) {
+      gc_spike_gate_reset(gate);  // what the signal was like is forgotten
+    }
   }
   if (gc_spike_review_take(review, filter->settings, step->dt, measured, counted[0])) {
     changed = count_in(filter, GC_REVIEW_AHEAD, accelerometer, counted[0]);
@@ -402,11 +394,10 @@ bool gc_orientation_take(gc_orientation *filter, int64_t stamp, const float *gyr
   if (gc_problem_rejects(verdict.problem)) {
     return false;
   }
-  const bool lost = verdict.problem == GC_PROBLEM_NONE && is_lost(&filter->state, verdict.dt, gyro);
-  if (!filter->started || lost || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
+  if (!filter->started || verdict.problem == GC_PROBLEM_CLOCK_RESTARTED || verdict.problem == GC_PROBLEM_GAP) {
     start(filter, gyro, accel, verdict.dt);
-    gc_alignment_begin(&filter->state.alignment, accel, filter->state.gravity_norm, true);
-    set_aligned(&filter->state, accel);
+    gc_alignment_begin(&filter->state.alignment, accel, filter->state.gravity_norm, 0);
+    set_aligned(&filter->state);
     gc_zero(&filter->even, sizeof filter->even);
     forget_suspects(filter);
     estimate_of(filter, gyro, estimate);

@@ -1,4 +1,4 @@
-// How fast the rates of a sensor swing, and by how much it may have turned in a gap (src/gravcomp/orientation/swings.py).
+// How fast the rates of a sensor swing, and what it likely turned in a gap (src/gravcomp/orientation/swings.py).
 #ifndef GC_SWINGS_H
 #define GC_SWINGS_H
 
@@ -20,8 +20,8 @@ void gc_swings_interrupt(gc_swings *swings);
 // Follow the rate (3,) in rad/s over dt s.
 void gc_swings_watch(gc_swings *swings, float dt, const float *rate);
 
-// Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it (rad/s) show. period: s between
-// two samples.
-float gc_swings_missed_in(const gc_swings *swings, float gap, float period, float rate_before, float rate_after);
+// Write the likeliest mean rate (3,) in a gap of `gap` s, rad/s; return the variance of the angle turned, rad^2 on each axis.
+// period: s between two samples; after (3,): the rate after the gap, and doubt: its error beyond noise, rad/s.
+float gc_swings_across(const gc_swings *swings, float gap, float period, const float *after, float doubt, float *mean);
 
 #endif

@@ -8,17 +8,17 @@ from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.inclination import inclination_error
 from gravcomp.recordings.imu import Recording
 
-GAP = 0.3  # s
+GAPS = (0.3, 0.5, 0.7, 1.0)  # s
 PLACES = (0.3, 0.55, 0.8)  # of the recording, where the gaps begin
-TIMES = (0.0, 2.0, 5.0)  # s after the gap
+TIMES = (0.0, 1.0, 5.0)  # s after the gap
 WATCHED = 8.0  # s after a gap
 
 
-def after_gaps(recording: Recording) -> tuple[np.ndarray, float]:
-    """Return the errors (gaps, times) in deg at TIMES after the gaps, and the largest error within WATCHED over its deviation."""
+def after_gaps(recording: Recording, gap: float) -> tuple[np.ndarray, float]:
+    """Return the errors (places, times) in deg at TIMES after gaps of `gap` s, and the largest within WATCHED, over its std."""
     keep, begins = np.ones(len(recording), bool), []
     for place in PLACES:
-        begin, missing = round(place * len(recording)), round(GAP * recording.rate)
+        begin, missing = round(place * len(recording)), round(gap * recording.rate)
         keep[begin : begin + missing] = False
         begins.append(int(np.count_nonzero(keep[:begin])))
     names = ("stamp_ns", "gyro", "accel", "orientation", "movement")

@@ -9,7 +9,7 @@ import numpy as np
 from gravcomp.bench.inclination_error import rmse_deg
 from gravcomp.bench.simulated_streams import KINDS, simulated
 from gravcomp.bench.stream_faults import FAULTS, Fault
-from gravcomp.bench.stream_gaps import after_gaps
+from gravcomp.bench.stream_gaps import GAPS, after_gaps
 from gravcomp.orientation import estimate_recording
 from gravcomp.orientation.calibration_in_motion import calibrated
 from gravcomp.orientation.self_calibration import calibrate_from_itself
@@ -64,19 +64,20 @@ def run(progress: Callable[[str], None], *, seed: int = 1, every: int = 1, seeds
 def simulated_kinds(progress: Callable[[str], None], seed: int, seeds: int) -> dict:
     """Return what is reported of recordings of the simulated kinds, with and without faults, and what spikes and gaps cost there.
 
-    A fault that rests alone show is left out for kinds without. `after_gap_deg`: RMS of the error at once, 2 s and 5 s after a
-    gap of 0.3 s; `after_gap_sigmas`: the largest error since then, in standard deviations.
+    A fault that rests alone show is left out for kinds without. `after_gap_deg`: RMS of the error at once, 1 s and 5 s after
+    a gap, for each length of it in s; `after_gap_sigmas`: the largest error after any of them, in standard deviations.
     """
     figures: dict = {"recordings": seeds * len(KINDS), "false_reports": 0, "missed": {}, "excess_deg": {}}
     figures |= {"after_gap_deg": {}, "after_gap_sigmas": {}}
     for name, kind in KINDS.items() if seeds else ():
         progress(f"simulated: {name}")
-        gaps = []
+        gaps: dict[float, list[tuple[np.ndarray, float]]] = {gap: [] for gap in GAPS}
         for number in range(seed, seed + seeds):
             recording = simulated(kind, number)
             figures["false_reports"] += len(check_recording(recording))
             clean = rmse_deg(estimate_recording(recording).orientation, recording)
-            gaps.append(after_gaps(recording))
+            for gap, found in gaps.items():
+                found.append(after_gaps(recording, gap))
             for fault_name, fault in FAULTS.items():
                 if fault.at_rest and not kind.pauses:
                     continue
@@ -87,10 +88,15 @@ def simulated_kinds(progress: Callable[[str], None], seed: int, seeds: int) -> d
                 if error is not None:
                     excess = figures["excess_deg"].setdefault(fault_name, {})
                     excess[name] = round(max(excess.get(name, 0.0), error - clean), 3)
-        errors = np.concatenate([each for each, _ in gaps])
-        figures["after_gap_deg"][name] = np.round(np.sqrt(np.mean(np.square(errors), axis=0)), 2).tolist()
-        figures["after_gap_sigmas"][name] = round(max(largest for _, largest in gaps), 2)
+        figures["after_gap_deg"][name] = {str(gap): _rms([each for each, _ in found]) for gap, found in gaps.items()}
+        figures["after_gap_sigmas"][name] = round(max(largest for found in gaps.values() for _, largest in found), 2)
     return figures
+
+
+def _rms(errors: list[np.ndarray]) -> list[float]:
+    """Return the RMS of the rows of the arrays (k, n): n values."""
+    squares = np.square(np.concatenate(errors))
+    return [round(float(value), 2) for value in np.sqrt(squares.mean(axis=0))]
 
 
 def outcome(fault: Fault, recording: Recording, seed: int) -> tuple[list[str], float | None]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import checked_target, made_folder
+from gravcomp.commands.imu_topic import add_imu_topic, imu_topic
 
 if TYPE_CHECKING:
     from gravcomp.orientation import EstimatorOptions
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a rosbag2 folder, an .npz file in BROAD's layout (gyr rad/s, acc m/s^2, rate Hz), a CSV file or folder",
     )
-    parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    add_imu_topic(parser)
     parser.add_argument("--columns", metavar="YAML", help="names of the columns of a CSV file that do not say what they are")
     parser.add_argument("--robot", default="article", help="robot file or shipped robot to start from (default: article)")
     parser.add_argument(
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         checked_target("--bias-model", made_folder("--bias-model", bias_model.parent) / bias_model.name)
     columns = read_mapping(args.columns) if args.columns else None
     with output.progress(f"reading {args.file}") as progress:
-        recording = read_recording(args.file, args.topic, columns, progress)
+        recording = read_recording(args.file, imu_topic(args), columns, progress)
     recording, findings, unknown = in_si(recording, convert=False)
     up = np.array(args.up) if args.up else None
     found = calibrate(recording, options.filter, up)

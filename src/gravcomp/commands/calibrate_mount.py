@@ -7,6 +7,7 @@ from typing import Any
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import checked_target
+from gravcomp.commands.imu_topic import add_imu_topic, imu_topic
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 folder with imu/data_raw and joint_states of the arm")
     parser.add_argument("--urdf", metavar="FILE", help="URDF of arm and robot (default: robot_description in the bag)")
-    parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    add_imu_topic(parser)
     parser.add_argument("--world-frame", default="world", help="link that carries the arm, z up (default: world)")
     parser.add_argument("--base-frame", default="soft_base", help="link of the robot's base (default: soft_base)")
     parser.add_argument("--tilt", action="store_true", help="fit also how far the arm's world is from the vertical")
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     options = from_mapping(ImuEstimatorParameters, section, source=file.source, key="nodes.imu_estimator").estimator
     target = checked_target("--write", Path(args.write or f"{file.robot.name}-mounted.yaml").expanduser())
     with output.progress(f"reading {args.bag}") as progress:
-        recording, _, _ = in_si(read_recording(args.bag, args.topic, progress=progress), convert=False)
+        recording, _, _ = in_si(read_recording(args.bag, imu_topic(args), progress=progress), convert=False)
     for note in recording.notes:
         output.note(f"{args.bag}: {note}")
     urdf = read_urdf(args.urdf) if args.urdf else read_description(args.bag)

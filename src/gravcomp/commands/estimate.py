@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import checked_target
+from gravcomp.commands.imu_topic import add_imu_topic, imu_topic
 
 if TYPE_CHECKING:
     from gravcomp.orientation import EstimatedRecording, EstimatorOptions
@@ -22,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE.npz", help="write stamp, quat (w x y z, sensor to earth), gravity, bias, rest, inclination_std"
     )
-    parser.add_argument("--topic", metavar="TOPIC", help="IMU topic, when the bag has several")
+    add_imu_topic(parser)
     parser.add_argument("--columns", metavar="YAML", help="names of the columns of a CSV file that do not say what they are")
     parser.add_argument(
         "--units",
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         columns = read_mapping(args.columns) if args.columns else None
         with output.progress(f"reading {args.file}") as reading:
-            recording = read_recording(args.file, args.topic, columns, reading)
+            recording = read_recording(args.file, imu_topic(args), columns, reading)
         recording, findings, unknown = in_si(recording, convert=args.units == "auto", option="--units auto")
         options, mount = _of_robot(args.robot)
         correction = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import made_folder, made_logs
+from gravcomp.commands.imu_topic import add_imu_topic, imu_topic
 from gravcomp.commands.live_page import add_page_arguments, show_page
 from gravcomp.commands.parsers import namespace
 
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="factor to real time (default: 1); 0: as fast as the graph processes it",
     )
-    parser.add_argument("--topic", default="", metavar="TOPIC", help="IMU topic, when the bag has several")
+    add_imu_topic(parser)
     parser.add_argument("--robot", default="article", help="robot file or shipped robot (default: article)")
     parser.add_argument("--out", metavar="DIR", help="record the output of the graph into a new bag")
     parser.add_argument("--viewer", action="store_true", help="show the robot in a browser")
@@ -72,8 +73,9 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         made_folder("--out", Path(args.out).parent)
     logs = made_logs(args.logs)
     bag = _whole(args.bag)
+    topic = imu_topic(args)
     with output.progress(f"reading {args.bag}") as progress:
-        recording = read_recording(bag, args.topic or None, progress=progress)
+        recording = read_recording(bag, topic, progress=progress)
     for note in recording.notes:
         output.note(f"{args.bag}: {note}")
     builder = prepare(args.robot, virtual=False)
@@ -87,7 +89,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     if args.out:
         specs.append(graph.node("gravcomp_fem", "recorder", out=str(Path(args.out).resolve())))
     replay = graph.node(
-        "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=args.topic,
+        "gravcomp_estimation", "imu_replay", file=str(Path(bag).resolve()), rate=args.speed, topic=topic or "",
         wait_for=[spec.executable for spec in (*viewer, *specs)], wait_for_subscribers=_START_TIMEOUT)  # fmt: skip
     begin = time.monotonic()
     with builder, Graph([*specs, replay], logs, builder.environment, host) as processes:

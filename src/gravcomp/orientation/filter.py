@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gravcomp.orientation import quaternion as quat
-from gravcomp.orientation.alignment import TOGETHER, Alignment
+from gravcomp.orientation.alignment import SWING, Alignment, Earlier
 from gravcomp.orientation.error_covariance import ErrorCovariance
 from gravcomp.orientation.estimate import Estimate
 from gravcomp.orientation.even_steps import EvenSteps
@@ -35,7 +35,6 @@ UNKNOWN_ACCEL_NOISE = 5.0  # m/s^2/sqrt(Hz): the accelerometer measures nothing
 CONTRADICTION = 0.5  # m/s: repeated values that lead to this velocity are those of a stuck sensor, not of a sensor at rest
 # Between the mean specific force at rest and the filter's gravity: a larger angle is more than a calibration error explains.
 CONTRADICTED_TILT = math.radians(2.0)
-LOST = math.radians(10.0)  # a gap in which the sensor may have turned farther than the rates around show is not bridged
 MISSED_PERIODS = 2.5  # a step longer than this many periods: samples are missing
 GRAVITY_TIME = 1.0  # s, low-pass of |a| at rest
 LARGEST_SCALE = 0.1  # of gravity: largest error of |a| at rest that is compensated
@@ -106,14 +105,13 @@ class OrientationFilter:
         if verdict.problem in REJECTED:
             self.rejected += 1
             return verdict.problem
-        problem = Problem.GAP if verdict.problem is Problem.NONE and self._is_lost(verdict.dt, rate) else verdict.problem
-        if not self._started or problem in RESTARTED:
+        if not self._started or verdict.problem in RESTARTED:
             self._start(rate, force, verdict.dt)
-            self._alignment.begin(force, self._gravity_norm, leads=True)
-            self._set_aligned(force)
+            self._alignment.begin(force, self._gravity_norm)
+            self._set_aligned()
             self._even.reset()
             self._steps.reset()
-            return self._estimate(stamp_ns, rate, False, problem)
+            return self._estimate(stamp_ns, rate, False, verdict.problem)
 
         step = Step(self._even.take(verdict.dt), rate, force, *self._usable(verdict))
         repeated = self._steps.take(step, gap=self._is_gap(step.dt))
@@ -147,26 +145,34 @@ class OrientationFilter:
         else:
             self._rest.reset()
             resting = False
-        bridged, variance = self._is_gap(dt) and step.accel_usable, self._errors.matrix[0, 0]
+        missing, variance = self._is_gap(dt) and step.accel_usable, self._errors.matrix[0, 0]
         self._predict(step)
-        bridged = bridged and self._errors.matrix[0, 0] > 2.0 * variance  # the inclination is mostly that of the gap
         if step.gyro_usable and step.accel_usable:
             self._alignment.watch(dt, force, self.options.gravity)
-        if bridged and not (self._alignment.active and self._alignment.leads):
-            self._alignment.begin(force, self._gravity_norm, leads=False)
-        elif self._alignment.active and step.gyro_usable:
+        broken = self._alignment.active and dt > SWING
+        if missing and (broken or self._errors.matrix[0, 0] > 2.0 * variance):  # it is mostly that of the gap
+            self._align_anew(force)
+            self._set_aligned()
+            return resting
+        if self._alignment.active and step.gyro_usable:
             noise = math.sqrt(self._vibration.density) if step.accel_usable else UNKNOWN_ACCEL_NOISE
-            upward = self._alignment.take(dt, self._unbiased(rate), force, self._gravity_norm, noise)
-            if self._alignment.leads:
-                self._set_aligned(upward)
-                return resting
-        elif self._alignment.active:
-            self._alignment.begin(force, self._gravity_norm, self._alignment.leads)
+            turn = self._unbiased(rate)
+            self._alignment.take(dt, turn, force, self._gravity_norm, noise, self._turn_variance(dt, turn))
+            self._set_aligned()
+            return resting
+        if self._alignment.active:
+            self._align_anew(force)
         if step.accel_usable:
             self._correct(dt, resting and self.bias_estimation)
         if resting:
             self._learn_gravity(dt)
         return resting
+
+    def _align_anew(self, force: quat.Vector) -> None:
+        """Begin the alignment with the inclination of the state, as sure as that is."""
+        upward = quat.rotate(quat.conjugate(self._orientation), (0.0, 0.0, 1.0))
+        earlier = Earlier(upward, float(self._errors.matrix[0, 0]), max(self._errors.bias_std()) ** 2)
+        self._alignment.begin(force, self._gravity_norm, earlier)
 
     def _unbiased(self, rate: quat.Vector) -> quat.Vector:
         x, y, z = (w - b for w, b in zip(rate, self._bias))
@@ -239,17 +245,9 @@ class OrientationFilter:
         """Return whether samples are missing in a step of `dt` s."""
         return self._period > 0.0 and dt > MISSED_PERIODS * self._period
 
-    def _is_lost(self, dt: float, gyro: quat.Vector) -> bool:
-        """Return whether the sensor may have turned too far meanwhile for a gap of `dt` s to be bridged."""
-        return self._is_gap(dt) and self._missed_in(dt, gyro) > LOST
-
-    def _missed_in(self, gap: float, gyro: quat.Vector) -> float:
-        """Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it show."""
-        around = (math.dist(rate, self._bias) for rate in (self._last_gyro, gyro))
-        return self._swings.missed_in(gap, self._period, *around)
-
-    def _set_aligned(self, upward: quat.Vector) -> None:
-        """Set the inclination by a vector (3,) that points up, in the sensor's frame, with the alignment's uncertainty."""
+    def _set_aligned(self) -> None:
+        """Set the inclination to that of the alignment, with its uncertainty."""
+        upward, tilt_std = self._alignment.inclination(self._gravity_norm)
         x, y, z = quat.rotate(self._orientation, upward)
         across = math.hypot(x, y)
         if across > 0.0:
@@ -257,9 +255,9 @@ class OrientationFilter:
             self._orientation = quat.normalised(quat.multiply(quat.exponential(tilt * y, -tilt * x, 0.0), self._orientation))
         self._velocity, velocity_std, together = (0.0, 0.0, 0.0), START_VELOCITY_STD, 0.0
         if not self._alignment.active:
-            motion, velocity_std = self._alignment.motion(self._gravity_norm)
-            self._velocity, together = quat.rotate(self._orientation, motion), TOGETHER
-        self._errors.set_tilt_and_velocity_std(self._alignment.std(self._gravity_norm), velocity_std, together)
+            motion, velocity_std, together = self._alignment.motion(self._gravity_norm)
+            self._velocity = quat.rotate(self._orientation, motion)
+        self._errors.set_tilt_and_velocity_std(tilt_std, velocity_std, together)
 
     def _usable(self, verdict: Verdict) -> tuple[bool, bool]:
         """Return whether gyroscope and accelerometer can be used: repeated values can, unless they contradict each other."""
@@ -273,15 +271,10 @@ class OrientationFilter:
         options = self.options
         dt, gyro, accel, gyro_usable, accel_usable = step.dt, step.rate, step.force, step.gyro_usable, step.accel_usable
         extra_tilt = extra_velocity = 0.0
-        x, y, z = gyro if gyro_usable else self._bias
+        wx, wy, wz = self._unbiased(gyro) if gyro_usable else (0.0, 0.0, 0.0)
         if self._is_gap(dt):
-            # The mean of the rates around stands in for the missing samples; a rate counts for the period before it. The mean
-            # misses a part of the motion, and it has the noise of two samples.
-            noise = 0.5 * self._swings.noise(self._period) + (0.5 * step.doubt) ** 2
-            extra_tilt = self._missed_in(dt, (x, y, z)) ** 2 / 3.0 + noise * dt * dt
+            (wx, wy, wz), extra_tilt = self._swings.across(dt, self._period, (wx, wy, wz), step.doubt)
             extra_velocity = UNKNOWN_ACCEL_NOISE**2 * dt
-            share = 0.5 + 0.5 * self._period / dt
-            x, y, z = (share * now + (1.0 - share) * before for now, before in zip((x, y, z), self._last_gyro))
             self._swings.interrupt()
             self._vibration.interrupt()
         else:
@@ -291,7 +284,6 @@ class OrientationFilter:
         if accel_usable:
             self._vibration.take(dt, accel)
         self._last_gyro = gyro if gyro_usable else self._bias
-        wx, wy, wz = x - self._bias[0], y - self._bias[1], z - self._bias[2]
         half = 0.5 * dt
         middle = quat.multiply(self._orientation, quat.exponential(wx * half, wy * half, wz * half))
         self._orientation = quat.normalised(quat.multiply(self._orientation, quat.exponential(wx * dt, wy * dt, wz * dt)))
@@ -300,8 +292,7 @@ class OrientationFilter:
             vx, vy, vz = self._velocity
             self._velocity = (vx + fx * dt, vy + fy * dt, vz + (fz - self._gravity_norm) * dt)
 
-        rate_squared = wx * wx + wy * wy + wz * wz
-        tilt = (options.gyro_noise**2 + options.gyro_noise_per_rate**2 * rate_squared) * dt + extra_tilt
+        tilt = self._turn_variance(dt, (wx, wy, wz)) + extra_tilt
         if not gyro_usable:
             tilt += (STUCK_RATE_NOISE if self._contradicted else SATURATED_RATE_NOISE) ** 2 * dt
         walk = options.bias_walk_stable if self.temperature_stable else options.bias_walk
@@ -317,12 +308,14 @@ class OrientationFilter:
             bias_estimation=self.bias_estimation,
         )
 
+    def _turn_variance(self, dt: float, rate: quat.Vector) -> float:
+        """Return the variance on each axis of a turn by a measured rate (3,) rad/s for `dt` s, rad^2."""
+        options, (x, y, z) = self.options, rate
+        return (options.gyro_noise**2 + options.gyro_noise_per_rate**2 * (x * x + y * y + z * z)) * dt
+
     def _correct(self, dt: float, measure_bias: bool) -> None:
         options = self.options
-        density = options.velocity_noise
-        if self._alignment.active:  # after a bridged gap
-            density = max(density, self._alignment.velocity_noise(self._gravity_norm))
-        velocity_variance = density * density / dt
+        velocity_variance = options.velocity_noise**2 / dt
         vx, vy, vz = self._velocity
         if measure_bias:
             mean, bias = self._rest.mean_gyro, self._bias

@@ -103,6 +103,8 @@ def _decided(
     gate: SpikeGate, review: SpikeReview, dt: float, measured: Vector, gap: bool
 ) -> tuple[Vector, list[tuple[int, Vector]]]:
     """Return what counts for a new sample, and for earlier ones: how many samples ago, and the value (3,) that is decided."""
+    if gap and dt > gate.options.time_constant:
+        gate.reset()  # what the signal was like is forgotten
     value, counted = gate.take(dt, measured)
     decided = [(age, counted[-age]) for age in range(1, min(len(counted), AHEAD - 1) + 1)]  # the review decides older ones
     if gap:

@@ -50,8 +50,9 @@ class SensorOptions:
         1.0, unit="s", minimum=0.02, maximum=60, description="the same values for this time: the sensor is stuck"
     )
     largest_gap: float = parameter(
-        0.5, unit="s", minimum=0.02, maximum=10, description="after a longer gap between samples the inclination is restarted"
-    )
+        1.1, unit="s", minimum=0.02, maximum=10,
+        description="after a longer step between samples the inclination is restarted; the rates before it say nothing of more",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,19 @@
-"""How fast the rates of a sensor swing, and so by how much it may have turned in a gap other than the rates around it show.
+"""How fast the rates of a sensor swing, and so what it likely turned in a gap.
 
-In a gap the mean of the rates around stands in for the missing ones. Of a rate that swings with an angular frequency f and the
-RMS w, that misses the share (f t)^2 / 12 of the angle w t in a short gap t, and half of it in a long one. A motion has slow and
-fast swings. The slow ones are those of the smoothed rate, with f = w' / w. The fast ones, such as a tremor, show in the second
-derivative: f = w'' / w' and w = w'^2 / w''. Vibration (`vibration`) is no swing; of it, only the noise of the two rates counts.
+A motion has slow and fast swings. The slow ones are those of the smoothed rate, with the angular frequency f = w' / w, of RMS
+values. The fast ones, such as a tremor, show in the second derivative: f = w'' / w' and w = w'^2 / w''. Vibration
+(`vibration`) is no swing; of it, only the noise of the rates counts. What that says of a gap is in `missing_rates`.
 """
 
 import math
 
+from gravcomp.orientation.missing_rates import Swing, likeliest_turn
 from gravcomp.orientation.quaternion import Vector
 from gravcomp.orientation.vibration import Vibration
 
 _MEMORY = 1.0  # s
 _SMOOTHING = 0.05  # s, of the rate whose change shows the slow swings
+_UNEVEN = 2.0  # the rate need not change evenly in a gap: square of f, of that of an even change
 
 
 class Swings:
@@ -72,21 +73,28 @@ class Swings:
         """Return the variance of a rate on each axis by vibration, (rad/s)^2, with the period in s between two samples."""
         return self._noise.variance(period)
 
-    def missed_in(self, gap: float, period: float, *around: float) -> float:
-        """Return by how much (rad) the sensor may have turned in a gap (s) other than the rates around it (rad/s) show.
+    def across(self, gap: float, period: float, after: Vector, doubt: float) -> tuple[Vector, float]:
+        """Return the likeliest mean rate (3,) in a gap (s), rad/s, and the variance of the angle turned, rad^2 on each axis.
 
-        period: s between two samples.
+        period: s between two samples; after (3,): the rate after the gap, and doubt: its error beyond noise, rad/s.
         """
-        noise = 3.0 * self.noise(period)
-        turning = max(0.0, self._turning - noise)
-        changing = max(0.0, self._changing - noise / (_SMOOTHING + period) ** 2)
-        change = max(0.0, self._change - 2.0 * noise / period**2)
-        bend = max(0.0, self._bend - 6.0 * noise / period**4)
-        slow = _missed(gap * gap * changing, turning, gap * max(math.sqrt(turning), *around))
-        fast = _missed(gap * gap * bend, change, gap * change / math.sqrt(bend)) if bend > 0.0 else 0.0
-        return math.hypot(slow, fast)
-
-
-def _missed(swing: float, of: float, angle: float) -> float:
-    """Return the part of an angle that a gap t hides, (f t)^2 / 12 and at most half, with (f t)^2 = swing / of."""
-    return angle * (swing / (12.0 * of) if swing < 6.0 * of else 0.5)
+        smooth, before = (after, after) if self._last is None else (self._smooth, self._last)
+        noise = self.noise(period)
+        turning = max(0.0, self._turning - 3.0 * noise)
+        changing = max(0.0, self._changing - 3.0 * noise / (_SMOOTHING + period) ** 2)
+        # The sensor may have begun to move in the gap.
+        most = max(turning, sum(w * w for w in before), sum(w * w for w in after))
+        if most <= 0.0:
+            return after, 0.0
+        swung = _UNEVEN * math.dist(before, after) ** 2 / (gap * gap)
+        squares = swung / most, changing / turning if turning > 0.0 else 0.0, 1.0 / _MEMORY**2
+        parts = [Swing(most / 3.0, math.sqrt(max(squares)))]  # slower ones do not show in the memory
+        change = max(0.0, self._change - 6.0 * noise / period**2)
+        bend = max(0.0, self._bend - 18.0 * noise / period**4)
+        if change > 0.0 and bend > 0.0:
+            parts.append(Swing(change * change / (3.0 * bend), math.sqrt(bend / change)))
+        # A rate is the mean of the period before it; smoothed, it is as late as the smoothing is long.
+        times = (-_SMOOTHING - 0.5 * period, -0.5 * period, gap - 0.5 * period)
+        weights, variance = likeliest_turn(parts, times, (noise, noise, noise + doubt * doubt), gap)
+        x, y, z = (sum(w * r for w, r in zip(weights, rates)) / gap for rates in zip(smooth, before, after))
+        return (x, y, z), variance

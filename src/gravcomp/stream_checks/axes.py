@@ -217,13 +217,15 @@ class Axes:
         force = accel[:whole].reshape(-1, count, 3).mean(axis=1) / length
         self._find_biases(rate, force, duration)
         biases = np.array([np.zeros(3) if bias is None else bias for bias in self._biases])
-        turns = np.einsum("cij,mcj->mci", _MATRICES, rate[:, None] - biases[_UNIT]) * duration
+        # By matrix products, which take a tenth of the time of sums over the same indices.
+        turns = (rate @ _MATRICES.reshape(-1, 3).T).reshape(len(rate), -1, 3)
+        turns = (turns - (_MATRICES @ biases[_UNIT][:, :, None])[:, :, 0]) * duration
         matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(_MATRICES), 3, 3)
         orientations = np.empty_like(matrices)
         orientation = np.broadcast_to(np.eye(3), (len(_MATRICES), 3, 3))
         for m in range(len(rate)):
             orientation = orientations[m] = orientation @ matrices[m]
-        turned = np.einsum("mcij,mj->mci", orientations, force)
+        turned = (orientations.reshape(len(force), -1, 3) @ force[:, :, None]).reshape(turns.shape)
         means = turned.reshape(WINDOWS, -1, len(_MATRICES), 3).mean(axis=1)
         scatter = np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=2), axis=0)
         candidates, scales = scatter[: len(CANDIDATES)], slice(len(CANDIDATES), -1)
@@ -243,14 +245,20 @@ class Axes:
 
 def _median(values: np.ndarray) -> np.ndarray:
     """Return the values (n, 3) without single spikes: the median of three neighbours."""
-    inner = np.median(np.stack([values[:-2], values[1:-1], values[2:]]), axis=0)
-    return np.concatenate([values[:1], inner, values[-1:]])
+    return np.concatenate([values[:1], _middle(values[:-2], values[1:-1], values[2:]), values[-1:]])
+
+
+def _middle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Return the median of three values each, which a few comparisons find faster than a sort."""
+    return np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
 
 
 def _without_spikes(values: np.ndarray) -> np.ndarray:
     """Return the values (n, 3) without spikes of one or two samples: the median of five neighbours stands in for them."""
     padded = np.pad(values, ((2, 2), (0, 0)), mode="edge")
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5, axis=0), axis=-1)
+    a, b, d, e = padded[:-4], padded[1:-3], padded[3:-1], padded[4:]
+    low, high = np.maximum(np.minimum(a, b), np.minimum(d, e)), np.minimum(np.maximum(a, b), np.maximum(d, e))
+    middle = _middle(low, high, values)  # of five
     away = np.abs(values - middle)
     return np.where(away > SPIKE * np.median(away, axis=0), middle, _median(values))
 

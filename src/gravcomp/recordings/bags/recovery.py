@@ -27,7 +27,8 @@ from gravcomp.recordings.bags.storage import is_compressed, message_of, storage_
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-_VERSION = 2  # of what is saved: 2 has the messages of MCAP files that are not in the order of their times, and none compressed
+_VERSION = 3  # of what is saved: 2 has MCAP messages that are not in the order of their times; 3 is without unknown types
+_LEFT_OUT = "left_out.txt"  # next to a copy that lacks topics: which
 _REPORTED = 200  # messages between two reports of progress
 
 
@@ -61,9 +62,9 @@ def readable(path: str | Path, progress: Callable[[float], None] | None = None) 
     if not any(file.stat().st_size for file in files):
         raise BagError(f"{path}: is empty: {', '.join(file.name for file in files)} has 0 bytes")
     saved = cache_folder("bags") / _key(files, path.stem) / path.stem
-    if saved.exists():
-        return ReadableBag(saved, problem, _read_through(saved))
-    return ReadableBag(saved, problem, _save(path, files, saved, problem))
+    count = _read_through(saved) if saved.exists() else _save(path, files, saved, problem)
+    left_out = saved.parent / _LEFT_OUT
+    return ReadableBag(saved, problem + (left_out.read_text(encoding="utf-8") if left_out.exists() else ""), count)
 
 
 def _read_through(path: Path, progress: Callable[[float], None] | None = None) -> int:
@@ -84,22 +85,34 @@ def share_read(reader: "Reader | AnyReader", received: int) -> float:
 
 
 def _save(path: Path, files: list[Path], saved: Path, problem: str) -> int:
-    """Write what can be read of `files` to the bag `saved` and return the number of messages. Raises BagError for none."""
+    """Write what can be read of `files` to the bag `saved` and return the number of messages. Raises BagError for none.
+
+    A copy needs the definition of each type. Recorders before Iron do not write it into SQLite files, so topics of types that are
+    not installed are left out.
+    """
     unfinished = saved.parent.with_suffix(".part")
     shutil.rmtree(unfinished, ignore_errors=True)
-    definitions, count = Definitions(), 0
+    definitions, count, unknown = Definitions(), 0, set[str]()
     with Writer(unfinished / saved.name, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections: dict[tuple[str, str], Connection] = {}
         for file in files:
             for source, time, message in _messages(file):
                 key = source.topic, source.msgtype
+                if key not in connections and source.topic not in unknown:
+                    try:
+                        connections[key] = _connection(writer, source, definitions)
+                    except BagError:
+                        unknown.add(source.topic)
                 if key not in connections:
-                    connections[key] = _connection(writer, source, definitions)
+                    continue
                 writer.write(connections[key], time, message)
                 count += 1
+    left_out = f"; without {', '.join(sorted(unknown))}, of types that are not installed" if unknown else ""
     if not count:
         shutil.rmtree(unfinished)
-        raise BagError(f"{path}: nothing in it can be read: {problem}")
+        raise BagError(f"{path}: nothing in it can be read: {problem}{left_out}")
+    if left_out:
+        (unfinished / _LEFT_OUT).write_text(left_out, encoding="utf-8")
     unfinished.rename(saved.parent)
     return count
 
