@@ -161,11 +161,21 @@ def test_turns_that_could_not_be_counted_wait_for_the_user_to_decide():
     bench.motors[1].silent = False
     bench.run(1.0, lambda t: GOAL)
     assert bench.bridge.state is State.FAULT and "motor 2 (c2) could not be counted" in bench.bridge.message
+    assert "velocity_limit" not in bench.bridge.message
     assert all(motor.current == 0.0 for motor in bench.motors)
     assert bench.bridge.resume(bench.now)[0]
     bench.run(1.0, lambda t: GOAL)
     assert bench.bridge.state is State.ACTIVE
     assert bench.motors[1].displacement == pytest.approx(GOAL[1], abs=2e-5)
+
+
+def test_a_drive_so_fast_that_its_turns_cannot_be_counted_is_told_how_fast_it_may_be():
+    drive = dataclasses.replace(HARDWARE.drive, velocity_limit=0.15, acceleration_limit=2.0)
+    bench = following(hardware=dataclasses.replace(HARDWARE, drive=drive))
+    for k in range(12):  # there and back by 20 mm, in steps that are not refused
+        bench.run(0.04, lambda t, k=k: [0.004 * min(k, 11 - k)] * 6)
+    assert bench.bridge.state is State.FAULT and "could not be counted" in bench.bridge.message
+    assert "velocity_limit_mm_s, 150" in bench.bridge.message and "65.4 at most" in bench.bridge.message
 
 
 def test_turns_that_could_not_be_counted_are_uncertain_again_after_homing_was_stopped():

@@ -3,8 +3,9 @@
 The capstans are so small that the backlash of the gears turns the tip little: a capstan of radius c behind a gear with the
 backlash b leaves a cable at the distance r from the axis open by b c, and the tip by b c / r. Those of described motors also
 reach the largest tension with the current that the file allows. Homing takes a cable as taut at half of the largest tension, or
-at what the current shows. Joints of a ros2_control robot are real motors: capstans that nobody has described are the standard
-ones there.
+at what the current shows. The rotor of a small capstan turns no faster than that of the standard drive: the angle wraps at a
+turn, so that feedback every 2 ms, which may be 8 ms late, no longer tells the turns at twice that speed. Joints of a
+ros2_control robot are real motors: capstans that nobody has described are the standard ones there.
 """
 
 import math
@@ -19,10 +20,10 @@ MARGIN = 1.5
 
 _PLAY = 0.02  # turn of the tip by the backlash of a gear, over the turn by the robot's weight
 _SMALLEST = 0.2e-3  # m: of a lead screw with a lead of 1.26 mm
+_SPEED = 28.0  # rad/s of a small capstan of a joint: half of what an M2006 does without load
+_FASTEST = 0.25  # m/s of a cable that a joint winds
 _HOMING = 0.5  # of the largest tension, at which homing takes a cable as taut
 _LEAST_RISE = 0.01  # A, of homing, that stands well out of the noise of a C610's current
-_SPEED = 28.0  # rad/s of a small capstan: half of what an M2006 does without load
-_FASTEST = 0.25  # m/s of a cable
 
 
 def has_motors(section: dict[str, Any]) -> bool:
@@ -66,15 +67,26 @@ def drive_of(radius: float, drive: dict[str, Any]) -> dict[str, Any]:
     return gains | assumed
 
 
-def fastest(radius: float) -> float:
-    """Return the largest speed in m/s of a cable on capstans of this radius in m."""
-    return _SPEED * radius if radius < Drive().capstan_radius else _FASTEST
+def fastest(radius: float, section: dict[str, Any]) -> float:
+    """Return the largest speed in m/s of a cable on capstans of this radius in m: at that of the standard drive's rotor.
+
+    section: `hardware` (edge keys), of which the gear ratio counts. Joints count their turns themselves.
+    """
+    standard = Drive()
+    if section.get("joints") is not None:
+        return _SPEED * radius if radius < standard.capstan_radius else _FASTEST
+    ratio = number(section.get("drive") or {}, "gear_ratio", standard.gear_ratio)
+    return standard.velocity_limit * (radius / standard.capstan_radius) * (standard.gear_ratio / ratio)
 
 
-def homing_of(radius: float, torque_constant: float, robot: Robot) -> dict[str, float]:
-    """Return the section `homing` (edge keys) of motors with capstans of this radius in m, and N m/A at the gear's output."""
-    rise = min(_HOMING * robot.limits.tension_max * radius / torque_constant, Homing().current_rise)
-    return {"current_rise": round(max(rise, _LEAST_RISE), 4)}
+def homing_of(radius: float, torque_constant: float, speed: float, robot: Robot) -> dict[str, float]:
+    """Return the section `homing` (edge keys) of motors with capstans of this radius in m, and N m/A at the gear's output.
+
+    speed: the largest of a cable, in m/s.
+    """
+    standard = Homing()
+    rise = min(_HOMING * robot.limits.tension_max * radius / torque_constant, standard.current_rise)
+    return {"current_rise": round(max(rise, _LEAST_RISE), 4), "velocity_mm_s": 1e3 * min(standard.velocity, speed)}
 
 
 def with_capstans(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
@@ -83,14 +95,17 @@ def with_capstans(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
     if not isinstance(drive, dict) or not isinstance(homing, dict):
         return section
     radius = capstan_radius(section, robot)
-    if radius >= standard.capstan_radius:
+    speed = fastest(radius, section)
+    if radius >= standard.capstan_radius and speed >= standard.velocity_limit:
         return section
-    speed = {"velocity_limit_mm_s": 1e3 * min(standard.velocity_limit, fastest(radius))}
+    limited = {"velocity_limit_mm_s": 1e3 * min(standard.velocity_limit, speed), **drive}
+    if radius >= standard.capstan_radius:
+        return {**section, "drive": limited}
     constant = number(drive, "torque_constant", standard.torque_constant)
     return {
         **section,
-        "drive": {**drive_of(radius, drive), **speed, **drive},
-        "homing": {**homing_of(radius, constant, robot), **homing},
+        "drive": {**drive_of(radius, drive), **limited},
+        "homing": {**homing_of(radius, constant, speed, robot), **homing},
     }
 
 

@@ -45,6 +45,12 @@ _SPEED_LIMIT = 20_000  # rpm of the rotor; more than the motor reaches
 _SPEED_JUMP, _SPEED_RATE = 4000.0, 6e5  # rpm, rpm/s at full current; more than the speed can change between two feedbacks
 
 
+def countable_speed(interval: float) -> float:
+    """Return the speed (rpm) up to which feedback every `interval` s tells the turns of a rotor that turns steadily."""
+    room = COUNTS_PER_TURN - 2.0 * _TOLERANCE - 0.5 * _ACCELERATION * interval * interval
+    return room / ((interval + _TIME_UNCERTAINTY) * _COUNTS_PER_S)
+
+
 @dataclasses.dataclass
 class _Doubt:
     """An undecided number of turns."""

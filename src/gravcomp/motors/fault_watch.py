@@ -1,14 +1,16 @@
 """Detection of faults in feedback, encoders and motors. It reports what is wrong; the bridge changes its state."""
 
+import math
 from collections.abc import Collection, Sequence
 
 from gravcomp.description.hardware import COUNTS_PER_TURN, Hardware
-from gravcomp.motors.encoder import JUMPS
+from gravcomp.motors.encoder import JUMPS, countable_speed
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.rotors import Rotors
 
 _UNKNOWN_ID_FRAMES = 20  # feedback frames in a row from an id that no cable has
 _UNKNOWN_ID_PAUSE = 0.1  # s; a longer pause between two of them ends the row
+_FEEDBACK = 0.004  # s between two feedbacks at 500 Hz, of which one is lost
 
 
 class FaultWatch:
@@ -104,7 +106,22 @@ class FaultWatch:
         if not unsure:
             return None
         turn = 1e3 * COUNTS_PER_TURN * self._drive.travel_per_count
-        return f"the turns of {', '.join(unsure)} could not be counted: the zero may be off by a multiple of {turn:.2f} mm"
+        return (
+            f"the turns of {', '.join(unsure)} could not be counted: the zero may be off by a multiple of {turn:.2f} mm"
+            f"{self._too_fast}"
+        )
+
+    @property
+    def _too_fast(self) -> str:
+        """Clause that names a speed at which the feedback does not tell the turns of a rotor; empty at the drive's speed."""
+        per_rpm = COUNTS_PER_TURN / 60.0 * self._drive.travel_per_count  # m/s
+        most, limit = countable_speed(_FEEDBACK) * per_rpm, self._drive.velocity_limit
+        if limit <= most:
+            return ""
+        return (
+            f" (at hardware.drive.velocity_limit_mm_s, {1e3 * limit:g}, the feedback does not tell the turns: it may be"
+            f" {math.floor(1e4 * most) / 10:g} at most)"
+        )
 
     def motor_fault(self, index: int, current: float, velocity: float, lag: float) -> str | None:
         """Stall, runaway or wrong sign of one motor; arguments as of `MotorMonitor.update`."""
