@@ -28,7 +28,8 @@ def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcom
 @pytest.mark.graph
 @pytest.mark.timeout(1300)
 def test_gravity_from_the_arm_only_works_as_well(gravcomp):
-    answer = tour(gravcomp, *documented("./gravcomp arm --gravity arm --hold 3 --json")[1:], "--hold", "1.5", *QUICK)
+    # No filter has to follow the motion: it may be twice as fast.
+    answer = tour(gravcomp, *documented("./gravcomp arm --gravity arm --hold 3 --json")[1:], "--hold", "1.5", "--travel", "1")
     assert answer.code == 0, answer.err
     assert answer.json["ratio"] >= 5.0
 

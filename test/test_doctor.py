@@ -69,7 +69,7 @@ def found(tmp_path_factory):
         demanding = observer.create_subscription(Vector3Stamped, f"{NAMESPACE}/gravity", lambda _: None, 10)
         doctor = subprocess.Popen(DOCTOR, stdout=subprocess.PIPE, text=True, env={**os.environ, "ROS_DOMAIN_ID": DOMAIN})
         try:
-            compared = future(compare_with_the_table, observer, graph, tmp_path_factory.mktemp("more"))
+            compared = future(compare_with_the_table, observer, graph, processes, tmp_path_factory.mktemp("more"))
             unserved = future(findings_of, doctor)
         finally:
             doctor.kill()  # nothing happens where the process has ended
@@ -164,7 +164,7 @@ def regular_findings(observer, processes) -> dict[str, dict]:
     return found
 
 
-def compare_with_the_table(observer, graph: RobotGraph, folder: Path) -> None:
+def compare_with_the_table(observer, graph: RobotGraph, processes: Graph, folder: Path) -> None:
     """Compare the ports of the running nodes, and of those that only some graphs have, with the table of nodes."""
     from gravcomp.arm.description import expanded, shipped_xacro
 
@@ -173,19 +173,19 @@ def compare_with_the_table(observer, graph: RobotGraph, folder: Path) -> None:
     more = [
         graph.node("gravcomp_fem", "viewer", port=8860),
         graph.node("gravcomp_estimation", "arm_gravity", urdf=str(urdf)),
-        graph.node("gravcomp_fem", "arm_player", urdf=str(urdf)),
+        graph.node("gravcomp_fem", "arm_player", urdf=str(urdf), hold=600.0),  # its tour does not end meanwhile
         graph.node("gravcomp_hw", "judge", duration=3600.0),
     ]
     names = [executable for _, executable in LOOP] + ["virtual_robot"] + [spec.executable for spec in more]
-    with Graph(more, folder / "logs", {"ROS_DOMAIN_ID": DOMAIN}) as added:
-        added.start()
-        for executable in names:
-            until(functools.partial(is_there, observer, executable), f"no {executable}", added)
-            try:
-                # A node creates its last ports at its activation.
-                until(functools.partial(fits_the_table, observer, executable), "", added, 60.0)
-            except AssertionError:
-                raise AssertionError(f"{executable} is not what the table says: {interface(observer, executable)}") from None
+    for spec in more:
+        processes.start_one(spec)
+    for executable in names:
+        until(functools.partial(is_there, observer, executable), f"no {executable}", processes)
+        try:
+            # A node creates its last ports at its activation.
+            until(functools.partial(fits_the_table, observer, executable), "", processes, 60.0)
+        except AssertionError:
+            raise AssertionError(f"{executable} is not what the table says: {interface(observer, executable)}") from None
 
 
 def fits_the_table(observer, executable: str) -> bool:

@@ -1,8 +1,10 @@
 """Targets without equilibrium in the running graph: commands continue, and the next target is reached."""
 
+import contextlib
 from concurrent.futures import Future
 from typing import NamedTuple
 
+import psutil
 import pytest
 
 pytest.importorskip("rclpy", reason="it runs the graph: ./gravcomp test")
@@ -42,7 +44,7 @@ def found():
             statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
             commands = ros2.listen(CableCommand, f"{graph.namespace}/cable/command")
             recovered = {target: future(recover, graph, ros2, statuses, commands, *target) for target in WITHOUT_EQUILIBRIUM}
-            return Found(recovered, future(wait_for_hold, ros2, statuses))
+            return Found(recovered, future(wait_for_hold, graph, ros2, statuses))
     finally:
         ros2.close()
 
@@ -64,10 +66,29 @@ def recover(graph: RunningGraph, ros2: Ros2, statuses: list, commands: list, ang
     graph.check()
 
 
-def wait_for_hold(ros2: Ros2, statuses: list) -> ControllerStatus:
-    """Return the first status with the answer, for which the process of low priority waits for the other tests."""
-    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "no answer comes", 500.0)
+def wait_for_hold(graph: RunningGraph, ros2: Ros2, statuses: list) -> ControllerStatus:
+    """Return the first status with the answer.
+
+    The process that computes it has the lowest priority, so it waits for the other tests. Meanwhile the virtual robot is halted:
+    without its samples the graph takes no processor.
+    """
+    robot, controller = graph.process("virtual_robot"), graph.process("inverse_controller")
+    robot.suspend()
+    try:
+        ros2.until(lambda: not is_computing(controller), "the question is not answered", 500.0)
+    finally:
+        robot.resume()
+    ros2.until(lambda: statuses and statuses[-1].holdable != 0, "the answer is not published")
     return statuses[-1]
+
+
+def is_computing(controller: psutil.Process) -> bool:
+    """Return whether the controller's only process, which answers, runs; the controller waits for its end with a sample."""
+    for child in controller.children():
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if child.status() != psutil.STATUS_ZOMBIE:
+                return True
+    return False
 
 
 def test_the_status_says_whether_the_target_can_be_held(found):

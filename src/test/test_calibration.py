@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from gravcomp.calibration import one_mesh
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
 from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
@@ -14,9 +15,11 @@ from gravcomp.calibration.parameters import StaticParameters, cable_compliance, 
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
 from gravcomp.closed_loop.setup import Setup
-from gravcomp.description import load_robot_file
+from gravcomp.description import Fibres, load_robot_file
+from gravcomp.description.robot import Payload
+from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh.coarse import with_coarse_elements
-from gravcomp.simulation import Simulator
+from gravcomp.simulation import DynamicSimulator, DynamicsOptions, Simulator
 from gravcomp.trials.known_robot import known_setup, known_windows, offsets
 
 GROUPS = {"offsets", "compliance", "winding"}
@@ -177,6 +180,33 @@ def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
     assert cable_compliance(mine.robot) == pytest.approx(parameters.compliance, abs=1e-6)
     assert mine.robot.cables[0].axial_stiffness == pytest.approx((0.2 + 0.05) / 0.2e-3)
     assert "base: article" in path.read_text(encoding="utf-8") and mine.robot.limits == robot.limits
+
+
+def test_robots_of_a_fit_have_one_mesh(robot, monkeypatch):
+    """They differ in modulus, damping and creep. Their models are those that each would have by itself."""
+    built = []
+
+    class Counted(RobotModel):
+        def __init__(self, *given):
+            built.append(given)
+            super().__init__(*given)
+
+    monkeypatch.setattr(one_mesh, "RobotModel", Counted)
+    monkeypatch.setattr(one_mesh, "_last", [])
+    coarse = with_coarse_elements(robot)
+    braided = with_coarse_elements(robot.with_material(fibres=Fibres(2.0, 0.5)))
+    fall = Measured(
+        "", np.zeros(3, int), 0.02 * np.arange(3), np.tile(GRAVITY, (3, 1)), np.full((3, 6), np.nan), np.zeros((3, 3))
+    )
+    for described, count in ((coarse, 1), (braided, 2), (dataclasses.replace(coarse, payload=Payload(0.01)), 3)):
+        for changes in ({}, {"youngs_modulus": 0.5e6, "damping_time": 0.03}, {"creep_ratio": 0.2, "creep_time": 0.1}):
+            changed = described.with_material(**changes)
+            tips = predict_course(changed, fall, DynamicsOptions(0.01))[0]
+            assert len(built) == count
+            alone = DynamicSimulator(RobotModel(changed), DynamicsOptions(0.01))
+            alone.settle(GRAVITY, fall.displacement[0])
+            moved = [alone.step(GRAVITY, fall.displacement[0], duration=0.02).tip_position for _ in range(2)]
+            np.testing.assert_allclose(tips[1:], moved, rtol=0.0, atol=1e-12)
 
 
 def test_a_robot_at_rest_is_predicted_to_stay(robot, tmp_path, monkeypatch):

@@ -75,6 +75,12 @@ def test_values_that_do_not_fit_are_refused(value):
         codec.encode("MotorCommand5to8", current_5=value, current_6=0, current_7=0, current_8=0)
 
 
+@pytest.mark.parametrize("given", [{"duty": 0.5}, {"duty": 0.5, "sequence": 1, "current": 0.0}, {"duty": 0.5, "current": 0.0}])
+def test_other_signals_than_those_of_the_frame_are_refused(given):
+    with pytest.raises(codec.FrameError, match=f"HeaterCommand has the signals .*; got {', '.join(given)}$"):
+        codec.encode("HeaterCommand", **given)
+
+
 def test_every_frame_of_the_dbc_is_documented():
     page = resources.files("gravcomp.canbus").joinpath("FRAMES.md").read_text(encoding="utf-8")
     for message in DATABASE.messages:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gravcomp.calibration.measured import Measured
+from gravcomp.calibration.one_mesh import model_of
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
 from gravcomp.mesh.robot_axis import rest_tip
@@ -36,7 +37,7 @@ def predict_course(robot: Robot, course: Measured, options: DynamicsOptions | No
 
 def predict_shapes(robot: Robot, course: Measured, options: DynamicsOptions | None = None) -> Iterator[Shape | None]:
     """Yield the shapes at the course's times, None for the start at the shape at rest; as `predict_course`."""
-    simulator = DynamicSimulator(robot, options or course_options(robot))
+    simulator = DynamicSimulator(model_of(robot), options or course_options(robot))
     if np.linalg.norm(course.tip_position[0] - rest_tip(robot)[0]) > STRAIGHT * robot.length:
         shape = simulator.settle(course.gravity[0], course.displacement[0])
         if not shape.is_equilibrium:

@@ -78,25 +78,27 @@ class Layout:
 
         Raises FrameError for a missing or unknown signal, a value that is not finite, or one out of range.
         """
+        try:
+            # As many values as signals, each found by its name: those are all.
+            raw = [round((values[name] - offset) / scale) for name, scale, offset, _, _ in self._given]
+            data = self._struct.pack(*raw, 0) if self.checked else self._struct.pack(*raw)
+            if len(raw) != len(values):
+                raise KeyError
+        except (KeyError, ValueError, OverflowError, struct.error):
+            raise FrameError(self._refusal(values)) from None
+        return data[:-1] + bytes([check_byte(self.frame_id, data[:-1])]) if self.checked else data
+
+    def _refusal(self, values: dict[str, float]) -> str:
+        """Return what is wrong with values that do not fit."""
         if values.keys() != self._names:
-            raise FrameError(
-                f"{self.name} has the signals {', '.join(name for name, *_ in self._given)}; got {', '.join(values)}"
-            )
-        raw = []
+            return f"{self.name} has the signals {', '.join(name for name, *_ in self._given)}; got {', '.join(values)}"
         for name, scale, offset, low, high in self._given:
             value = values[name]
             if not math.isfinite(value):
-                raise FrameError(f"{self.name}.{name} is {value}; a finite number is needed")
-            count = round((value - offset) / scale)
-            if not low <= count <= high:
-                raise FrameError(
-                    f"{self.name}.{name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}"
-                )
-            raw.append(count)
-        if not self.checked:
-            return self._struct.pack(*raw)
-        data = self._struct.pack(*raw, 0)[:-1]
-        return data + bytes([check_byte(self.frame_id, data)])
+                return f"{self.name}.{name} is {value}; a finite number is needed"
+            if not low <= round((value - offset) / scale) <= high:
+                return f"{self.name}.{name} is {value:g}; allowed: {low * scale + offset:g} to {high * scale + offset:g}"
+        raise AssertionError(f"{self.name}: {values} fit")
 
 
 @functools.cache

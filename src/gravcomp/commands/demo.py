@@ -64,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    _check(args)  # before the host, which would import for nothing
     # Before the imports of the command: the host imports for the nodes at the same time.
     from gravcomp.launcher.host_client import NodeHost
 
@@ -81,7 +82,6 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
     from gravcomp.virtual.described import described
 
-    _check(args)
     given_logs = made_logs(args.logs)
     times = _Times.of(args)
     parameters: dict[str, dict] = {"virtual_robot": _motion(args, times)}

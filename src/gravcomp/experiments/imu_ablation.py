@@ -15,7 +15,7 @@ from gravcomp.virtual.parameters import Board
 
 TITLE = "IMU: filter and heating"
 
-_BRIEF_DURATION, _BRIEF_REST = 12.0, 5.0  # s
+_BRIEF_DURATION, _BRIEF_REST = 4.0, 3.0  # s
 _WINDOW = 30.0  # s, over which the article reports 20 deg
 _MOTIONS = (("at rest", 0.0), ("turning at 23 deg/s", RATE))
 _FILTERS = (("filter", "with filter"), ("no_filter", "raw rate integrated"))

@@ -8,6 +8,8 @@ S and D come from the material's law (`materials.laws`) and its fibres; `assembl
 `viscous_strain`. Quadratic tetrahedra have one pressure each (`materials.volume`).
 """
 
+import copy
+
 import numpy as np
 
 from gravcomp.materials.constants import MaterialConstants
@@ -37,18 +39,25 @@ class SolidElements:
         self._connectivity = mesh.elements.astype(np.int64)
         self.fibres = scaled_fibres(mesh, rule.points)
         self.averaged = np.full(len(mesh.elements), mesh.kind == "tet10")
-        self._solid = assembly.Solid(
-            self._connectivity,
-            self.gradients,
-            self.weights,
-            self.constants.law,
-            self.constants.values,
-            self.fibres,
-            self.averaged,
-        )
+        self._solid = self._bundled()
         self._position = scatter_positions(mesh.elements, pattern)
         count = len(self.weights)
         self._elastic = ViscousStrain(np.zeros(count), np.zeros((*self.weights.shape, 6)), np.zeros(count, bool))
+
+    def with_materials(self, mesh: Mesh) -> "SolidElements":
+        """Return the elements with the materials of `mesh`, which is otherwise this mesh; they share the geometry."""
+        other = copy.copy(self)
+        other.mesh, other.constants = mesh, MaterialConstants.of(mesh)
+        other.fibres = scaled_fibres(mesh, stiffness_quadrature(mesh.kind).points)
+        other._solid = other._bundled()
+        return other
+
+    def _bundled(self) -> assembly.Solid:
+        """Return what the compiled functions take."""
+        constants = self.constants
+        return assembly.Solid(
+            self._connectivity, self.gradients, self.weights, constants.law, constants.values, self.fibres, self.averaged
+        )
 
     def scale_stiffness(self, factor: np.ndarray) -> None:
         """Multiply the modulus of every element by `factor` (k,), that of its fibres as well."""

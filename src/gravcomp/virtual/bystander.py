@@ -49,6 +49,8 @@ class Bystander:
         """Move the wall for `dt` s and return the hand's force (3,) N in soft_base on the tip, at `time` s."""
         if self._wall is not None:
             self._wall.step(dt)
+        if not self.hand.holds:
+            return self.hand.force
         rod = self._rod
         return self.hand.pull(rod.orientation[0].T @ (rod.position[-1] - rod.position[0]), time)
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from gravcomp.scene.scene import turn_to
 from gravcomp.virtual.backbone import backbone_poses
+from gravcomp.virtual.capstan_spring import capstan_springs
 from gravcomp.virtual.contact import find_contacts, slots
 from gravcomp.virtual.contact_force import touching_of
 from gravcomp.virtual.equilibrium import RodShape
@@ -59,16 +60,9 @@ class MovingRod:
         return position, orientation
 
     @property
-    def spring(self) -> np.ndarray:
-        """Stiffness (m,) N/m that each capstan feels within a step: the line in series with the rod."""
-        return self.tendon_stiffness / (1.0 + self.tendon_stiffness * self._compliance)
-
-    @property
-    def contact(self) -> np.ndarray:
-        """Displacement (m,) m of each capstan at which a spring of `spring` that has the present tension becomes slack."""
-        spring = self.spring
-        taut = (self.tension > 0.0) & (spring > 0.0)
-        return np.where(taut, self._wound - self.tension / np.where(taut, spring, 1.0), self.shortened)
+    def capstan_springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """What each capstan feels within a step: displacements (m,) m at which its spring is slack, its stiffness (m,) N/m."""
+        return capstan_springs(self.tension, self.tendon_stiffness, self._compliance, self._wound, self.shortened)
 
     @property
     def touches(self) -> Touches:

@@ -47,6 +47,11 @@ class Hand:
         self._place: np.ndarray | None = None
         self._ordered = self._stepped = -math.inf
 
+    @property
+    def holds(self) -> bool:
+        """Whether it holds the tip; without that it pulls by nothing."""
+        return self._wanted is not None
+
     def hold(self, place: np.ndarray, time: float) -> None:
         """Hold the tip from `time` (s) on by a spring to the place (3,) m in soft_base, until released or forgotten."""
         self._wanted, self._ordered = np.asarray(place, dtype=float), time

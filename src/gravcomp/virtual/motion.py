@@ -15,6 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from gravcomp.virtual.se3 import rotation_exp, rotation_log, rotation_to_quaternion
 
+_OTHER_WAVES = [2, 0, 1]  # of a hand's turns about x, y, z: those with which it shifts along these axes
+
 
 class BaseMotion(Protocol):
     """Pose of the base over time. The times of successive calls do not decrease."""
@@ -118,7 +120,7 @@ class TremorMotion(SyntheticMotion):
         # The hand starts from rest, so that the first samples are those of a base at rest.
         begin = min(1.0, time / 2.0) ** 2
         waves = np.sin(2 * math.pi * self._frequency * time + self._phase)
-        return self._orientation @ turned(begin * (waves @ self._turn)), begin * (np.roll(waves, 1, axis=0) @ self._shift)
+        return self._orientation @ turned(begin * (waves @ self._turn)), begin * (waves[_OTHER_WAVES] @ self._shift)
 
 
 class FollowedMotion(SyntheticMotion):

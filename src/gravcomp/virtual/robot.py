@@ -178,9 +178,7 @@ class VirtualRobot:
         end = self._tick + ticks
         sent: list[can.Message] = []
         while self._tick < end:
-            # The rod answers once a step. In between, a capstan feels line and rod in series: a stiff line alone would
-            # resist every turn as if the rod stood still.
-            contact, spring = self._rod.contact, self._rod.spring
+            contact, spring = self._rod.capstan_springs  # the rod answers once a step
             due = min(end, *(self._tick - self._tick % period + period for period in (_ROD_TICKS, self._feedback_ticks)))
             self._motors.step(due - self._tick, contact, spring)
             self._tick = due
