@@ -275,14 +275,63 @@ def test_what_a_slow_tracker_has_seen_of_a_force_is_kept_between_its_samples(sha
 def test_what_friction_hides_does_not_depend_on_the_rate_of_the_samples():
     once, often = (LoadFilter(LoadEstimationOptions(kind="force"), ROBOT.limits, 6, 3, 0.02) for _ in range(2))
     tension, still = np.full(6, 0.8), np.zeros(6)
-    once.diffuse(1.0, 0.5, 1000.0, tension, still)
+    once.diffuse(1.0, 0.5, tension, still)
     for _ in range(100):
-        often.diffuse(0.01, 0.5, 1000.0, tension, still)
+        often.diffuse(0.01, 0.5, tension, still)
     assert often.covariance == pytest.approx(once.covariance)
     for _ in range(20):
-        once.diffuse(1.0, 0.5, 1000.0, tension, still)
+        once.diffuse(1.0, 0.5, tension, still)
     hidden = np.sqrt(np.diag(once.covariance)[-6:])
     assert hidden == pytest.approx(LoadEstimationOptions().cable_friction * tension, rel=1e-3)
+
+
+def test_a_payload_far_below_what_the_cables_hold_does_not_follow_each_turn_of_friction(shape):
+    """The cables hold 60 times as much; friction turns round every second and has a mean of none."""
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="payload"))
+    random, mass, found = np.random.default_rng(4), 0.002, []
+    loaded = HeldRobot(shape, tip, shape.cable_displacement, REST).under(mass * GRAVITY)
+    for k in range(400):
+        now, there = 0.02 * k, k >= 120
+        observer.predict(now, shape, tip, ZERO, shape.cable_displacement)
+        if k == 5:
+            observer.zero(now)
+        tension = shape.cable_tension + there * loaded.tension
+        friction = 1.03 if (k // 50) % 2 else 0.97
+        observer.measure_tensions(now, friction * tension * (1 + 0.01 * random.normal(size=3)) + 1e-3 * random.normal(size=3))
+        if k >= 300:
+            found.append(observer.estimate(GRAVITY, now).mass)
+    low, high = observer.estimate(GRAVITY, now).mass_interval
+    assert low <= mass <= high
+    assert np.ptp(found) < 0.2 * mass
+
+
+def test_a_payload_fades_alike_whatever_the_rate_of_the_samples_up_to_one_that_may_be_anything():
+    options = LoadEstimationOptions(kind="payload", payload_time=10.0)
+    once, often, long = (LoadFilter(options, ROBOT.limits, 6, 1, 0.02) for _ in range(3))
+    tension, still = np.full(6, 0.8), np.zeros(6)
+    for one in (once, often, long):
+        one.set_load(np.array([0.002]), np.array([[1e-8]]))
+    once.diffuse(1.0, 0.05, tension, still)
+    for _ in range(100):
+        often.diffuse(0.01, 0.05, tension, still)
+    long.diffuse(1000.0, 0.05, tension, still)
+    assert often.load_covariance == pytest.approx(once.load_covariance)
+    assert once.load_covariance == pytest.approx(1e-8 * np.exp(0.2), rel=1e-3)
+    assert long.load_covariance == pytest.approx(0.05**2) and long.load == pytest.approx(0.002)
+
+
+def test_a_tip_that_arrives_late_does_not_let_the_time_pass_twice(shape, monkeypatch):
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="payload"))
+    passed, diffuse = [], LoadFilter.diffuse
+    monkeypatch.setattr(LoadFilter, "diffuse", lambda one, *given: (passed.append(given[0]), diffuse(one, *given)))
+    for k in range(100):
+        observer.predict(0.01 * k, shape, tip, ZERO, shape.cable_displacement)
+        observer.measure_tensions(0.01 * k, shape.cable_tension + 1e-3 * np.sin([k, 2 * k, 3 * k]))
+        if k > 20:
+            observer.measure_tip(0.01 * (k - 10), shape.tip_position)
+    assert 0.8 < sum(passed) < 1.0
 
 
 def test_what_a_sensor_has_said_before_it_was_found_to_be_wrong_is_forgotten(shape):

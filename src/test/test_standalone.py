@@ -183,6 +183,37 @@ def test_a_robot_whose_parts_creep_differently_or_by_too_many_terms_is_refused_w
         fit(RobotModel(creeping), built[1], dataclasses.replace(parameters, robot=creeping))
 
 
+@pytest.mark.parametrize(
+    ("lines", "names"),
+    [
+        ("scene: {planes: [{name: table, normal: [0, 1, 0], point_mm: [0, -6, 0]}]}", r"the walls of scene \(table\)"),
+        (
+            "scene: {spheres: [{name: vessel, centre_mm: [9, 0, 90], radius_mm: 2, forbidden: true}]}",
+            r"zones of scene \(vessel\)",
+        ),
+        ("scene: {self_contact: true}", "scene.self_contact"),
+        ("robot: {payload: {mass_g: 2.0, centre_mm: [0, 0, 15]}}", "robot.payload.centre_mm"),
+        ("nodes: {fem_simulator: {payload_mass_g: 3.0}}", "payload_mass_g"),
+        ("nodes: {fem_simulator: {load: {kind: payload}}}", "load.kind: payload"),
+        ("nodes: {inverse_controller: {inverse: {max_contact_force: 0.1}}}", "max_contact_force"),
+    ],
+)
+def test_what_the_board_does_not_know_is_refused_with_its_name(tmp_path, lines, names):
+    path = tmp_path / "robot.yaml"
+    path.write_text(f"base: article\n{lines}\n")
+    with pytest.raises(ConfigError, match=f"{path}: the loop on the board does not know .*{names}"):
+        LoopParameters.of(load_robot_file(str(path)))
+    if "scene" in lines:
+        with pytest.raises(ConfigError, match=names):
+            ClosedLoop(Setup.of(load_robot_file(str(path))), StaticMotion(base_orientation(0.0)), board="standalone")
+
+
+def test_a_payload_at_the_tip_is_known_to_the_board(tmp_path):
+    path = tmp_path / "robot.yaml"
+    path.write_text("base: article\nrobot: {payload: {mass_g: 2.0}}\nnodes: {fem_simulator: {payload_mass_g: 2.0}}\n")
+    assert LoopParameters.of(load_robot_file(str(path))).robot.payload.mass == pytest.approx(0.002)
+
+
 def test_the_estimator_in_float32_follows_that_of_the_host(parameters, found):
     rng = np.random.default_rng(0)
     host = GravityEstimator(parameters.estimator.estimator, quat.from_roll_pitch_yaw(*parameters.robot.imu_mount.rpy))

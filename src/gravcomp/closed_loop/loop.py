@@ -320,5 +320,7 @@ class ClosedLoop:
 
 
 def _parameters(setup: Setup) -> LoopParameters:
-    """Return what the loop on the board takes from the setup."""
-    return LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn)
+    """Return what the loop on the board takes from the setup. Raises ConfigError for what it does not know."""
+    found = LoopParameters(setup.source, setup.robot, setup.estimator, setup.controller, setup.hardware, setup.simulator.turn)
+    found.refuse_unknown(setup.modelled_scene, setup.zones, setup.simulator)
+    return found

@@ -125,9 +125,10 @@ def _model(args: argparse.Namespace) -> int:
     from gravcomp.firmware.model_settings import LoopParameters
 
     file = load_robot_file(args.robot)
+    parameters = LoopParameters.of(file)
     path = made_folder("--output", Path(args.output).expanduser()) / f"{file.robot.name}.model"
     model, reduction, _ = prepare(args.robot)
-    found = fit(model, reduction, LoopParameters.of(file), math.radians(args.joystick_bend))
+    found = fit(model, reduction, parameters, math.radians(args.joystick_bend))
     path.write_bytes(found.blob)
     figures = {
         "robot": file.robot.name,

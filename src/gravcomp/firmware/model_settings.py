@@ -16,6 +16,7 @@ from gravcomp.graph.parameters.inverse_controller import InverseControllerParame
 from gravcomp.inverse.rest_target import rest_target
 from gravcomp.inverse.target import Target, direction_weight
 from gravcomp.orientation import quaternion as quat
+from gravcomp.scene.scene import Scene
 
 SAMPLE_PERIOD = 0.01  # s, of the board's IMU
 CABLES_MAX = 9
@@ -42,13 +43,32 @@ class LoopParameters:
 
         estimator = section(ImuEstimatorParameters, "imu_estimator")
         controller = section(InverseControllerParameters, "inverse_controller")
-        if file.zones or controller.inverse.max_contact_force is not None:
+        simulator = section(FemSimulatorParameters, "fem_simulator")
+        parameters = cls(file.source, file.robot, estimator, controller, file.hardware, simulator.turn)
+        parameters.refuse_unknown(file.scene, file.zones, simulator)
+        return parameters
+
+    def refuse_unknown(self, scene: Scene | None, zones: Scene | None, simulator: FemSimulatorParameters) -> None:
+        """Raise ConfigError for what the loop on the board does not know, and would move the robot against.
+
+        scene: walls of the model; zones: forbidden ones; simulator: that of the host, which may carry or look for a load.
+        """
+        payload, live, load = self.robot.payload, simulator.payload_mass, simulator.load.kind
+        unknown = {
+            f"the walls of scene ({', '.join(scene.names) if scene else ''})": scene is not None and bool(scene.walls),
+            "scene.self_contact": scene is not None and scene.self_contact,
+            f"the forbidden zones of scene ({', '.join(zones.names) if zones else ''})": bool(zones),
+            "inverse.max_contact_force": self.controller.inverse.max_contact_force is not None,
+            "robot.payload.centre_mm (it has a payload's weight at the tip itself)": payload.mass > 0.0 and any(payload.centre),
+            "fem_simulator.payload_mass_g (it has robot.payload)": live >= 0.0 and live != payload.mass,
+            f"load.kind: {load} (it looks for no load)": load != "none",
+        }
+        found = [name for name, is_there in unknown.items() if is_there]
+        if found:
             raise ConfigError(
-                f"{file.source}: forbidden zones in scene and inverse.max_contact_force need the loop on a host;"
-                " that on the board has neither"
+                f"{self.source}: the loop on the board does not know {', '.join(found)}. Run the loop on a host, or give"
+                " the board a robot file without them"
             )
-        turn = section(FemSimulatorParameters, "fem_simulator").turn
-        return cls(file.source, file.robot, estimator, controller, file.hardware, turn)
 
     @property
     def at_rest(self) -> Target:

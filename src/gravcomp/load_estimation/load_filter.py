@@ -2,8 +2,13 @@
 
 The state is x = (load, s_E, s_w, b_e, b_lambda, b_u, b_f): the load in k numbers that give the force D x, the relative errors of
 compliance and weight (`sensitivity`), and what is off in the tip (creep, hysteresis), in the tensions (zeros of the sensors), in
-the cables' displacements (backlash, stretch), and in the tensions by friction. Load, b_e and b_u walk at random (Kalman 1960). As
-a load makes cables slack, each measurement is linearised again at the state that it leads to (iterated filter, Jazwinski 1970).
+the cables' displacements (backlash, stretch), and in the tensions by friction. A force, b_e and b_u walk at random (Kalman
+1960). As a load makes cables slack, each measurement is linearised again at the state that it leads to (iterated filter,
+Jazwinski 1970).
+
+A payload comes at once and then stays. What is measured of it loses its weight within a time t_p (fading memory, Sorenson and
+Sacks 1971): dP/dt = 2 (P - P^2 / s^2) / t_p, up to the variance s^2 of a load that may be anything. A walk at random would need
+its size; that of the largest load which the cables hold lets the estimate of a small payload follow each turn of friction.
 
 Friction adds a share mu of the tension T to what a sensor reads, or takes it away, and turns round with the cable's motion,
 however small. So b_f is a coloured noise of standard deviation mu T that is forgotten within a time t_f (Bryson and Johansen
@@ -76,8 +81,8 @@ class LoadFilter:
         return alone.load_covariance
 
     def open_load(self, deviation: float) -> None:
-        """Let the load be farther from what it was, by this standard deviation."""
-        self.covariance[: self._k, : self._k] += deviation**2 * np.eye(self._k)
+        """Let the load be anything of this standard deviation around what it was."""
+        self.covariance[: self._k, : self._k] = deviation**2 * np.eye(self._k)
 
     def copy(self) -> "LoadFilter":
         """Return a filter in the same state; the steps of one do not change the other."""
@@ -85,16 +90,19 @@ class LoadFilter:
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
-    def diffuse(self, elapsed: float, deviation: float, time: float, tension: np.ndarray, change: np.ndarray) -> None:
+    def diffuse(self, elapsed: float, deviation: float, tension: np.ndarray, change: np.ndarray) -> None:
         """Let what walks walk, for `elapsed` s.
 
-        The load forgets what it was within `time` s and is then anything of this standard deviation, so that what no sensor sees
-        of it stays bounded. tension (m,) N: of the cables; change (m,) N: of the model's since the last call.
+        A load that is forgotten is anything of this standard deviation, so that what no sensor sees of it stays bounded; 0: it is
+        known. tension (m,) N: of the cables; change (m,) N: of the model's since the last call.
         """
         k, m, options = self._k, self._m, self._options
         friction = slice(k + 5 + 2 * m, None)
         step, kept = np.zeros(len(self.state)), np.ones(len(self.state))
-        kept[:k] = np.exp(-elapsed / time)
+        if options.kind == "payload":
+            self._fade(np.exp(-2.0 * elapsed / options.payload_time), deviation)
+        else:
+            kept[:k] = np.exp(-elapsed / options.change_time)
         kept[friction] = np.exp(-elapsed / options.friction_time)
         self.state *= kept
         self.covariance *= np.outer(kept, kept)
@@ -103,6 +111,13 @@ class LoadFilter:
         step[k + 5 + m : k + 5 + 2 * m] = self._displacement**2 * np.minimum(1.0, np.abs(change) / self._largest)
         step[friction] = (1.0 - kept[friction] ** 2) * (options.cable_friction * tension) ** 2
         self.covariance[np.diag_indices(len(step))] += step
+
+    def _fade(self, kept: float, deviation: float) -> None:
+        """Keep a share of the information P^-1 - 1 / deviation^2 on the load."""
+        if deviation > 0.0:
+            covariance = self.load_covariance
+            faded = kept * np.eye(self._k) + (1.0 - kept) / deviation**2 * covariance
+            self.covariance[: self._k, : self._k] = np.linalg.solve(faded, covariance)
 
     def take_tip(
         self, residual: np.ndarray, robot: HeldRobot, direction: np.ndarray, carried: np.ndarray, moved: np.ndarray

@@ -39,7 +39,6 @@ _TOPICS = {"tip": "measured/tip", "tensions": "measured/tension"}
 # Outliers in a row: then it is the load that has changed. A tracker has fewer samples, and its spikes are single ones.
 _OUTLIERS = {"tip": 3, "tensions": 6}
 _REACH = 1.5  # lengths of the robot from its base: a tip that is measured beyond is none, however far the body stretches
-_CONSTANT = 1e5  # s: a payload changes at once or not at all
 
 
 class LoadObserver:
@@ -128,7 +127,7 @@ class LoadObserver:
         if self._predictions.add(prediction):  # a replay has restarted
             self._seen.clear()
         if self._scale and not self._released and prediction.stamp >= self._zero_until:
-            self._filter.set_load(np.zeros(self._numbers), self._scale**2 * np.eye(self._numbers))
+            self._filter.open_load(self._scale)
             self._filter.learning, self._released = False, True
             self._before.clear()
 
@@ -300,13 +299,13 @@ class LoadObserver:
         return self._released and newest is not None and newest.anchored
 
     def _diffuse(self, then: Prediction, pull: np.ndarray) -> None:
-        """Let the filter forget with the time and the change of tensions since the last measurement. pull (m,): tensions, N."""
+        """Let the filter forget with the time and the change of tensions since the newest measurement. pull (m,): tensions, N."""
         assert self._filter is not None
         if self._last_change is not None:
             before, tension = self._last_change
-            time = _CONSTANT if self.options.kind == "payload" else self.options.change_time
-            deviation = self._scale if self._released else 0.0
-            self._filter.diffuse(max(0.0, then.stamp - before), deviation, time, pull, then.tension - tension)
+            if then.stamp > before:  # a tip arrives later than tensions that were measured after it
+                self._filter.diffuse(then.stamp - before, self._scale if self._released else 0.0, pull, then.tension - tension)
             if then.anchored and self._released:  # nothing else is known than what the anchored model needs to be where it is
                 self._filter.set_load(then.carried, self._scale**2 * np.eye(self._numbers))
-        self._last_change = then.stamp, then.tension
+        if self._last_change is None or then.stamp > self._last_change[0]:
+            self._last_change = then.stamp, then.tension

@@ -60,6 +60,14 @@ class LoadEstimationOptions:
         description="time in which a force may change unnoticed by as much as the cables can hold; faster changes show in the"
         " sensors, and the estimate begins again",
     )
+    payload_time: float = parameter(
+        60.0,
+        unit="s",
+        minimum=0.01,
+        maximum=1e5,
+        description="time in which what was measured of a payload loses its weight; a payload that changes by more than friction"
+        " hides shows in the sensors, and the estimate begins again",
+    )
     zero_time: float = parameter(
         2.0, unit="s", minimum=0.1, maximum=600.0, description="duration of ~/zero_load, in which the robot carries no load"
     )
