@@ -35,7 +35,7 @@ def free_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
 
 
 def true_fall(job: tuple[Setup, float, float, float, int]) -> Measured:
-    """Return the true tip of a fall, by which a model is evaluated, and the gravity that the filter finds; job: see `free_fall`."""
+    """Return the true tip of a fall, by which a model is evaluated, and the gravity from the IMU; job: see `free_fall`."""
     setup, inclination, roll, duration, trial = job
     base = base_orientation(np.radians(inclination), np.radians(roll))
     tips, directions = zip(
