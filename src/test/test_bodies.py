@@ -15,6 +15,7 @@ from gravcomp.full_model import mesh_choice, mesh_error, mesh_loads
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.mesh_choice import chosen_mesh
 from gravcomp.full_model.mesh_error import error_of_mesh
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.modes import natural_frequencies
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
@@ -446,10 +447,27 @@ def test_a_shape_is_carried_to_another_mesh():
         RobotModel(Robot("r", segments=(segment,), elements=Elements(around, along, radial))).mesh
         for around, along, radial in ((6, 8, 1), (8, 13, 2))
     )
-    carried = carried_shape(field(source.straight), source, target, from_file=False)
+    carried = carried_shape(field(source.straight), source, target, by_elements=False)
     expected = field(target.straight)
     expected[target.clamped] = 0.0
     assert np.abs(carried - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_a_shape_is_carried_by_elements_where_no_equilibrium_is_found_from_that_by_sections(monkeypatch):
+    segment = Segment("a", 0.1, 12e-3, 4e-3)
+    source, target = (MeshedModel(Robot("r", segments=(segment,), elements=Elements(6, along, 1))) for along in (6, 9))
+    load = mesh_loads.MeshLoad("horizontal", np.array([-9.81, 0.0, 0.0]), np.zeros(0))
+    near = mesh_loads.shapes_under(source, [load])
+    ways = []
+
+    def carried(u, one, other, *, by_elements):
+        ways.append(by_elements)
+        shape = carried_shape(u, one, other, by_elements=by_elements)
+        return shape if by_elements else -0.9 * other.nodes  # crushed
+
+    monkeypatch.setattr(mesh_loads, "carried_shape", carried)
+    found = mesh_loads.shapes_under(target, [load], near=near, steps=0)
+    assert ways == [False, True] and found.tips == pytest.approx(near.tips, abs=2e-4)
 
 
 def test_elements_are_well_shaped_where_the_file_gives_none():

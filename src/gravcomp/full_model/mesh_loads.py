@@ -14,6 +14,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.mesh import MeshError
 
 TIMES = 4
 """How often tensions that a finer mesh does not carry are made smaller."""
@@ -28,9 +29,6 @@ _TURN = np.pi / 2
 _SAFE = 0.7
 # A load is followed in steps of its parts: the first one, the largest and the smallest.
 _STEP, _LARGEST, _SMALLEST = 0.125, 0.25, 1.0 / 256.0
-# Newton's iterations from the shape of another mesh: four to nine are usual, more where the robot is far bent; to follow the load
-# takes ten times as many.
-_NEAR_ITERATIONS = 25
 # The tension grows by this factor from step to step, from this part of its limit; by the small one where that is too much.
 _FACTOR, _SMALL_FACTOR, _FIRST = 1.35, 1.08, 0.01
 
@@ -100,13 +98,19 @@ def shapes_under(
 def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
-    u = carried_shape(shape, source.mesh, model.mesh, from_file=model.robot.body is not None)
-    solver.state = dataclasses.replace(
-        solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
-    )
-    if solver.track(load.gravity, CableInput(tension=load.tension), _NEAR_ITERATIONS).converged:
-        return True
-    solver.reset()
+    for by_elements in (True,) if model.robot.body is not None else (False, True):
+        try:
+            u = carried_shape(shape, source.mesh, model.mesh, by_elements=by_elements)
+        except MeshError:
+            if model.robot.body is not None:
+                raise
+            continue
+        solver.state = dataclasses.replace(
+            solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
+        )
+        if solver.track(load.gravity, CableInput(tension=load.tension), ITERATIONS).converged:
+            return True
+        solver.reset()
     return False
 
 
