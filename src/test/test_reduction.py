@@ -1,6 +1,7 @@
 """The reduced model: exact polynomials, agreement with the full model, trained range, and fallback to the full model."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -22,8 +23,9 @@ from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
 from gravcomp.reduction.reduced_model import project, section_changes
 from gravcomp.reduction.strain_polynomials import strain_at, strain_polynomials, tangent
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
-from gravcomp.training import TrainingOptions, build
-from gravcomp.training.samples import _released, samples
+from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training.build import trained
+from gravcomp.training.samples import Sample, _released, samples
 
 
 @pytest.fixture(scope="module")
@@ -212,6 +214,19 @@ def test_a_path_begins_with_the_equilibrium_of_the_released_robot_at_less_cost_t
     few = len(factors)
     assert searched.solve(gravity, CableInput()).converged and len(factors) - few > few
     assert begun.state.u == pytest.approx(searched.state.u, abs=1e-5 * soft.length)
+
+
+@pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 4)])
+def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_the_shapes(
+    robot, monkeypatch, law, represented, size
+):
+    model = RobotModel(robot.with_material(law=law))
+    shapes = 1e-4 * model.length * np.random.default_rng(0).normal(size=(12, 3 * model.n_free))
+    none = np.zeros(model.tendons.count)
+    found = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args: found)
+    options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
+    assert trained(model, options).basis.shape[1] == size
 
 
 @pytest.mark.parametrize(
