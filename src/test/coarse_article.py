@@ -17,6 +17,7 @@ from gravcomp.training.build import alone
 # Little training: enough to keep this robot straight.
 SMALL = BuildOptions(
     modes=30,
+    more_modes=0,
     strains=24,
     training=TrainingOptions(paths=36, steps=12, bend=0.3),
     test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),

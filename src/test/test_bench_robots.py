@@ -65,7 +65,7 @@ def test_a_robot_that_fails_is_reported_and_the_others_go_on(short, tmp_path):
 def test_what_was_measured_is_kept_until_the_robot_changes(short, tmp_path, monkeypatch):
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path / "cache"))
     count = iter(range(10))
-    monkeypatch.setattr(robots.robot_figures, "measure", lambda name, file, every: {name: next(count)})
+    monkeypatch.setattr(robots.robot_figures, "measure", lambda name, file, every, progress: {name: next(count)})
 
     def found(file, **options):
         return robots.run(silent, files=[file], figures=["build_s"], **options)["robots"]["short"]["build_s"]

@@ -15,6 +15,7 @@ from gravcomp.full_model import mesh_choice, mesh_error, mesh_loads
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.mesh_choice import chosen_mesh
 from gravcomp.full_model.mesh_error import error_of_mesh
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.modes import natural_frequencies
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
@@ -397,6 +398,45 @@ def test_the_error_of_a_mesh_ends_with_an_answer_or_a_reason(monkeypatch):
     assert solver.tried <= 40
 
 
+def lost_when_horizontal(calls):
+    """Return a `shapes_under` that finds the weight's shape on the first mesh only, and writes unknowns and steps to `calls`."""
+
+    def found(model, loads, near=None, steps=None):
+        calls.append((model.pattern.n, steps))
+        rest = np.zeros_like(model.mesh.nodes)
+        first = model.pattern.n == calls[0][0]
+        return mesh_loads.LoadedShapes(model, tuple(rest if first or load.tension.any() else None for load in loads))
+
+    return found
+
+
+def test_a_load_that_the_finer_mesh_does_not_carry_is_sought_by_way_of_meshes_between_and_then_given_up(monkeypatch):
+    robot = Robot("tube", segments=(Segment("a", 0.05, 8e-3, 3e-3),), elements=Elements(around=6, along=5))
+    calls, stages = [], []
+    monkeypatch.setattr(mesh_error, "shapes_under", lost_when_horizontal(calls))
+    monkeypatch.setattr(mesh_error, "_MOST_TO_FOLLOW", 7e9)  # 35 steps on the first of the meshes between
+    with pytest.raises(MeshError, match="the finer mesh finds no equilibrium under the load 'horizontal'"):
+        error_of_mesh(robot, stages.append)
+    unknowns, steps = zip(*calls)
+    assert len(calls) == 5 and unknowns[0] < unknowns[2] < unknowns[3] < unknowns[1] == unknowns[4]  # less tension is no help
+    assert steps[1] == 0 and 40 > steps[2] > steps[3] > steps[4] > 0  # the larger a mesh, the fewer
+    assert stages[-1].startswith("load 'horizontal', ") and len(stages) == 4
+
+
+def test_the_tension_is_not_made_smaller_for_another_load_without_equilibrium(monkeypatch):
+    cable = Cable("c", 0.0, 3e-3, segment="a")
+    robot = Robot("tube", segments=(Segment("a", 0.05, 8e-3, 3e-3),), cables=(cable,), elements=Elements(around=6, along=5))
+    loads = [mesh_loads.MeshLoad("horizontal", np.array([-9.81, 0.0, 0.0]), np.zeros(1))]
+    loads.append(mesh_loads.MeshLoad("bent", np.zeros(3), np.ones(1)))
+    calls = []
+    monkeypatch.setattr(mesh_choice, "mesh_loads", lambda model: loads)
+    monkeypatch.setattr(mesh_choice, "shapes_under", lost_when_horizontal(calls))
+    tips = mesh_choice._Tips(robot, robot.elements)
+    change = tips.change(robot.elements, dataclasses.replace(robot.elements, along=7))
+    assert np.isnan(change[0]).all() and change[1] == pytest.approx(np.zeros(3), abs=1e-9)
+    assert len(calls) == 2  # each mesh once
+
+
 def test_a_shape_is_carried_to_another_mesh():
     def field(place):
         x, y, z = place.T
@@ -407,10 +447,27 @@ def test_a_shape_is_carried_to_another_mesh():
         RobotModel(Robot("r", segments=(segment,), elements=Elements(around, along, radial))).mesh
         for around, along, radial in ((6, 8, 1), (8, 13, 2))
     )
-    carried = carried_shape(field(source.straight), source, target, from_file=False)
+    carried = carried_shape(field(source.straight), source, target, by_elements=False)
     expected = field(target.straight)
     expected[target.clamped] = 0.0
     assert np.abs(carried - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_a_shape_is_carried_by_elements_where_no_equilibrium_is_found_from_that_by_sections(monkeypatch):
+    segment = Segment("a", 0.1, 12e-3, 4e-3)
+    source, target = (MeshedModel(Robot("r", segments=(segment,), elements=Elements(6, along, 1))) for along in (6, 9))
+    load = mesh_loads.MeshLoad("horizontal", np.array([-9.81, 0.0, 0.0]), np.zeros(0))
+    near = mesh_loads.shapes_under(source, [load])
+    ways = []
+
+    def carried(u, one, other, *, by_elements):
+        ways.append(by_elements)
+        shape = carried_shape(u, one, other, by_elements=by_elements)
+        return shape if by_elements else -0.9 * other.nodes  # crushed
+
+    monkeypatch.setattr(mesh_loads, "carried_shape", carried)
+    found = mesh_loads.shapes_under(target, [load], near=near, steps=0)
+    assert ways == [False, True] and found.tips == pytest.approx(near.tips, abs=2e-4)
 
 
 def test_elements_are_well_shaped_where_the_file_gives_none():

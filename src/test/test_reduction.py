@@ -1,14 +1,18 @@
 """The reduced model: exact polynomials, agreement with the full model, trained range, and fallback to the full model."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
 from coarse_article import SMALL, built_once, cache_of_the_run, coarse
 
 from gravcomp.bench.contact_scenes import scene_of
-from gravcomp.description import Fibres, PronyTerm
+from gravcomp.description import Cable, Elements, Fibres, Material, PronyTerm, Robot, Segment
+from gravcomp.full_model.cable_input import CableInput
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.inverse import InverseController, straight_target
+from gravcomp.mechanics.block_matrix import BlockMatrix
 from gravcomp.mesh import MeshError, tube_mesh
 from gravcomp.reduction import ReducedServing, load, path_of, why_not
 from gravcomp.reduction.basis import energy_basis
@@ -19,7 +23,9 @@ from gravcomp.reduction.reduced_cables import add_stiffness, tendons_at
 from gravcomp.reduction.reduced_model import project, section_changes
 from gravcomp.reduction.strain_polynomials import strain_at, strain_polynomials, tangent
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
-from gravcomp.training import build
+from gravcomp.training import BuildOptions, TrainingOptions, build
+from gravcomp.training.build import trained
+from gravcomp.training.samples import Sample, _released, samples
 
 
 @pytest.fixture(scope="module")
@@ -183,6 +189,44 @@ def test_a_robot_of_linear_tetrahedra_is_refused_with_the_reason(robot, cache):
     assert "corotational" in why_not(linear)
     with pytest.raises(MeshError, match="full model is used"):
         build(linear, SMALL)
+
+
+@pytest.fixture(scope="module")
+def soft():
+    """The model of a short thick arm of very soft silicone, which loses its equilibrium on many paths."""
+    silicone = Material(youngs_modulus=0.15e6, poissons_ratio=0.49, density=1070.0)
+    cables = tuple(Cable(f"c{i}", i * 2.0 * np.pi / 3.0, 7e-3, segment="arm") for i in range(3))
+    arm = Segment("arm", 0.12, 20e-3, 8e-3, material=silicone)
+    return RobotModel(Robot("soft", segments=(arm,), cables=cables, elements=Elements(around=6, along=6)))
+
+
+def test_the_training_takes_commands_back_where_a_soft_robot_loses_its_equilibrium(soft):
+    found = samples(soft, TrainingOptions(paths=1, steps=12, seed=3))
+    assert len(found) >= 10  # 2 when the loss of the equilibrium is not said to the controller
+
+
+def test_a_path_begins_with_the_equilibrium_of_the_released_robot_at_less_cost_than_a_search(soft, monkeypatch):
+    gravity = 2.0 * 9.81 * np.array([0.17, 0.0, -0.98])  # nearly upright: the tip sinks to the side
+    factors, factor = [], BlockMatrix.factor
+    monkeypatch.setattr(BlockMatrix, "factor", lambda matrix: factors.append(None) or factor(matrix))
+    begun, searched = StaticSolver(soft), StaticSolver(soft)
+    assert _released(begun, gravity)
+    few = len(factors)
+    assert searched.solve(gravity, CableInput()).converged and len(factors) - few > few
+    assert begun.state.u == pytest.approx(searched.state.u, abs=1e-5 * soft.length)
+
+
+@pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 4)])
+def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_the_shapes(
+    robot, monkeypatch, law, represented, size
+):
+    model = RobotModel(robot.with_material(law=law))
+    shapes = 1e-4 * model.length * np.random.default_rng(0).normal(size=(12, 3 * model.n_free))
+    none = np.zeros(model.tendons.count)
+    found = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args: found)
+    options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
+    assert trained(model, options).basis.shape[1] == size
 
 
 @pytest.mark.parametrize(

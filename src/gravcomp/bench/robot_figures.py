@@ -1,6 +1,7 @@
 """Figures of one robot's model, as described in its file."""
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,8 @@ OF_THE_MESH = ("mesh_error_pct", "rest_error_pct")
 """Those that no load on the machine changes, and that need no reduced model."""
 
 
-def measure(name: str, file: str, every: int = 1) -> dict[str, Any]:
-    """Return one of `FIGURES`, and what else the same computation gives.
+def measure(name: str, file: str, every: int = 1, progress: Callable[[str], None] = lambda stage: None) -> dict[str, Any]:
+    """Return one of `FIGURES`, and what else the same computation gives. progress: called with what is computed.
 
     `mesh_error_pct`: distance of the tips, worst of the loads of `full_model.mesh_loads`, in percent of the length;
     `rest_error_pct`: distance of the tip from where it is described, in percent; `build_s`: CPU time from the file to the
@@ -34,13 +35,13 @@ def measure(name: str, file: str, every: int = 1) -> dict[str, Any]:
     """
     if name == "build_s":
         begin = time.process_time()
-        build(RobotModel(load_robot_file(file).robot))
+        build(RobotModel(load_robot_file(file).robot), progress=lambda stage, share: progress(f"{stage}, {100 * share:.0f} %"))
         return {name: round(time.process_time() - begin, 1)}
     model = RobotModel(load_robot_file(file).robot)
     if name == "mesh_error_pct":
         elements = model.robot.elements
         described = {} if elements is None else {"elements": [elements.around, elements.along, elements.radial]}
-        return {name: round(100.0 * error_of_mesh(model.robot), 4)} | described
+        return {name: round(100.0 * error_of_mesh(model.robot, progress), 4)} | described
     if name == "rest_error_pct":
         shape = Simulator(model, reduced=False).solve(np.zeros(3))
         described = model.mesh.axis.points(np.array([[0.0, 0.0, model.length]]))[0]
@@ -48,7 +49,7 @@ def measure(name: str, file: str, every: int = 1) -> dict[str, Any]:
     if load(model) is None:
         build(model)
     # One slow path would hide the other figure, so both come from the same run.
-    figures = reduced_figures(model, lambda stage: None, every)
+    figures = reduced_figures(model, progress, every)
     return {
         "reduced_step_ms": figures["reduced_step_ms"]["median"],
         "reduced_error_pct": round(0.1 * figures["reduced_error_mm"] / model.length, 5),

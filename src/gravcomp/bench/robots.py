@@ -85,11 +85,12 @@ def _of(file: str, wanted: Sequence[str], progress: Progress, every: int, again:
         for name in wanted:
             if measured[name] is not None:  # the same computation as that of another figure gave it
                 continue
-            progress(f"{robot.name}: {robot_figures.FIGURES[name]}")
+            what = f"{robot.name}: {robot_figures.FIGURES[name]}"
+            progress(what)
 
-            def outcome(name: str = name) -> dict[str, Any]:
+            def outcome(name: str = name, what: str = what) -> dict[str, Any]:
                 with _cache(folder):
-                    return _outcome(name, file, every)
+                    return _outcome(name, file, every, lambda stage: progress(f"{what}, {stage}"))
 
             body = Path(robot.body.file).read_bytes() if robot.body is not None else b""
             found = measured_before(place_of(robot, body, name, every), outcome, again=again)
@@ -101,10 +102,10 @@ def _of(file: str, wanted: Sequence[str], progress: Progress, every: int, again:
     return robot.name, measured | ({"errors": errors} if errors else {})
 
 
-def _outcome(name: str, file: str, every: int) -> dict[str, Any]:
+def _outcome(name: str, file: str, every: int, progress: Progress) -> dict[str, Any]:
     """Return the figure, or why it could not be measured, as `error`."""
     try:
-        return robot_figures.measure(name, file, every)
+        return robot_figures.measure(name, file, every, progress)
     except (ConfigError, MeshError, ArithmeticError, ValueError) as error:
         return {"error": str(error)}
 

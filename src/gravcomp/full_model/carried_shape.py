@@ -1,9 +1,11 @@
 """A deformed shape on one mesh of a robot, carried to another mesh of the same robot.
 
-In a body from a file, nodes move with the elements in which they lie. In a robot of segments, in every cross-section between
-two layers the displacements are fitted by polynomials of second degree in the place in the section, which contain its motion as
-a rigid body, its bending and its contraction across. Their coefficients are interpolated along the robot. The result is no
-equilibrium, but so near to one that Newton's method needs only a few steps from there.
+By sections: in every cross-section between two layers the displacements are fitted by polynomials of second degree in the place
+in the section, which contain its motion as a rigid body, its bending and its contraction across. Their coefficients are
+interpolated along the robot. It takes little time, and suits robots of segments. By elements: nodes move with the elements in
+which they lie. That suits every body, and shapes bent so far that sections warp: of an arm that its weight bends by more than a
+right angle, Newton's method finds no equilibrium from the first, and needs four steps from the second. Neither result is an
+equilibrium.
 """
 
 import numpy as np
@@ -16,16 +18,16 @@ _DEGREE = 2
 _UNDETERMINED = 1e-9
 
 
-def carried_shape(u: np.ndarray, source: Mesh, target: Mesh, *, from_file: bool) -> np.ndarray:
+def carried_shape(u: np.ndarray, source: Mesh, target: Mesh, *, by_elements: bool) -> np.ndarray:
     """Return displacements (n, 3) in m of the target mesh, from those of the source (m, 3). Both are of the same body.
 
-    from_file: whether the body is from a file.
+    by_elements: the way; by sections only where the source consists of layers.
 
-    Raises MeshError if a node of a body from a file lies outside the other mesh.
+    Raises MeshError, by elements, if a node of the target lies outside the other mesh.
     """
     from scipy.interpolate import CubicSpline
 
-    if from_file:
+    if by_elements:
         place = embed(source, target.nodes)
         moved: np.ndarray = np.einsum("nc,nci->ni", place.weights, u[place.nodes])
         moved[target.clamped] = 0.0

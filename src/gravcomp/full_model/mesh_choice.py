@@ -232,8 +232,9 @@ class _Tips:
         """Return the change of the tips (l, 3) from one mesh to another, over the length."""
         for _ in range(TIMES):
             change = (self._tips(other, one) - self._tips(one)) / self._robot.length
-            if not np.isnan(change).any():
-                break
+            lost = np.isnan(change).any(axis=1)
+            if not any(load.tension.any() for load, without in zip(self._loads, lost) if without):
+                break  # less tension does not help
             self._known.clear()
             self._loads = less_tension(self._loads)
         return change

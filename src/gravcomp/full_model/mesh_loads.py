@@ -14,18 +14,21 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.carried_shape import carried_shape
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.mesh import MeshError
 
 TIMES = 4
 """How often tensions that a finer mesh does not carry are made smaller."""
+
+ITERATIONS, MOST_STEPS = 10, 40
+"""Newton's iterations of a step of a load that is followed, and the most steps, with those that fail."""
 
 _LESS = 0.7
 _GRAVITY = 9.81
 _TURN = np.pi / 2
 # The part of the last tension with an equilibrium that is used, and the steps in which a load is searched for.
 _SAFE = 0.7
-# A load is followed in steps of its parts: the first one, the largest and the smallest; Newton's iterations of each, and the
-# most steps, with those that fail.
-_STEP, _LARGEST, _SMALLEST, _ITERATIONS, _MOST_STEPS = 0.125, 0.25, 1.0 / 256.0, 10, 40
+# A load is followed in steps of its parts: the first one, the largest and the smallest.
+_STEP, _LARGEST, _SMALLEST = 0.125, 0.25, 1.0 / 256.0
 # The tension grows by this factor from step to step, from this part of its limit; by the small one where that is too much.
 _FACTOR, _SMALL_FACTOR, _FIRST = 1.35, 1.08, 0.01
 
@@ -73,44 +76,51 @@ class LoadedShapes:
         return tips
 
 
-def shapes_under(model: MeshedModel, loads: list[MeshLoad], near: LoadedShapes | None = None) -> LoadedShapes:
+def shapes_under(
+    model: MeshedModel, loads: list[MeshLoad], near: LoadedShapes | None = None, steps: int = MOST_STEPS
+) -> LoadedShapes:
     """Return the shapes under the loads.
 
     near: the shapes of another mesh of the same robot under the same loads. Newton's method starts from them; only where that
-    fails, the load is followed from the straight robot.
+    fails, the load is followed from the straight robot. steps: the most of them in which a load is followed, each of up to
+    `ITERATIONS` factors of the tangent.
     """
     solver = StaticSolver(model)
     shapes: list[np.ndarray | None] = []
     for index, load in enumerate(loads):
         solver.reset()
         known = near.shapes[index] if near else None
-        if (near is not None and known is not None and _from_near(solver, load, near.model, known)) or _follow(solver, load):
-            shapes.append(solver.state.u)
-        else:
-            shapes.append(None)
+        found = near is not None and known is not None and _from_near(solver, load, near.model, known)
+        shapes.append(solver.state.u if found or _follow(solver, load, steps) else None)
     return LoadedShapes(model, tuple(shapes))
 
 
 def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
-    u = carried_shape(shape, source.mesh, model.mesh, from_file=model.robot.body is not None)
-    solver.state = dataclasses.replace(
-        solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
-    )
-    if solver.track(load.gravity, CableInput(tension=load.tension), _ITERATIONS).converged:
-        return True
-    solver.reset()
+    for by_elements in (True,) if model.robot.body is not None else (False, True):
+        try:
+            u = carried_shape(shape, source.mesh, model.mesh, by_elements=by_elements)
+        except MeshError:
+            if model.robot.body is not None:
+                raise
+            continue
+        solver.state = dataclasses.replace(
+            solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
+        )
+        if solver.track(load.gravity, CableInput(tension=load.tension), ITERATIONS).converged:
+            return True
+        solver.reset()
     return False
 
 
-def _follow(solver: StaticSolver, load: MeshLoad) -> bool:
+def _follow(solver: StaticSolver, load: MeshLoad, steps: int = MOST_STEPS) -> bool:
     """Follow the equilibrium of the straight robot up to the load; returns whether there is one within the steps allowed."""
     done, step = 0.0, _STEP
     smallest = _SMALLEST * solver.share_of_steps(load.gravity)
-    for _ in range(_MOST_STEPS):
+    for _ in range(steps):
         before, part = solver.state, min(1.0, done + step)
-        if solver.track(part * load.gravity, CableInput(tension=part * load.tension), _ITERATIONS).converged:
+        if solver.track(part * load.gravity, CableInput(tension=part * load.tension), ITERATIONS).converged:
             done, step = part, min(1.5 * step, _LARGEST)
             if done >= 1.0:
                 return True
@@ -132,7 +142,7 @@ def _bending_tension(model: MeshedModel) -> np.ndarray | None:
     tension, best, best_angle = _FIRST * limit, 0.0, 0.0
     while True:
         before = solver.state
-        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), _ITERATIONS)
+        state = solver.track(np.zeros(3), CableInput(tension=tension * unit), ITERATIONS)
         if not state.converged:
             if factor == _SMALL_FACTOR:
                 logging.getLogger(__name__).info("no equilibrium at a tension of %.3g N", tension)

@@ -39,15 +39,17 @@ _MOST = 0.95
 class BuildOptions:
     """Size of a reduction and of its training.
 
-    modes: r; loaded_modes: more of them for a robot that carries external loads; strains: number of principal strains in addition
-    to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose the
-    cubature of the law's deviation with, cubature its tolerance; from `points` up to `board_points`, for which the board has
+    modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
+    they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
+    addition to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose
+    the cubature of the law's deviation with, cubature its tolerance; from `points` up to `board_points`, for which the board has
     room, twice the tolerance is enough; represented: the training ends when the modes of earlier paths represent new ones to this
     part of the length; training and test: motions to train and to test with.
     """
 
     modes: int = 44
     loaded_modes: int = 12
+    more_modes: int = 12
     strains: int = 36
     decomposed: int = 1100
     integrated: int = 150
@@ -100,15 +102,18 @@ def trained(
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
 
+    def represent(basis: np.ndarray, some: list[Sample]) -> bool:
+        """Return whether the modes (n, r) represent the samples."""
+        shapes = _shapes(some).T
+        missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
+        apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
+        return bool(np.quantile(apart, _MOST) <= options.represented)
+
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones."""
         if len(earlier) < modes or not new:
             return False
-        basis = energy_basis(evenly(_shapes(earlier), options.decomposed), matrix.multiply, modes)
-        shapes = _shapes(new).T
-        missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
-        apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
-        return bool(np.quantile(apart, _MOST) <= options.represented)
+        return represent(energy_basis(evenly(_shapes(earlier), options.decomposed), matrix.multiply, modes), new)
 
     found = samples(model, options.training, lambda share: progress("training", share), kept, enough)
     if len(found) < modes:
@@ -119,13 +124,16 @@ def trained(
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
     basis = energy_basis(shapes, matrix.multiply, modes)
+    exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
+    if exact and not represent(basis, found):
+        basis = energy_basis(shapes, matrix.multiply, modes + options.more_modes)
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
     coordinates = _shapes(found) @ matrix.multiply(basis)
     cubature = Cubature.none()
-    if not all(LAWS[material.law].quadratic for material in model.mesh.materials):
+    if not exact:
         sections = section_changes(model, basis)[:, 0] / model.length
         shown = evenly(coordinates, options.integrated)
         cubature = choose(model.elements, basis, shown, sections, options.cubature, (options.points, options.board_points))

@@ -6,8 +6,12 @@ controller keeps the robot straight or bent in a random plane, with and without 
 tensions are those of the closed loop, including its transients. On the other paths the cables are released. A robot that carries
 external loads has one on most paths: a force and a moment in a random direction on a random section, mostly the tip's, that grow
 and fall along the path up to its `max_wrench`.
+
+A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop; a path on
+which that does not help is at its end, as a search from the straight robot takes longer than all steps of a path.
 """
 
+import itertools
 import json
 import zipfile
 from collections.abc import Callable, Iterator
@@ -17,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
-from gravcomp.full_model.shape import ShapeStatus
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import InverseController, direction_weight, rest_target
 from gravcomp.simulation.simulator import Simulator
@@ -28,6 +33,10 @@ GRAVITY = 9.81
 _TURN = np.radians(5.0)
 _INTERVAL = 0.05
 _STEPS_A_TURN = 15
+# Steps in a row without equilibrium that end a path: the controller has taken the command back twice and paid out once.
+_LOST_STEPS = 3
+# Largest turn of gravity between two equilibria on the way to the first shape of a path.
+_TURN_TO_START = np.radians(30.0)
 # Fraction of paths with released cables, and of those that keep the robot straight.
 _RELEASED, _STRAIGHT = 0.15, 0.3
 # Fraction of paths with an external load, where the robot carries any; and of these, with the load at the tip.
@@ -133,16 +142,21 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
         bend = 0.0 if kind < _RELEASED + _STRAIGHT else rng.uniform(0.0, options.bend)
         weight = rng.choice([0.0, direction_weight(model.length)])
         target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
-    simulator, controller = Simulator(model, reduced=False), InverseController(model.robot)
-    simulator.solver.extrapolates = True  # gravity turns evenly
-    gravity, displacement = size * _direction(rng), None
+    simulator, controller = Simulator(model, reduced=False, searches=False), InverseController(model.robot)
+    gravity, displacement, lost = size * _direction(rng), None, 0
     largest = _largest_load(model, rng)
+    if not _released(simulator.solver, gravity):
+        return
+    simulator.solver.extrapolates = True  # gravity turns evenly
     for step in range(options.steps):
         load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / options.steps)), 1.0)
         shape = simulator.step(gravity, displacement, wrench=wrench_of(load))
-        if shape.status == ShapeStatus.OK:
+        lost = 0 if shape.is_equilibrium else lost + 1
+        if not lost:
             unknowns = model.free(simulator.displacements).copy()
             yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction, load)
+        elif lost == _LOST_STEPS:
+            return
         if step % _STEPS_A_TURN == 0:
             axis = _direction(rng)
         gravity = _rotated(gravity, axis, _TURN)
@@ -153,7 +167,30 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
                 backbone_station=shape.backbone_station,
                 tension=shape.cable_tension,
                 interval=_INTERVAL,
+                followed=not lost,
             ).displacement
+
+
+def _released(solver: StaticSolver, gravity: np.ndarray) -> bool:
+    """Bring the straight robot, its cables released, to its equilibrium under gravity (3,); return whether there is one.
+
+    Where one search from the straight robot fails, gravity turns from the direction in which the robot hangs and stays nearly
+    straight. That takes fewer steps than loads that grow, and leads to the branch on which a robot that stands upright has sunk.
+    """
+    released = CableInput()
+    if solver.track(gravity, released).converged:
+        return True
+    solver.reset()
+    hanging = np.array([0.0, 0.0, np.linalg.norm(gravity)])
+    if not solver.track(hanging, released, iterations=15).converged:
+        return False
+    across = np.cross(hanging, gravity)
+    if not across.any():
+        across = np.array([1.0, 0.0, 0.0])
+    angle = np.arctan2(np.linalg.norm(np.cross(hanging, gravity)), hanging @ gravity)
+    parts = max(1, int(np.ceil(angle / _TURN_TO_START)))
+    directions = [_rotated(hanging, across / np.linalg.norm(across), part * angle / parts) for part in range(parts + 1)]
+    return all(solver.approach(before, after, released).converged for before, after in itertools.pairwise(directions))
 
 
 def wrench_of(load: np.ndarray) -> Wrench | None:
