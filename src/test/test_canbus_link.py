@@ -98,26 +98,24 @@ def test_filtered_frames_do_not_wake_the_process(frame_ids, kept):
 
 
 def test_a_receiver_delayed_by_0_1_s_loses_no_frame_and_has_the_right_stamps():
-    """350 frames are 0.1 s of six motors at 500 Hz and the board. A receiver without delay shows when the kernel has them."""
+    """350 frames are 0.1 s of six motors at 500 Hz and the board. A receiver without delay has the same stamps: the kernel's.
+
+    No stamp is compared with this process's clock: a busy machine stamps late, and may set its clock back.
+    """
     settings = CanInterface(channel=private_channel())
     sender, prompt, delayed = (CanLink(settings) for _ in range(3))
     links = (sender, prompt, delayed)
     for link in links:
         link.open()
-    times = []
-    for _ in range(2):
-        times.append(time.time())
+    stamps = []
+    for batch in (175, 350):
         sender.send([FRAME] * 175)
-        count = 0
-        while count < 175:
+        while len(stamps) < batch:
             frames = prompt.receive(1.0)
-            assert frames, f"{175 - count} frames do not arrive"
-            count += len(frames)
-        times.append(time.time())
+            assert frames, f"{batch - len(stamps)} frames do not arrive"
+            stamps += [frame.timestamp for frame in frames]
         time.sleep(0.1)
-    stamps = [frame.timestamp for frame in delayed.receive(0.0)]
-    assert len(stamps) == 350
-    assert times[0] <= stamps[0] <= stamps[174] <= times[1] < times[2] <= stamps[175] <= stamps[349] <= times[3]
+    assert [frame.timestamp for frame in delayed.receive(0.0)] == stamps
     for link in links:
         link.close()
 

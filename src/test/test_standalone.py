@@ -200,7 +200,7 @@ def test_a_robot_whose_parts_creep_differently_or_by_too_many_terms_is_refused_w
 )
 def test_what_the_board_does_not_know_is_refused_with_its_name(tmp_path, lines, names):
     path = tmp_path / "robot.yaml"
-    path.write_text(f"base: article\n{lines}\n")
+    path.write_text(f"base: article\n{lines}\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=f"{path}: the loop on the board does not know .*{names}"):
         LoopParameters.of(load_robot_file(str(path)))
     if "scene" in lines:
@@ -210,7 +210,9 @@ def test_what_the_board_does_not_know_is_refused_with_its_name(tmp_path, lines, 
 
 def test_a_payload_at_the_tip_is_known_to_the_board(tmp_path):
     path = tmp_path / "robot.yaml"
-    path.write_text("base: article\nrobot: {payload: {mass_g: 2.0}}\nnodes: {fem_simulator: {payload_mass_g: 2.0}}\n")
+    path.write_text(
+        "base: article\nrobot: {payload: {mass_g: 2.0}}\nnodes: {fem_simulator: {payload_mass_g: 2.0}}\n", encoding="utf-8"
+    )
     assert LoopParameters.of(load_robot_file(str(path))).robot.payload.mass == pytest.approx(0.002)
 
 
