@@ -52,13 +52,14 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
     limits, standard = robot.limits, Drive()
     tension = number(drive, "tension_limit", limits.tension_max)
     radius = capstan_radius(section, robot)
+    speed = fastest(radius, section)
     torque = MARGIN * tension * radius
     constant = max(standard.torque_constant, math.ceil(1e3 * torque / _LARGEST_CURRENT) * 1e-3)
     used = number(drive, "torque_constant", constant)
     derived = {
         "tension_limit": tension,
         "current_limit": round(min(max(torque / used, standard.current_limit), _LARGEST_CURRENT), 3),
-        "velocity_limit_mm_s": 1e3 * min(limits.displacement_rate, fastest(radius, section)),
+        "velocity_limit_mm_s": 1e3 * min(limits.displacement_rate, speed),
         "displacement_min_mm": 1e3 * limits.displacement_min,
         "displacement_max_mm": 1e3 * limits.displacement_max,
     } | drive_of(radius, drive)
@@ -69,7 +70,7 @@ def with_motors(section: dict[str, Any], robot: Robot) -> dict[str, Any]:
     found = {**section, "drive": {**derived, **drive}, "motors": motors}
     homing = section.get("homing") or {}
     if isinstance(homing, dict):
-        found["homing"] = {**homing_of(radius, used, fastest(radius, section), robot), **homing}
+        found["homing"] = {**homing_of(radius, used, speed, robot), **homing}
     if len(motors) > most and not section.get("buses"):
         count = -(-len(motors) // most)
         found["buses"] = [{"name": f"bus{k}", "channel": _channel(k)} for k in range(count)]

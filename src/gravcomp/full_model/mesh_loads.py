@@ -98,13 +98,14 @@ def shapes_under(
 def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
-    for by_elements in (True,) if model.robot.body is not None else (False, True):
+    from_file = model.robot.body is not None
+    for by_elements in (True,) if from_file else (False, True):
         try:
             u = carried_shape(shape, source.mesh, model.mesh, by_elements=by_elements)
         except MeshError:
-            if model.robot.body is not None:
+            if from_file:
                 raise
-            continue
+            return False
         solver.state = dataclasses.replace(
             solver.state, u=u, tension=load.tension.copy(), tendons=model.tendons.state(model.mesh.nodes + u)
         )
