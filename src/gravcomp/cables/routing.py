@@ -59,7 +59,7 @@ def _route(robot: Robot, mesh: Mesh, cable: Cable, guided: np.ndarray, known: di
     smooth = _smooth(points[:, 2], mesh.stations, at_disk, 1e-6 * robot.length)
     at_section = at_disk
     from_file = robot.body is not None
-    if cable.via_points is not None or from_file:
+    if cable.via_points is not None or not mesh.in_layers:
         smooth[:] = False
     if from_file or cable.via_points is None:
         at_section = np.ones(len(points), dtype=bool)

@@ -4,7 +4,7 @@ import copy
 import dataclasses
 
 from gravcomp.description import Robot
-from gravcomp.full_model.mesh_choice import with_chosen_elements
+from gravcomp.full_model.chosen_elements import with_chosen_elements
 from gravcomp.full_model.robot_model import RobotModel
 
 _VISCOUS = ("damping_time", "creep_ratio", "creep_time", "prony")

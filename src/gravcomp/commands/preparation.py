@@ -37,11 +37,12 @@ def choose_mesh(described: "Robot") -> None:
 
     A robot without a mesh is left to what needs the mesh, which reports the error.
     """
-    from gravcomp.full_model.mesh_choice import is_chosen, with_chosen_elements
+    from gravcomp.full_model.chosen_elements import is_chosen, with_chosen_elements
     from gravcomp.mesh.mesh import MeshError
 
-    if is_chosen(described):
-        return
+    with contextlib.suppress(MeshError):
+        if is_chosen(described):
+            return
     what = f"choosing the mesh of {described.name}, once for this robot (up to a minute)"
     if not output.console().is_terminal:
         output.note(what)  # there a status is not shown

@@ -6,8 +6,6 @@ from gravcomp.description.mesh_body import MeshBody
 from gravcomp.description.section_moments import SectionMoments, boundary_moments
 from gravcomp.mesh_files import MeshError
 from gravcomp.mesh_files.level_cut import level_cut
-from gravcomp.mesh_files.repair_volume import boundary_triangles
-from gravcomp.rest_axis import straightened
 
 
 def body_sections(body: MeshBody, stations: np.ndarray) -> list[SectionMoments]:
@@ -15,9 +13,7 @@ def body_sections(body: MeshBody, stations: np.ndarray) -> list[SectionMoments]:
 
     The faces of quadratic elements count as flat. Raises MeshError for a file that describes no body, or one without a section.
     """
-    placed = body.placed()
-    nodes = straightened(placed.axis, placed.nodes, placed.length) if placed.axis.bent else placed.nodes
-    surface = nodes[placed.cells if placed.kind == "tri3" else boundary_triangles(placed.cells)]
+    surface = body.placed().straight_surface()
     found = [boundary_moments(level_cut(surface, float(s))) for s in stations]
     for s, section in zip(stations, found):
         if section.area <= 0.0:

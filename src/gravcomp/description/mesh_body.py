@@ -46,12 +46,12 @@ class MeshBody:
         description="the file's z after the transform, or found from the body's shape; reversed: base and tip exchanged",
     )
     transform: Transform = parameter(default_factory=Transform, description="scale, rotation and displacement, after the axis")
-    element_size: float = parameter(
-        3.0,
+    element_size: float | None = parameter(
+        None,
         edge="mm",
         minimum=0.05,
         maximum=500.0,
-        description="edge length of the elements in a surface; distance of via points",
+        description="largest edge length of tetrahedra in a surface, and distance of a cable's via points; chosen if not given",
     )
     elements_max: int = parameter(
         20_000, minimum=1, maximum=2_000_000, description="a mesh with more elements is refused; memory grows with their number"

@@ -9,6 +9,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Sequence
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -18,10 +19,25 @@ from gravcomp.description.outline import Outline, encloses
 from gravcomp.description.section_moments import SectionMoments, section_moments
 from gravcomp.description.segment import Segment, require_room
 
+# Anything with `start` and `length` in m along the robot.
+_Placed = TypeVar("_Placed", bound="HasPlace")
+
 # A transition whose length is not given: so many times as long as the outline moves in it, at least this part of the width.
 _SLOPE, _PART = 2.0, 0.25
 # In a layer of elements in a transition the areas of outline, wall and lumens change by about this factor at most.
 _AREA_IN_LAYER = 1.5
+
+
+class HasPlace(Protocol):
+    """A part of the robot."""
+
+    @property
+    def start(self) -> float:
+        """Arc length of its base (m)."""
+
+    @property
+    def length(self) -> float:
+        """Its length (m)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,7 +88,7 @@ class Piece:
         return section_moments(*self.section(s))
 
 
-def piece_at(pieces: Sequence[Piece], s: float) -> Piece:
+def piece_at(pieces: Sequence[_Placed], s: float) -> _Placed:
     """Return the piece at the arc length s (m), the later one where two meet."""
     ends = [piece.start + piece.length for piece in pieces[:-1]]
     return pieces[bisect.bisect_right(ends, s)]

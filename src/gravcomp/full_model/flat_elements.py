@@ -10,6 +10,7 @@ import dataclasses
 import math
 
 from gravcomp.description import Elements, Robot
+from gravcomp.mesh.division import pieces_to_divide, walls
 from gravcomp.mesh.layers import layers_of
 
 _STRONGEST = 8.0
@@ -38,22 +39,19 @@ def with_grading(robot: Robot, elements: Elements) -> Elements:
 
 def _width(robot: Robot, elements: Elements) -> float:
     """Smallest width (m) of the elements across the base's section."""
-    outline = robot.segments[0].outline(0.0)
-    lumens = robot.segments[0].lumen_outlines(0.0)
-    half = min(outline.half_width, outline.half_height)
+    half, lumens = walls(robot)[0]
     if not lumens:
         return 2.0 * half / (elements.around / 4 + 2 * elements.radial)
-    inner = min(lumens[0].half_width, lumens[0].half_height)
+    inner = lumens[0]
     return min((half - inner) / elements.radial, math.pi * (half + inner) / elements.around)
 
 
 def deep_cells(robot: Robot, elements: Elements) -> bool:
     """Return whether cells through the wall around a single lumen are more than 1.4 x as deep as wide."""
-    for segment in robot.segments:
-        outline, lumens = segment.outline(0.0), segment.lumen_outlines(0.0)
+    for half, lumens in walls(robot):
         if len(lumens) != 1:
             continue
-        half, inner = min(outline.half_width, outline.half_height), min(lumens[0].half_width, lumens[0].half_height)
+        inner = lumens[0]
         if (half - inner) / elements.radial > _DEEPEST * math.pi * (half + inner) / elements.around:
             return True
     return False
@@ -61,4 +59,4 @@ def deep_cells(robot: Robot, elements: Elements) -> bool:
 
 def _first(robot: Robot, elements: Elements, grading: float) -> float:
     """Thickness (m) of the first of the layers."""
-    return float(layers_of(robot.pieces, elements.along, grading, softness=elements.softness)[0][1])
+    return float(layers_of(pieces_to_divide(robot), elements.along, grading, softness=elements.softness)[0][1])

@@ -1,4 +1,4 @@
-"""The division of segments into elements that reaches an accuracy at the least cost.
+"""The division of segments, or of a swept body from a file, into elements that reaches an accuracy at the least cost.
 
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
@@ -19,6 +19,7 @@ import json
 import logging
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,10 @@ from gravcomp.description import Elements, Material, Robot
 from gravcomp.full_model.flat_elements import deep_cells, with_grading
 from gravcomp.full_model.mesh_loads import TIMES, LoadedShapes, less_tension, mesh_loads, shapes_under
 from gravcomp.full_model.model import MeshedModel
+from gravcomp.mesh.division import divided_mesh, fewest_elements, pieces_to_divide
 from gravcomp.mesh.layers import least_layers, softest
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.refusal import is_well_shaped, well_shaped
-from gravcomp.mesh.tube import coarse_elements, tube_mesh
 from gravcomp.whole_file import write_whole
 
 ACCURACY = 1e-3
@@ -63,22 +64,13 @@ class MeshChoice:
     error: float
 
 
-def with_chosen_elements(robot: Robot) -> Robot:
-    """Return the robot with chosen elements, where it consists of segments and its file gives none. Raises MeshError."""
-    if robot.body is not None or robot.elements is not None:
-        return robot
-    return dataclasses.replace(robot, elements=chosen_mesh(robot).elements)
-
-
-def is_chosen(robot: Robot) -> bool:
-    """Return whether `with_chosen_elements` has no choice to compute: the robot has a mesh, or its choice is in the cache."""
-    return robot.body is not None or robot.elements is not None or _place_of(_rounded(robot)).exists()
-
-
 def chosen_mesh(robot: Robot) -> MeshChoice:
-    """Return the choice for a robot of segments, whatever its `elements` are. Raises MeshError if it cannot be meshed."""
+    """Return the choice for a robot of segments, or with a body that can be swept, whatever its `elements` are.
+
+    Raises MeshError if it cannot be meshed.
+    """
     rounded = _rounded(robot)
-    path = _place_of(rounded)
+    path = place_of_choice(robot)
     if path.exists():
         stored = json.loads(path.read_text(encoding="utf-8"))
         return MeshChoice(Elements(**stored["elements"]), stored["error"])
@@ -100,9 +92,18 @@ def chosen_mesh(robot: Robot) -> MeshChoice:
     return choice
 
 
-def _place_of(rounded: Robot) -> Path:
-    """The file of the choice for a robot of `_rounded` in the cache, which may not exist yet."""
-    return cache_path("mesh", content_key(_FORMAT, rounded), ".json")
+def place_of_choice(robot: Robot) -> Path:
+    """Return the file of the choice for a robot in the cache, which may not exist yet. Raises MeshError."""
+    return cache_path("mesh", content_key(_FORMAT, *described_for_mesh(_rounded(robot))), ".json")
+
+
+def described_for_mesh(robot: Robot) -> list[Any]:
+    """Return what the mesh of a robot follows from: of a body from a file the body as it is placed, not the file."""
+    if robot.body is None:
+        return [robot]
+    placed = robot.body.placed()
+    others = [robot.body.material, robot.cables, robot.limits, robot.payload, robot.loads]
+    return [*map(dataclasses.asdict, (placed.axis, others[0])), placed.nodes, placed.cells, *others[1:]]
 
 
 def _rounded(robot: Robot) -> Robot:
@@ -125,7 +126,10 @@ def _rounded(robot: Robot) -> Robot:
         for s in robot.segments
     )
     cables = tuple(c.without_line() for c in robot.cables)
-    return Robot("chosen", segments=segments, cables=cables, limits=robot.limits, payload=robot.payload, loads=robot.loads)
+    body = robot.body and dataclasses.replace(robot.body, material=material(robot.body.material))
+    return Robot(
+        "chosen", segments=segments, body=body, cables=cables, limits=robot.limits, payload=robot.payload, loads=robot.loads
+    )
 
 
 def _rounded_down(modulus: float) -> float:
@@ -208,7 +212,7 @@ class _Tips:
     def unknowns(self, elements: Elements) -> int:
         """Return the number of unknowns of a mesh."""
         if elements not in self._unknowns:
-            self._unknowns[elements] = 3 * len(tube_mesh(dataclasses.replace(self._robot, elements=elements)).nodes)
+            self._unknowns[elements] = 3 * len(divided_mesh(self._robot, elements).nodes)
         return self._unknowns[elements]
 
     def cost(self, elements: Elements) -> float:
@@ -261,9 +265,9 @@ class _Tips:
 
 def _start(robot: Robot) -> Elements:
     """Coarse numbers whose elements are well shaped."""
-    parts = least_layers(robot.pieces)
+    parts = least_layers(pieces_to_divide(robot))
     disks = any(segment.disks for segment in robot.segments)
-    around = 4 if coarse_elements(robot).around == 8 else 6
+    around = 4 if fewest_elements(robot).around == 8 else 6
     along = parts if disks else max(_START_ALONG, parts)
     # Between disks the layers are even; else they are graded towards the clamp, whose corner is singular.
     start = Elements(
@@ -288,7 +292,7 @@ def _graded(robot: Robot, elements: Elements) -> Elements:
 
 def _softness(robot: Robot) -> float:
     """The power with which layers are denser where the body is soft: none where the layers would hardly move."""
-    return _SOFTNESS if softest(robot.pieces) < _ALIKE else 0.0
+    return _SOFTNESS if softest(pieces_to_divide(robot)) < _ALIKE else 0.0
 
 
 def _not_deep(robot: Robot, elements: Elements) -> Elements:
@@ -304,7 +308,7 @@ def _finer(robot: Robot, elements: Elements, direction: str) -> Elements:
         return _with(robot, elements, "around", min(elements.around + (4 if elements.around % 4 == 0 else 2), 48))
     if direction == "radial":
         return _with(robot, elements, "radial", min(elements.radial + 1, 8))
-    parts = least_layers(robot.pieces)
+    parts = least_layers(pieces_to_divide(robot))
     disks = any(segment.disks for segment in robot.segments)
     return _with(robot, elements, "along", min(elements.along + parts if disks else math.ceil(1.4 * elements.along), 500))
 

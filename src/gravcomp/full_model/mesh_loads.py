@@ -98,12 +98,12 @@ def shapes_under(
 def _from_near(solver: StaticSolver, load: MeshLoad, source: MeshedModel, shape: np.ndarray) -> bool:
     """Search for the equilibrium near the shape (n, 3) of another mesh; returns whether there is one."""
     model = solver.model
-    from_file = model.robot.body is not None
-    for by_elements in (True,) if from_file else (False, True):
+    in_layers = source.mesh.in_layers
+    for by_elements in (False, True) if in_layers else (True,):
         try:
             u = carried_shape(shape, source.mesh, model.mesh, by_elements=by_elements)
         except MeshError:
-            if from_file:
+            if not in_layers:
                 raise
             return False
         solver.state = dataclasses.replace(

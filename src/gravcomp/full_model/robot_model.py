@@ -1,7 +1,7 @@
 """The finite-element model of a robot as it is described: where it has no `elements`, with the mesh that `mesh_choice` finds."""
 
 from gravcomp.description import Robot
-from gravcomp.full_model.mesh_choice import with_chosen_elements
+from gravcomp.full_model.chosen_elements import with_chosen_elements
 from gravcomp.full_model.model import MeshedModel
 from gravcomp.mesh import Mesh
 

@@ -1,10 +1,12 @@
 """Heights at which the layers of elements end, shorter toward the clamp, whose corner is singular, and where the body is soft."""
 
 import itertools
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
-from gravcomp.description import Piece
+from gravcomp.description import Material, SectionMoments
 from gravcomp.description.pieces import piece_at
 from gravcomp.mesh.mesh import MeshError
 
@@ -12,13 +14,36 @@ from gravcomp.mesh.mesh import MeshError
 _SAMPLES, _DENSEST = 100, 8.0
 
 
-def least_layers(pieces: list[Piece]) -> int:
+class LayeredPiece(Protocol):
+    """A part of a robot of one material that layers of elements divide, as `description.Piece` is."""
+
+    @property
+    def start(self) -> float:
+        """Arc length of its base (m)."""
+
+    @property
+    def length(self) -> float:
+        """Its length (m)."""
+
+    @property
+    def material(self) -> Material:
+        """Its material."""
+
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """Arc lengths (m) from its base, its ends not among them, where layers must end."""
+
+    def moments(self, s: float) -> SectionMoments:
+        """Return area, centroid and second moments of the section at the arc length s (m) of the robot."""
+
+
+def least_layers(pieces: Sequence[LayeredPiece]) -> int:
     """Return the number of parts, each a layer or more, into which the ends of the pieces and their marks divide the robot."""
     return sum(len(piece.marks) + 1 for piece in pieces)
 
 
 def layers_of(
-    pieces: list[Piece], along: int, grading: float, first: float | None = None, softness: float = 0.0
+    pieces: Sequence[LayeredPiece], along: int, grading: float, first: float | None = None, softness: float = 0.0
 ) -> tuple[np.ndarray, list[int]]:
     """Return heights (along + 1,) in m in geometric progression, and the piece of each layer.
 
@@ -63,13 +88,13 @@ def _growing(first: float, length: float, along: int) -> np.ndarray:
     return np.concatenate([growing, np.full(along - count, rest)])
 
 
-def softest(pieces: list[Piece]) -> float:
+def softest(pieces: Sequence[LayeredPiece]) -> float:
     """Return the smallest stiffness in bending of a section over the largest."""
     stiffness = _stiffness(pieces, _places(pieces))
     return float(stiffness.min() / stiffness.max())
 
 
-def _denser_where_soft(pieces: list[Piece], softness: float) -> tuple[np.ndarray, np.ndarray]:
+def _denser_where_soft(pieces: Sequence[LayeredPiece], softness: float) -> tuple[np.ndarray, np.ndarray]:
     """The heights (s + 1,) in m as even layers have them, and where they go so that layers are denser where a section is soft."""
     heights = _places(pieces)
     stiffness = _stiffness(pieces, heights)
@@ -78,12 +103,12 @@ def _denser_where_soft(pieces: list[Piece], softness: float) -> tuple[np.ndarray
     return reached / reached[-1] * heights[-1], heights
 
 
-def _places(pieces: list[Piece]) -> np.ndarray:
+def _places(pieces: Sequence[LayeredPiece]) -> np.ndarray:
     """Evenly spaced heights (s + 1,) in m between which the stiffness is asked for."""
     return np.linspace(0.0, pieces[-1].start + pieces[-1].length, _SAMPLES + 1)
 
 
-def _stiffness(pieces: list[Piece], heights: np.ndarray) -> np.ndarray:
+def _stiffness(pieces: Sequence[LayeredPiece], heights: np.ndarray) -> np.ndarray:
     """The mean stiffness in bending (s,) in N m^2 half way between the heights (s + 1,) in m."""
     found = []
     for height in 0.5 * (heights[1:] + heights[:-1]):

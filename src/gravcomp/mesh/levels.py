@@ -8,7 +8,10 @@ import dataclasses
 from collections.abc import Sequence
 
 from gravcomp.description import BlendedOutline, Outline, Piece
+from gravcomp.mesh.measured_outline import MeasuredOutline
 from gravcomp.mesh.mesh import MeshError
+
+Curve = Outline | BlendedOutline | MeasuredOutline
 
 _SAME = 1e-9  # m
 
@@ -20,7 +23,7 @@ class Levels:
     spans: for every piece its innermost and outermost level; the innermost is -1 for a solid piece, which reaches to the axis.
     """
 
-    curves: Sequence[Sequence[Outline | BlendedOutline | None]]
+    curves: Sequence[Sequence[Curve | None]]
     spans: list[tuple[int, int]]
 
     @property

@@ -1,12 +1,12 @@
-"""Meshes of segments whose elements are too distorted to trust are refused, with numbers of elements that work."""
+"""Meshes from numbers of elements whose elements are too distorted to trust are refused, with numbers of elements that work."""
 
 import dataclasses
 import itertools
 
 from gravcomp.description import Elements, Robot
+from gravcomp.mesh.division import divided_mesh
 from gravcomp.mesh.mesh import Mesh, MeshError
 from gravcomp.mesh.quality import mesh_quality
-from gravcomp.mesh.tube import tube_mesh
 
 _LEAST_RATIO = 0.2
 
@@ -41,7 +41,7 @@ def well_shaped(robot: Robot, elements: Elements) -> Elements | None:
 
 def is_well_shaped(robot: Robot, elements: Elements) -> bool:
     """Return whether the mesh of the robot with these elements is not refused."""
-    return mesh_quality(tube_mesh(dataclasses.replace(robot, elements=elements))).jacobian_ratio >= _LEAST_RATIO
+    return mesh_quality(divided_mesh(robot, elements)).jacobian_ratio >= _LEAST_RATIO
 
 
 def _text(elements: Elements) -> str:

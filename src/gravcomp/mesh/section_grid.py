@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from gravcomp.description import BlendedOutline, Outline
-from gravcomp.mesh.levels import Levels
+from gravcomp.mesh.levels import Curve, Levels
+from gravcomp.mesh.measured_outline import MeasuredOutline
 from gravcomp.mesh.mesh import MeshError
 
 # Above this ratio of radii the rings of a wall are divided evenly, below it in geometric progression.
@@ -50,7 +51,7 @@ def section_grid(levels: Levels, around: int, radial: int, equal_stiffness: bool
         )
     angle = np.pi * np.arange(2 * around) / around + (math.pi / 4 if cornered else 0.0)
     if equal_stiffness:
-        levels = Levels([[outline and _stood_out(outline, around) for outline in row] for row in levels.curves], levels.spans)
+        levels = Levels([[outline and _stood_out(outline, angle) for outline in row] for row in levels.curves], levels.spans)
     planes = [_curves_in_plane(levels, plane, angle, radial, around) for plane in range(len(levels.curves[0]))]
     boundary = np.array(planes)  # (planes, rings + 1, 2 around, 2)
     rings = boundary.shape[1] - 1
@@ -78,11 +79,13 @@ def _present(levels: Levels, interval: np.ndarray) -> np.ndarray:
     return (interval > low) & (interval <= high)
 
 
-def _stood_out(outline: Outline | BlendedOutline, around: int) -> Outline | BlendedOutline:
-    """An ellipse so much larger that its facets enclose the second moment of area of the ellipse."""
+def _stood_out(outline: Curve, angle: np.ndarray) -> Curve:
+    """A curve so much larger that its facets, with nodes at the parameters `angle`, enclose its second moment of area."""
+    if isinstance(outline, MeasuredOutline):
+        return outline.stood_out(angle)
     if not isinstance(outline, Outline) or outline.shape != "ellipse":
         return outline
-    h = math.pi / around
+    h = 2.0 * math.pi / len(angle)
     t, weight = np.polynomial.legendre.leggauss(8)
     # The parabola through the points of the unit circle at -h, 0 and h, and the polar moment of area of its sector.
     x, y = 1.0 + (math.cos(h) - 1.0) * t**2, math.sin(h) * t
@@ -120,12 +123,15 @@ def _shares(levels: Levels, level: int, plane: int, radial: int) -> np.ndarray:
     return (ratio**even - 1.0) / (ratio - 1.0)
 
 
-def _core_boundary(outline: Outline | BlendedOutline, angle: np.ndarray, across: int, radial: int) -> np.ndarray:
+def _core_boundary(outline: Curve, angle: np.ndarray, across: int, radial: int) -> np.ndarray:
     """Return the sides (angles, 2) of the core, inside the innermost level; its cells are about as wide as those around it."""
     part = across / (across + radial)
     middle = np.array([outline.x, outline.y])
-    shrunk = 1.0 if outline.shape == "rectangle" else math.sqrt(0.5)
-    square = Outline("rectangle", shrunk * outline.half_width, shrunk * outline.half_height).boundary(angle)
+    if isinstance(outline, MeasuredOutline):
+        square = outline.square(angle)
+    else:
+        shrunk = 1.0 if outline.shape == "rectangle" else math.sqrt(0.5)
+        square = Outline("rectangle", shrunk * outline.half_width, shrunk * outline.half_height).boundary(angle)
     curve = outline.boundary(angle) - middle
     return middle + part * ((1.0 - BULGE) * square + BULGE * curve)
 

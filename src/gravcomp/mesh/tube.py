@@ -4,15 +4,12 @@ A division of the cross-section (`section_division`) is swept along the axis in 
 hexahedra, or six tetrahedra each (Kuhn's division). The robot is meshed straight and then laid along its axis at rest.
 """
 
-import itertools
-
 import numpy as np
 
 from gravcomp.description import Elements, Robot
-from gravcomp.mesh.elements import is_hexahedron, reference_nodes
+from gravcomp.mesh.layered_cells import halved, layered_cells
 from gravcomp.mesh.layers import layers_of, least_layers
 from gravcomp.mesh.mesh import Mesh
-from gravcomp.mesh.quadratic import TET_EDGES
 from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.mesh.section_division import divided_sections
 
@@ -31,24 +28,13 @@ def tube_mesh(
         pieces, along or elements.along, elements.grading, elements.first_layer, elements.softness
     )
 
-    numbers, region = [], []
-    # Nodes of an element in (radial, around, along) half steps of its cell.
-    patterns = [np.rint(reference_nodes(kind) + 1).astype(int)] if is_hexahedron(kind) else _kuhn(quadratic=kind == "tet10")
-    levels_high = 2 * len(heights) - 1
-    for pattern in patterns:
-        for layer, piece in enumerate(piece_of_layer):
-            cells = grid.cells[grid.present[piece]]
-            planar = cells[:, pattern[:, 0], pattern[:, 1]]
-            numbers.append(planar * levels_high + 2 * layer + pattern[:, 2])
-            region.append(np.full(len(planar), piece))
-    used, elements_of = np.unique(np.concatenate(numbers), return_inverse=True)
-    connectivity = elements_of.reshape(-1, len(patterns[0]))
-    planar, level = used // levels_high, used % levels_high
+    levels = layered_cells(kind, grid.cells, [grid.present[piece] for piece in piece_of_layer])
+    planar, level = levels.planar, levels.level
 
     # A section lies between the planes at both ends of its piece, and changes linearly from one to the other.
     ends = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
-    height = _halved(heights)
-    piece_of_level = np.repeat(piece_of_layer, 2)[np.minimum(np.arange(levels_high), levels_high - 2)]
+    height = halved(heights)
+    piece_of_level = np.repeat(piece_of_layer, 2)[np.minimum(np.arange(len(height)), len(height) - 2)]
     part = (height - ends[piece_of_level]) / np.diff(ends)[piece_of_level]
     base, part = piece_of_level[level], part[level][:, None]
     low_place, high_place = grid.place[base, planar], grid.place[base + 1, planar]
@@ -58,8 +44,8 @@ def tube_mesh(
     materials = tuple(piece.material for piece in pieces)
     axis = rest_axis(robot)
     return Mesh(
-        kind, axis.points(straight), connectivity, np.concatenate(region), materials, robot.length, height, axis,
-        straight if axis.bent else None,
+        kind, axis.points(straight), levels.elements, np.array(piece_of_layer)[levels.layer], materials, robot.length, height, axis,
+        straight if axis.bent else None, in_layers=True,
     )  # fmt: skip
 
 
@@ -68,22 +54,3 @@ def coarse_elements(robot: Robot) -> Elements:
     several = any(len(piece.lumens) > 1 for piece in robot.pieces)
     cornered = not several and any(not piece.lumens or piece.outer[0].shape == "rectangle" for piece in robot.pieces)
     return Elements(around=8 if cornered else 6, along=max(10, least_layers(robot.pieces)))
-
-
-def _halved(values: np.ndarray) -> np.ndarray:
-    """The values and the means between them."""
-    return np.interp(np.arange(2 * len(values) - 1) / 2.0, np.arange(len(values)), values)
-
-
-def _kuhn(quadratic: bool) -> list[np.ndarray]:
-    """The six tetrahedra of a cell: one for each order of walking its edges from the first corner to the opposite one."""
-    tets = []
-    for order in itertools.permutations(range(3)):
-        corners = [np.zeros(3, dtype=int)]
-        for axis in order:
-            corners.append(corners[-1] + 2 * np.eye(3, dtype=int)[axis])
-        if np.linalg.det(np.array(corners[1:]) - corners[0]) < 0:
-            corners[1], corners[2] = corners[2], corners[1]
-        mids = [(corners[a] + corners[b]) // 2 for a, b in TET_EDGES] if quadratic else []
-        tets.append(np.array(corners + mids))
-    return tets

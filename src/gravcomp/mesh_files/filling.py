@@ -38,7 +38,7 @@ def filled(
     volume = enclosed_volume(nodes, triangles)
     expected = volume / (element_size**3 / (6.0 * np.sqrt(2.0)))
     if expected > 2.0 * elements_max:
-        fits = (volume * 6.0 * np.sqrt(2.0) / elements_max) ** (1 / 3)
+        fits = size_of_elements(volume, elements_max)
         raise MeshError(
             f"{name}: about {expected:.2g} elements of this size fill the body; body.elements_max allows {elements_max}:"
             f" use element_size_mm: {1e3 * fits:.2g} or more, or raise elements_max (memory grows with it)"
@@ -58,6 +58,11 @@ def filled(
             " raise element_size_mm or elements_max (memory grows with it)"
         )
     return found
+
+
+def size_of_elements(volume: float, count: int) -> float:
+    """Return the edge length (m) of regular tetrahedra of which `count` have the volume (m^3)."""
+    return float((volume * 6.0 * np.sqrt(2.0) / count) ** (1 / 3))
 
 
 def shapes(nodes: np.ndarray, elements: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from gravcomp.mesh_files.orientation import automatic_frame
 from gravcomp.mesh_files.repair_surface import repaired_surface
 from gravcomp.mesh_files.repair_volume import boundary_triangles, repaired_volume
 from gravcomp.mesh_files.units import unit_of
-from gravcomp.rest_axis import STRAIGHT, RestAxis
+from gravcomp.rest_axis import STRAIGHT, RestAxis, straightened
 
 # Of the length: how far a node may lie from the plane of the base or of the end face to be put onto it.
 _PLANE = 1e-4
@@ -40,7 +40,7 @@ class Placement:
     elements_max: int = 20_000
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class PlacedBody:
     """A surface (kind tri3, facing outward) or a volume (tet4, tet10, hex20) in soft_base.
 
@@ -56,6 +56,11 @@ class PlacedBody:
     unit: float
     unit_reason: str
     notes: tuple[str, ...]
+
+    def straight_surface(self) -> np.ndarray:
+        """Return the triangles (t, 3, 3) around the straightened body, facing outward; faces of quadratic elements count as flat."""
+        nodes = straightened(self.axis, self.nodes, self.length) if self.axis.bent else self.nodes
+        return nodes[self.cells if self.kind == "tri3" else boundary_triangles(self.cells)]
 
 
 def placed_body(path: str | Path, placement: Placement) -> PlacedBody:

@@ -21,7 +21,7 @@ from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config.declaration import parameter_of
 from gravcomp.description import Robot
-from gravcomp.full_model.mesh_choice import with_chosen_elements
+from gravcomp.full_model.chosen_elements import with_chosen_elements
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.holding import Case, target_of
 from gravcomp.virtual.body import build_rod

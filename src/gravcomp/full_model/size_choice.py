@@ -1,0 +1,72 @@
+"""The size of the tetrahedra in a surface with which the tip is accurate enough.
+
+The error of a mesh is estimated from one shape (`recovered_strain`). That of quadratic tetrahedra with one pressure each falls
+with the square of their size, by which the next size is found. The size in the robot's file, if any, is the first and the
+largest one. The choice is kept in the cache, by content.
+"""
+
+import dataclasses
+import json
+import logging
+from pathlib import Path
+
+from gravcomp.cache import cache_path, content_key
+from gravcomp.description import MeshBody, Robot
+from gravcomp.full_model.mesh_choice import ACCURACY, described_for_mesh
+from gravcomp.full_model.model import MeshedModel
+from gravcomp.full_model.recovered_strain import estimated_error
+from gravcomp.mesh.body import first_size
+from gravcomp.mesh.mesh import MeshError
+from gravcomp.whole_file import write_whole
+
+_FORMAT = 1  # part of the key; to be raised when the choice changes
+_USED, _TIMES = 0.8, 4
+# From one size to the next: the estimate of a coarse mesh is not relied on further.
+_LEAST, _MOST = 0.4, 0.85
+
+
+def with_chosen_size(robot: Robot) -> Robot:
+    """Return the robot, whose body is a surface, with a size of elements. Raises MeshError if it cannot be filled."""
+    body = robot.body
+    assert body is not None
+    path = place_of_choice(robot)
+    if path.exists():
+        return _with(robot, body, json.loads(path.read_text(encoding="utf-8"))["element_size"])
+    size = body.element_size or first_size(body)
+    sizes: dict[float, float] = {}
+    for _ in range(_TIMES):
+        try:
+            estimate = estimated_error(MeshedModel(_with(robot, body, size)))
+        except MeshError:
+            if not sizes:
+                raise
+            break
+        if estimate is None:
+            break
+        sizes[size] = estimate.error
+        if estimate.error <= _USED * ACCURACY:
+            break
+        size *= min(_MOST, max(_LEAST, (0.9 * _USED * ACCURACY / estimate.error) ** 0.5))
+    best = min(sizes, key=sizes.__getitem__, default=size)
+    if not sizes or sizes[best] > ACCURACY:
+        logging.getLogger(__name__).warning(
+            "the tetrahedra chosen for '%s', of %.3g mm, leave an estimated error of %s; wanted: %g %% of the length",
+            robot.name,
+            1e3 * best,
+            f"{100 * sizes[best]:.2g} %" if sizes else "a size that is not known",
+            100 * ACCURACY,
+        )
+    write_whole(path, json.dumps({"element_size": best, "error": sizes.get(best)}))
+    return _with(robot, body, best)
+
+
+def place_of_choice(robot: Robot) -> Path:
+    """Return the file of the choice for a robot in the cache, which may not exist yet. Raises MeshError."""
+    body = robot.body
+    assert body is not None
+    content = [*described_for_mesh(robot), body.element_size, body.elements_max]
+    return cache_path("mesh", content_key("size", _FORMAT, *content), ".json")
+
+
+def _with(robot: Robot, body: MeshBody, size: float) -> Robot:
+    return dataclasses.replace(robot, body=dataclasses.replace(body, element_size=size))
