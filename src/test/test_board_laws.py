@@ -9,6 +9,7 @@ import pytest
 from gravcomp.firmware import model_blob
 from gravcomp.firmware.host_library import load
 from gravcomp.firmware.model_blob import SETTINGS, law_constants
+from gravcomp.firmware.model_settings import BRANCHES_MAX, CABLES_MAX
 from gravcomp.firmware.sources import STANDALONE, firmware_folder
 from gravcomp.materials.laws import LAWS
 from gravcomp.reduction.law_deviation import LawDeviation, add_deviation_stiffness, deviating_stress, deviation_at
@@ -81,5 +82,6 @@ def test_blob_and_build_count_on_the_room_that_the_firmware_has():
     header = (firmware_folder() / STANDALONE / "model.h").read_text(encoding="utf-8")
     room = {name: int(number) for name, number in re.findall(r"#define GC_(\w+_MAX) (\d+)u", header)}
     assert BuildOptions().board_points == room["LAW_POINTS_MAX"]
-    for name in ("MODES_MAX", "STRAINS_MAX", "PIECES_MAX", "POINTS_MAX", "LAW_POINTS_MAX", "BRANCHES_MAX"):
+    for name in ("MODES_MAX", "STRAINS_MAX", "PIECES_MAX", "POINTS_MAX", "LAW_POINTS_MAX"):
         assert getattr(model_blob, name) == room[name], name
+    assert (CABLES_MAX, BRANCHES_MAX) == (room["CABLES_MAX"], room["BRANCHES_MAX"])

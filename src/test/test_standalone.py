@@ -11,6 +11,7 @@ from coarse_article import built_once, cache_of_the_run, coarse
 from gravcomp.closed_loop import loop as loop_module
 from gravcomp.closed_loop.loop import ClosedLoop
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.commands.__main__ import main
 from gravcomp.config import ConfigError
 from gravcomp.description import PronyTerm, load_robot_file
 from gravcomp.external_loads.base_turn import BaseTurn
@@ -20,7 +21,7 @@ from gravcomp.firmware.host_library import load as library
 from gravcomp.firmware.image import build_image
 from gravcomp.firmware.loop_on_host import LOADING_STEPS, run_on_host, turning_gravity
 from gravcomp.firmware.model_fit import LONGEST_MS, SLOT_BYTES, error_of_loop, fit
-from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, settings
+from gravcomp.firmware.model_settings import BRANCHES_MAX, CABLES_MAX, SAMPLE_PERIOD, LoopParameters, settings
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.orientation import GravityEstimator
 from gravcomp.orientation import quaternion as quat
@@ -137,7 +138,7 @@ def changed(blob: bytes, at: int, value: int) -> bytes:
         (lambda b: changed(b, 44, model_blob.PIECES_MAX + 1), "pieces of cables"),
         (lambda b: changed(b, 52, model_blob.POINTS_MAX + 1), "points"),
         (lambda b: changed(b, 56, model_blob.LAW_POINTS_MAX + 1), "points"),
-        (lambda b: changed(b, 60, model_blob.BRANCHES_MAX + 1), "branches"),
+        (lambda b: changed(b, 60, BRANCHES_MAX + 1), "branches"),
         (lambda b: changed(b, 8, len(b) - 4), "size"),
         (lambda b: b[:200] + bytes([b[200] ^ 1]) + b[201:], "CRC"),
         (lambda b: changed(b, 16, 0), "another robot"),
@@ -181,6 +182,12 @@ def test_a_robot_whose_parts_creep_differently_or_by_too_many_terms_is_refused_w
     creeping = parameters.robot.with_material(prony=terms)
     with pytest.raises(ConfigError, match="has 5 terms in prony; the firmware has room for 4"):
         fit(RobotModel(creeping), built[1], dataclasses.replace(parameters, robot=creeping))
+
+
+def test_a_robot_with_too_many_cables_is_refused_before_its_reduced_model_is_built(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("gravcomp.commands.model.build.prepare", None)
+    assert main(["firmware", "model", "three_segment", "--output", str(tmp_path)]) == 2
+    assert "has 9 cables; the bus of the board has room for 8 motors" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

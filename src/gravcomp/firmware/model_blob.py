@@ -19,7 +19,7 @@ from gravcomp.reduction.strain_polynomials import StrainPolynomials
 MAGIC, VERSION = b"GCMB", 3
 TILE = 4
 SETTINGS = 77  # floats of gc_settings
-MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX, BRANCHES_MAX = 48, 96, 512, 64, 128, 4
+MODES_MAX, STRAINS_MAX, PIECES_MAX, POINTS_MAX, LAW_POINTS_MAX = 48, 96, 512, 64, 128
 LAW_FLOATS, BRANCH_FLOATS = 6, 3
 _HEADER = struct.Struct("<4sIII16s8I")
 _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinates; more is another kind of basis

@@ -11,7 +11,6 @@ from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware.cycles import CLOCK_HZ
 from gravcomp.firmware.loop_on_host import LOADING_STEPS, HostRun, run_on_host, turning_gravity
 from gravcomp.firmware.model_blob import (
-    BRANCHES_MAX,
     LAW_POINTS_MAX,
     MODES_MAX,
     PIECES_MAX,
@@ -23,7 +22,7 @@ from gravcomp.firmware.model_blob import (
     pack,
     truncated,
 )  # fmt: skip
-from gravcomp.firmware.model_settings import CABLES_MAX, SAMPLE_PERIOD, LoopParameters, least_tensions, settings
+from gravcomp.firmware.model_settings import SAMPLE_PERIOD, LoopParameters, least_tensions, settings
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel
@@ -74,7 +73,7 @@ def fit(model: RobotModel, reduction: Reduction, parameters: LoopParameters, joy
     joystick_bend: rad at full deflection of the joystick. Raises ConfigError, with the number, for a robot that does not fit.
     """
     whole = reduction.reduced_model(model)
-    _check(model, whole, parameters)
+    _check(whole, parameters)
     turn = BaseTurn(model, parameters.turn)
     run = run_on_host(model, parameters, turning_gravity(np.radians(90.0), 0, 200), rise=True)
     best: Fit | None = None
@@ -148,24 +147,14 @@ def _share_cost(modes: int) -> int:
     return 81 * modes + 9 * modes * (modes + 1) // 2 + _LAW_STIFFNESS
 
 
-def _check(model: RobotModel, whole: ReducedModel, parameters: LoopParameters) -> None:
+def _check(whole: ReducedModel, parameters: LoopParameters) -> None:
     """Raise ConfigError for a robot that the loop on the board does not model, whatever the basis."""
-    source, points, cables = parameters.source, len(whole.deviation.weight), len(whole.cables.rest_length)
+    parameters.refuse_too_large()
+    source, points = parameters.source, len(whole.deviation.weight)
     if points > LAW_POINTS_MAX:
         raise ConfigError(
             f"{source}: the material's law needs {points} points of the body; the firmware has room for {LAW_POINTS_MAX}"
         )
-    branches = {material.branches for material in model.mesh.materials}
-    if len(branches) > 1:
-        raise ConfigError(
-            f"{source}: has {len(branches)} materials that creep differently; the reduced model, and the board, have one"
-        )
-    if len(_branches(model)) > BRANCHES_MAX:
-        raise ConfigError(
-            f"{source}: a material has {len(_branches(model))} terms in prony; the firmware has room for {BRANCHES_MAX}"
-        )
-    if cables > min(CABLES_MAX, 8):
-        raise ConfigError(f"{source}: has {cables} cables; the bus of the board has room for 8 motors")
     if len(whole.section_rest) - 1 > POINTS_MAX:
         raise ConfigError(
             f"{source}: has {len(whole.section_rest) - 1} points of the backbone; the firmware has room for {POINTS_MAX}"

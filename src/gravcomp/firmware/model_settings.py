@@ -21,6 +21,9 @@ from gravcomp.scene.scene import Scene
 SAMPLE_PERIOD = 0.01  # s, of the board's IMU
 CABLES_MAX = 9
 """Room for cables in the firmware (GC_CABLES_MAX)."""
+BRANCHES_MAX = 4
+"""Room for terms of creep in the firmware (GC_BRANCHES_MAX)."""
+_MOTORS_MAX = 8  # a C610's number is 1 to 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +49,23 @@ class LoopParameters:
         simulator = section(FemSimulatorParameters, "fem_simulator")
         parameters = cls(file.source, file.robot, estimator, controller, file.hardware, simulator.turn)
         parameters.refuse_unknown(file.scene, file.zones, simulator)
+        parameters.refuse_too_large()
         return parameters
+
+    def refuse_too_large(self) -> None:
+        """Raise ConfigError, with the number, for what is seen in the description: to build the reduced model takes minutes."""
+        cables = len(self.robot.cables)
+        if cables > min(CABLES_MAX, _MOTORS_MAX):
+            raise ConfigError(f"{self.source}: has {cables} cables; the bus of the board has room for {_MOTORS_MAX} motors")
+        materials = [piece.material for piece in self.robot.pieces] or self.robot.materials
+        branches = {material.branches for material in materials}
+        if len(branches) > 1:
+            raise ConfigError(
+                f"{self.source}: has {len(branches)} materials that creep differently; the reduced model, and the board, have one"
+            )
+        terms = max(map(len, branches))
+        if terms > BRANCHES_MAX:
+            raise ConfigError(f"{self.source}: a material has {terms} terms in prony; the firmware has room for {BRANCHES_MAX}")
 
     def refuse_unknown(self, scene: Scene | None, zones: Scene | None, simulator: FemSimulatorParameters) -> None:
         """Raise ConfigError for what the loop on the board does not know, and would move the robot against.
