@@ -84,4 +84,4 @@ def test_blob_and_build_count_on_the_room_that_the_firmware_has():
     assert BuildOptions().board_points == room["LAW_POINTS_MAX"]
     for name in ("MODES_MAX", "STRAINS_MAX", "PIECES_MAX", "POINTS_MAX", "LAW_POINTS_MAX"):
         assert getattr(model_blob, name) == room[name], name
-    assert (CABLES_MAX, BRANCHES_MAX) == (room["CABLES_MAX"], room["BRANCHES_MAX"])
+    assert (room["CABLES_MAX"], room["BRANCHES_MAX"]) == (CABLES_MAX, BRANCHES_MAX)

@@ -13,7 +13,7 @@ def body_sections(body: MeshBody, stations: np.ndarray) -> list[SectionMoments]:
 
     The faces of quadratic elements count as flat. Raises MeshError for a file that describes no body, or one without a section.
     """
-    surface = body.placed().straight_surface()
+    surface = body.placed().straight_surface
     found = [boundary_moments(level_cut(surface, float(s))) for s in stations]
     for s, section in zip(stations, found):
         if section.area <= 0.0:

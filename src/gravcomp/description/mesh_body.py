@@ -56,6 +56,7 @@ class MeshBody:
     elements_max: int = parameter(
         20_000, minimum=1, maximum=2_000_000, description="a mesh with more elements is refused; memory grows with their number"
     )
+    remesh: bool = parameter(False, description="make elements anew inside the surface of a file that has elements")
     material: Material = parameter(default_factory=Material, description="material of the body")
 
     @property
@@ -65,8 +66,9 @@ class MeshBody:
         return Placement(self.axis, self.file_unit, self.length, put.scale, put.rotate, put.move, self.elements_max)
 
     def placed(self) -> PlacedBody:
-        """Return the body in soft_base, read when it is asked for first. Raises MeshError."""
-        return placed_body(self.file, self.placement)
+        """Return the body in soft_base, read when it is asked for first; to be meshed again, its surface. Raises MeshError."""
+        placed = placed_body(self.file, self.placement)
+        return placed.without_elements if self.remesh else placed
 
     @property
     def full_length(self) -> float:

@@ -22,7 +22,7 @@ from gravcomp.firmware.model_blob import (
     pack,
     truncated,
 )  # fmt: skip
-from gravcomp.firmware.model_settings import SAMPLE_PERIOD, LoopParameters, least_tensions, settings
+from gravcomp.firmware.model_settings import BRANCHES_MAX, SAMPLE_PERIOD, LoopParameters, least_tensions, settings
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.robot_model import RobotModel

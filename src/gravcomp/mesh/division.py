@@ -46,9 +46,7 @@ def walls(robot: Robot) -> list[tuple[float, list[float]]]:
     if robot.body is not None:
         *lumens, outline = swept_sections(robot.body).curves(0.0)
         return [(_half(outline), [_half(lumen) for lumen in lumens])]
-    return [
-        (_half(segment.outline(0.0)), [_half(lumen) for lumen in segment.lumen_outlines(0.0)]) for segment in robot.segments
-    ]
+    return [(_half(segment.outline(0.0)), [_half(lumen) for lumen in segment.lumen_outlines(0.0)]) for segment in robot.segments]
 
 
 def _half(curve: Curve) -> float:

@@ -39,9 +39,7 @@ def layered_cells(kind: str, cells: np.ndarray, present: Sequence[np.ndarray]) -
             numbers.append(planar * levels_high + 2 * layer + pattern[:, 2])
             layer_of.append(np.full(len(planar), layer))
     used, elements = np.unique(np.concatenate(numbers), return_inverse=True)
-    return LayeredCells(
-        elements.reshape(-1, len(patterns[0])), np.concatenate(layer_of), used // levels_high, used % levels_high
-    )
+    return LayeredCells(elements.reshape(-1, len(patterns[0])), np.concatenate(layer_of), used // levels_high, used % levels_high)
 
 
 def halved(values: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ class Mesh:
 
     kind: one of `elements.KINDS`, the nodes of an element ordered as in VTK; nodes (n, 3) in m; elements (k, c) indices;
     region (k,): index into `materials`; length: rest length in m along the axis; stations (s,): heights in m, from 0 to length,
-    at which cables are guided; axis: the axis at rest; straight_nodes (n, 3): see `straight`, None for a straight axis; in_layers:
-    all nodes lie at the stations, two of them to a layer of elements and one more.
+    at which cables are guided; axis: the axis at rest; straight_nodes (n, 3): see `straight`, None for a straight axis;
+    in_layers: all nodes lie at the stations, two of them to a layer of elements and one more.
     """
 
     kind: str

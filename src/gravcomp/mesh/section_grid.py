@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from gravcomp.description import BlendedOutline, Outline
+from gravcomp.description import Outline
 from gravcomp.mesh.levels import Curve, Levels
 from gravcomp.mesh.measured_outline import MeasuredOutline
 from gravcomp.mesh.mesh import MeshError

@@ -1,12 +1,13 @@
 """Whether the section of a body from a file can be swept along its axis, and its curves at every height.
 
-A body is swept where every section has one outline, and the same one lumen or none, whose rays from its middle meet it once, and
-where the section changes gradually. Sharp edges along the body, up to four, get nodes of their own.
+A body is swept where every section has one outline and the same one lumen or none, whose rays from their middles meet them once,
+and where the section changes gradually, also at its ends. Sharp edges along the body, up to four, get nodes of their own.
 """
 
 import dataclasses
 import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,7 +21,9 @@ from gravcomp.mesh_files.placing import PlacedBody
 
 _SAMPLES = 65
 # At the ends a section is taken a part of the length inside the body: the first of these from which on the section is whole.
-_INSIDE = (1e-9, 1e-4, 1e-3, 5e-3)
+_INSIDE = (1e-9, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2)
+# How far inside the next ones are (of the length), and by how much the areas of whole sections differ from even growth.
+_FARTHER, _WHOLE = 5e-3, 1e-3
 # From one sample to the next the area changes by this factor at most.
 _STEP = 1.6
 # Corners of two sections belong together when they are this near (rad).
@@ -33,7 +36,8 @@ class SweptSections:
 
     placed: the body; material; corners: of every curve, from the innermost out, the polar angles (k,) in rad of its sharp edges
     at the base; slots: of every curve the polar angles (4,) there of the nodes at the corners of a square, None without edges;
-    ends: the arc lengths (m) next to base and tip up to which there are whole sections, which stand for those beyond.
+    ends: the arc lengths (m) next to base and tip up to which there are whole sections, which stand for those beyond; start and
+    marks: as those of a piece.
     """
 
     placed: PlacedBody
@@ -41,7 +45,7 @@ class SweptSections:
     corners: tuple[np.ndarray, ...]
     slots: tuple[np.ndarray | None, ...]
     ends: tuple[float, float]
-    start = 0.0
+    start: float = 0.0
     marks: tuple[float, ...] = ()
 
     @property
@@ -56,7 +60,7 @@ class SweptSections:
 
     def moments(self, s: float) -> SectionMoments:
         """Return area, centroid and second moments of the section at the arc length s (m)."""
-        return boundary_moments(level_cut(_surface(self.placed), self._within(s)))
+        return boundary_moments(level_cut(self.placed.straight_surface, self._within(s)))
 
     def curves(self, s: float) -> list[MeasuredOutline]:
         """Return the curves at the arc length s (m), from the innermost out, with slots where they have sharp edges.
@@ -65,7 +69,9 @@ class SweptSections:
         """
         found = _curves(self.placed, self._within(s))
         if len(found) != len(self.corners):
-            raise MeshError(f"the section at {1e3 * s:.4g} mm has {len(found) - 1} lumens, not {len(self.corners) - 1}")
+            raise MeshError(
+                f"its section at {1e3 * s:.3g} mm has {len(found) - 1} lumens, not {len(self.corners) - 1} as at the base"
+            )
         result = []
         for curve, corners, slots in zip(found, self.corners, self.slots):
             moved = _moved(curve.corners, corners, s)
@@ -82,15 +88,26 @@ class SweptSections:
 
 def swept_sections(body: MeshBody) -> SweptSections:
     """Return the sections of a body from a file. Raises MeshError, with the reason, where they cannot be swept."""
-    return dataclasses.replace(_sections(body.placed()), material=body.material)
+    found = _sections(body.placed())
+    if isinstance(found, str):
+        raise MeshError(found)
+    return dataclasses.replace(found, material=body.material)
 
 
 @functools.lru_cache(maxsize=4)
-def _sections(placed: PlacedBody) -> SweptSections:
-    """The sections, of a default material."""
+def _sections(placed: PlacedBody) -> SweptSections | str:
+    """The sections, of a default material; or why they cannot be swept."""
+    try:
+        return _checked(placed)
+    except MeshError as error:
+        return str(error)
+
+
+def _checked(placed: PlacedBody) -> SweptSections:
+    """The sections, of a default material. Raises MeshError."""
     low, high = (_whole_section(placed, tip) for tip in (False, True))
     heights = np.linspace(low, high, _SAMPLES)
-    first = _curves(placed, heights[0])
+    first = _curves(placed, low)
     corners = tuple(curve.corners for curve in first)
     if max(map(len, corners)) > 4:
         raise MeshError(f"its section has {max(map(len, corners))} sharp edges; up to 4 are swept")
@@ -106,41 +123,38 @@ def _sections(placed: PlacedBody) -> SweptSections:
 
 
 def _whole_section(placed: PlacedBody, tip: bool) -> float:
-    """The arc length (m) next to an end of the body where the section is as large as a little farther inside.
+    """The arc length (m) next to an end of the body where the section is as large as those a little farther inside let expect.
 
     The end of a body that is bent at rest, and the edge of a filleted one, are not exactly across the axis.
     """
     for inside in _INSIDE:
-        here, there = (_area(placed, (1.0 - part if tip else part) * placed.length) for part in (inside, inside + _INSIDE[-1]))
-        if here > there / _STEP:
+        parts = inside + _FARTHER * np.arange(3)
+        here, one, other = (_area(placed, part * placed.length) for part in (1.0 - parts if tip else parts))
+        if abs(here - (2.0 * one - other)) < _WHOLE * one:
             break
     return (1.0 - inside if tip else inside) * placed.length
 
 
 def _area(placed: PlacedBody, height: float) -> float:
-    return boundary_moments(level_cut(_surface(placed), height)).area
+    return boundary_moments(level_cut(placed.straight_surface, height)).area
 
 
-@functools.lru_cache(maxsize=4)
-def _surface(placed: PlacedBody) -> np.ndarray:
-    return placed.straight_surface()
-
-
-def _curves(placed: PlacedBody, height: float) -> list[MeasuredOutline]:
-    """The curves at a height (m), from the innermost out. Raises MeshError where the section is no outline with a lumen or none."""
+@functools.lru_cache(maxsize=512)
+def _curves(placed: PlacedBody, height: float) -> tuple[MeasuredOutline, ...]:
+    """The curves at a height (m), from the innermost out. Raises MeshError where they are not an outline with a lumen or none."""
     where = f"at {1e3 * height:.3g} mm"
-    contours = section_contours(_surface(placed), height)
+    contours = section_contours(placed.straight_surface, height)
     lumens = [contour[::-1] for contour in contours if enclosed_area(contour) < 0.0]
     outlines = [contour for contour in contours if enclosed_area(contour) > 0.0]
     if len(outlines) != 1 or len(lumens) > 1:
         raise MeshError(f"its section {where} has {len(outlines)} outlines and {len(lumens)} lumens; one and up to one are swept")
     try:
-        return [MeasuredOutline(contour) for contour in (*lumens, *outlines)]
+        return tuple(MeasuredOutline(contour) for contour in (*lumens, *outlines))
     except ValueError as error:
         raise MeshError(f"a curve of its section {where} is not swept: {error}") from error
 
 
-def _slots(curves: list[MeasuredOutline]) -> tuple[np.ndarray | None, ...]:
+def _slots(curves: Sequence[MeasuredOutline]) -> tuple[np.ndarray | None, ...]:
     """The polar angles (4,) in rad of every curve's corners of a square, in one order; None where no curve has sharp edges."""
     cornered = [curve for curve in curves if len(curve.corners)]
     if not cornered:
@@ -170,7 +184,9 @@ def _moved(found: np.ndarray, known: np.ndarray, s: float) -> np.ndarray:
         by = _wrapped(np.roll(found, -turn) - known)
         if (np.abs(by) < _SAME_CORNER).all():
             return by
-    raise MeshError(f"its section at {1e3 * s:.3g} mm has {len(found)} sharp edges in other places than the {len(known)} at the base")
+    raise MeshError(
+        f"its section at {1e3 * s:.3g} mm has {len(found)} sharp edges in other places than the {len(known)} at the base"
+    )
 
 
 def _wrapped(angle: np.ndarray) -> np.ndarray:

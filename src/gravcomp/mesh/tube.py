@@ -41,10 +41,11 @@ def tube_mesh(
     # In the plane itself the other end may not be known: a wall may end there.
     place = np.where(part <= 0.0, low_place, np.where(part >= 1.0, high_place, (1.0 - part) * low_place + part * high_place))
     straight = np.column_stack([place, height[level]])
+    region = np.array(piece_of_layer)[levels.layer]
     materials = tuple(piece.material for piece in pieces)
     axis = rest_axis(robot)
     return Mesh(
-        kind, axis.points(straight), levels.elements, np.array(piece_of_layer)[levels.layer], materials, robot.length, height, axis,
+        kind, axis.points(straight), levels.elements, region, materials, robot.length, height, axis,
         straight if axis.bent else None, in_layers=True,
     )  # fmt: skip
 

@@ -57,10 +57,19 @@ class PlacedBody:
     unit_reason: str
     notes: tuple[str, ...]
 
+    @functools.cached_property
     def straight_surface(self) -> np.ndarray:
-        """Return the triangles (t, 3, 3) around the straightened body, facing outward; faces of quadratic elements count as flat."""
+        """The triangles (t, 3, 3) around the straightened body, facing outward; faces of quadratic elements count as flat."""
         nodes = straightened(self.axis, self.nodes, self.length) if self.axis.bent else self.nodes
         return nodes[self.cells if self.kind == "tri3" else boundary_triangles(self.cells)]
+
+    @functools.cached_property
+    def without_elements(self) -> "PlacedBody":
+        """The surface of the body, flat between the corners of its elements."""
+        if self.kind == "tri3":
+            return self
+        used, triangles = np.unique(boundary_triangles(self.cells), return_inverse=True)
+        return dataclasses.replace(self, kind="tri3", nodes=self.nodes[used], cells=triangles.reshape(-1, 3))
 
 
 def placed_body(path: str | Path, placement: Placement) -> PlacedBody:

@@ -159,10 +159,9 @@ def _mesh_error(described: "Robot", model: "RobotModel", sag: "Shape") -> dict[s
     from gravcomp.simulation import Simulator
 
     robot = model.robot
-    if robot.body is not None:
-        return _file_error(model)
     elements = robot.elements
-    assert elements is not None  # the model's robot has its mesh chosen
+    if elements is None:  # a body from a file that is not divided along its axis
+        return _file_error(model)
     if described.elements is None:
         error = chosen_mesh(described).error
         return {
@@ -190,6 +189,7 @@ def _file_error(model: "RobotModel") -> dict[str, Any]:
 
     from gravcomp.full_model.mesh_choice import ACCURACY
     from gravcomp.full_model.recovered_strain import estimated_error
+    from gravcomp.mesh.division import why_not_swept
 
     estimate, body = estimated_error(model), model.robot.body
     assert body is not None
@@ -203,13 +203,14 @@ def _file_error(model: "RobotModel") -> dict[str, Any]:
     else:
         fitting = 1e3 * estimate.element_length * math.sqrt(ACCURACY / estimate.error)
         where = f"along the robot around z = {1e3 * estimate.place:.0f} mm"
+        reason = why_not_swept(model.robot)
         if body.placed().kind == "tri3":
-            advice = f"too coarse; use element_size_mm: {fitting:.2g}"
+            advice = f"tetrahedra fine enough, of {fitting:.2g} mm, take too long; hexahedra are not possible: {reason}"
         else:
-            advice = (
-                f"too coarse; use elements of {fitting:.2g} mm in place of {1e3 * estimate.element_length:.2g} mm {where};"
-                " hexahedra of 20 nodes are the fewest"
-            )
+            chosen = "or body.remesh: true, with which hexahedra are chosen"
+            again = chosen if reason is None else "hexahedra of 20 nodes are the fewest"
+            found = f"{fitting:.2g} mm in place of {1e3 * estimate.element_length:.2g} mm {where}"
+            advice = f"too coarse; use elements of {found}; {again}"
     return {"estimated_error_pct": 100 * estimate.error, "worst_load": estimate.load, "refinement": advice}
 
 
