@@ -47,14 +47,14 @@ def test_info_tells_masses_modes_and_reach(tmp_path, capsys):
 @pytest.mark.parametrize("command", [["info", "--no-hold"], ["solve"], ["view", "--out", "robot.png"], ["build"]])
 def test_a_mesh_that_has_to_be_chosen_is_announced(command, monkeypatch, tmp_path, capsys):
     """Without a terminal, where no status is shown; the choice takes up to 41 s."""
-    from gravcomp.full_model import mesh_choice
+    from gravcomp.full_model import chosen_elements
 
     def choice(robot):
         assert "choosing the mesh of rod" in capsys.readouterr().err
         raise ValueError("no choice in a test")
 
     monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
-    monkeypatch.setattr(mesh_choice, "chosen_mesh", choice)
+    monkeypatch.setattr(chosen_elements, "chosen_mesh", choice)
     rod = tmp_path / "rod.yaml"
     rod.write_text("robot:\n  name: rod\n  segments: [{name: a, length_mm: 150, outer_diameter_mm: 10}]\n", encoding="utf-8")
     assert main(["model", command[0], str(rod), *command[1:]]) == 2

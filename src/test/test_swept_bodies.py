@@ -120,6 +120,7 @@ def test_tetrahedra_get_smaller_until_their_estimated_error_is_small_enough(tmp_
 
     monkeypatch.setattr(size_choice, "MeshedModel", lambda robot: robot.body.element_size)
     monkeypatch.setattr(size_choice, "estimated_error", estimated)
+    monkeypatch.setattr(size_choice, "too_long", lambda size: (2e-3 / size) ** 7)
     smallest = 0.0
     chosen = with_chosen_elements(robot)
     assert chosen.elements is None and is_chosen(robot) and chosen.body.element_size == tried[-1]
@@ -127,6 +128,11 @@ def test_tetrahedra_get_smaller_until_their_estimated_error_is_small_enough(tmp_
     # Where the next size takes too long, the best one that is estimated is kept.
     smallest, coarse = 3.9e-3, dataclasses.replace(robot, cables=(Cable("c", 0.0, radius=3e-3, end=LENGTH),))
     assert with_chosen_elements(coarse).body.element_size == 4e-3 and tried[-1] < 3.9e-3
+    # Without a size in the file the first one is as small as can be estimated.
+    smallest = 0.0
+    free = dataclasses.replace(robot, body=dataclasses.replace(robot.body, element_size=None))
+    monkeypatch.setattr(size_choice, "first_size", lambda body: 1e-3)
+    assert with_chosen_elements(free).body.element_size == tried[-1] == pytest.approx(2.1e-3)
 
 
 def test_the_elements_of_a_file_are_replaced_on_request():

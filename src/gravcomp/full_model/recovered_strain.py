@@ -35,9 +35,14 @@ class MeshEstimate(NamedTuple):
     element_length: float
 
 
+def too_long(model: MeshedModel) -> float:
+    """Return how many times as long as it may a step of the model takes for its error to be estimated."""
+    return float((model.pattern.size.astype(float) ** 3).sum()) / _MOST_WORK
+
+
 def estimated_error(model: MeshedModel) -> MeshEstimate | None:
     """Return the estimate under the loads of `mesh_loads`; None where no equilibrium is found or a step takes too long."""
-    if float((model.pattern.size.astype(float) ** 3).sum()) > _MOST_WORK:
+    if too_long(model) > 1.0:
         return None
     loads = mesh_loads(model)
     found = shapes_under(model, loads)

@@ -8,21 +8,25 @@ largest one. The choice is kept in the cache, by content.
 import dataclasses
 import json
 import logging
+import math
 from pathlib import Path
 
 from gravcomp.cache import cache_path, content_key
 from gravcomp.description import MeshBody, Robot
 from gravcomp.full_model.mesh_choice import ACCURACY, described_for_mesh
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.recovered_strain import estimated_error
+from gravcomp.full_model.recovered_strain import estimated_error, too_long
 from gravcomp.mesh.body import first_size
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.whole_file import write_whole
 
 _FORMAT = 1  # part of the key; to be raised when the choice changes
-_USED, _TIMES = 0.8, 4
+_USED, _TIMES = 0.8, 6
 # From one size to the next: the estimate of a coarse mesh is not relied on further.
 _LEAST, _MOST = 0.4, 0.85
+# What a first size is multiplied by where it cannot be meshed, and a size where a step takes too long: the time of a step falls
+# with the size to the power 7 (elements with its third, time with that number to the 7/3).
+_SMALLER, _LARGER, _POWER = 0.7, 1.05, 1.0 / 7.0
 
 
 def with_chosen_size(robot: Robot) -> Robot:
@@ -34,13 +38,21 @@ def with_chosen_size(robot: Robot) -> Robot:
         return _with(robot, body, json.loads(path.read_text(encoding="utf-8"))["element_size"])
     size = body.element_size or first_size(body)
     sizes: dict[float, float] = {}
-    for _ in range(_TIMES):
+    for left in range(_TIMES, 0, -1):
         try:
-            estimate = estimated_error(MeshedModel(_with(robot, body, size)))
+            model = MeshedModel(_with(robot, body, size))
         except MeshError:
-            if not sizes:
+            if sizes:
+                break
+            if body.element_size or left == 1:
                 raise
-            break
+            size *= _SMALLER  # facets as large as these are too far from the surface
+            continue
+        affordable = _LARGER * size * too_long(model) ** _POWER
+        if too_long(model) > 1.0 and affordable < min([body.element_size or math.inf, *(_MOST * known for known in sizes)]):
+            size = affordable
+            continue
+        estimate = estimated_error(model)
         if estimate is None:
             break
         sizes[size] = estimate.error
