@@ -60,7 +60,7 @@ BODIES = {
     "rectangle with a lumen": Segment("a", LENGTH, section=Section("rectangle", 12e-3, 8e-3), lumen_diameter=3e-3),
     "flat ellipse": Segment("a", LENGTH, section=Section("ellipse", 12e-3, 6e-3)),
     "cone": Segment("a", LENGTH, 9e-3, tip_outer_diameter=4e-3),
-    "lumen beside the axis": Segment("a", LENGTH, 9e-3, lumens=(Lumen(3e-3, x=1.5e-3),)),
+    "lumen off the axis": Segment("a", LENGTH, 9e-3, lumens=(Lumen(3e-3, x=1.5e-3),)),
     "bent at rest": Segment("a", LENGTH, 9e-3, 3e-3, rest=RestShape(bend_angle=1.2, bend_plane=0.3)),
 }
 

@@ -56,7 +56,7 @@ class MeshBody:
     elements_max: int = parameter(
         20_000, minimum=1, maximum=2_000_000, description="a mesh with more elements is refused; memory grows with their number"
     )
-    remesh: bool = parameter(False, description="make elements anew inside the surface of a file that has elements")
+    remesh: bool = parameter(False, description="make new elements inside the surface of a file that has elements")
     material: Material = parameter(default_factory=Material, description="material of the body")
 
     @property

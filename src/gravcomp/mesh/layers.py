@@ -15,7 +15,7 @@ _SAMPLES, _DENSEST = 100, 8.0
 
 
 class LayeredPiece(Protocol):
-    """A part of a robot of one material that layers of elements divide, as `description.Piece` is."""
+    """A part of one material that layers of elements divide, as `description.Piece` is."""
 
     @property
     def start(self) -> float:
