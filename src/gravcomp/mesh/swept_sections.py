@@ -179,7 +179,7 @@ def _ascending(angles: np.ndarray) -> np.ndarray:
 
 
 def _moved(found: np.ndarray, known: np.ndarray, s: float) -> np.ndarray:
-    """By how much (k,) in rad the corners of a section lie away from those at the base. Raises MeshError where they are others."""
+    """By how much (k,) in rad the corners of a section are off those at the base. Raises MeshError where they are others."""
     for turn in range(max(1, len(known))) if len(found) == len(known) else ():
         by = _wrapped(np.roll(found, -turn) - known)
         if (np.abs(by) < _SAME_CORNER).all():
