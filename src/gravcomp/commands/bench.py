@@ -133,11 +133,10 @@ def run(args: argparse.Namespace) -> int:
     options = {name: getattr(args, name) for name in OPTIONS.get(args.benchmark, {})}
     options |= BRIEF[args.benchmark] if args.brief else {}
     options |= {name.lstrip("-"): getattr(args, name.lstrip("-")) for name in LISTS.get(args.benchmark, {})}
-    console = output.console()
-    with console.status(command) as status:
-        measured = module.run(lambda stage: status.update(f"{command}: {stage}"), **options)
+    with output.busy(command) as show:
+        measured = module.run(lambda stage: show(f"{command}: {stage}"), **options)
     figures = headline_figures(args.benchmark, measured)
-    console.print(_table_of_everything(command, measured))
+    output.console().print(_table_of_everything(command, measured))
     if args.write:
         figures_table.renew(Path(args.write), command, figures, typed=_typed(args, command))
     output.result(measured, figures_table.rich_table(command, figures))
