@@ -40,6 +40,15 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
 
     Raises ConfigError, MeshError.
     """
+    from gravcomp.launcher.model_builder import note_stored
+    from gravcomp.reduction import path_of
+
+    model, reduction, seconds = _built(robot, force)
+    note_stored(robot, path_of(model))
+    return model, reduction, seconds
+
+
+def _built(robot: str, force: bool) -> tuple:
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from gravcomp.commands.preparation import choose_mesh
