@@ -7,6 +7,8 @@ Marks of the tests that start a graph of nodes, which is slow where others take 
     graph    it waits for events: another such test may run next to it where there are processors for two graphs
     rates    it asserts rates or delays: no other graph runs meanwhile
 
+The mark `slow` leaves a test in src/test out of `./gravcomp test --fast`, as it is no unit test of the core (CONTRIBUTING.md).
+
 All tests with the mark `rates` run in one process, one after the other. They begin first; next to them run tests without a graph,
 those that take longest first. With fewer than four processors the tests with the mark `graph` follow in the same process. A test
 of the commands in test/ without a mark starts no graph that goes on.
@@ -16,6 +18,7 @@ import fcntl
 import os
 import sys
 import tempfile
+from importlib.util import cache_from_source
 from pathlib import Path
 
 import pytest
@@ -58,6 +61,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Declare the marks, and reserve the domain for the processes that this one starts; a domain that the user has set stays."""
     config.addinivalue_line("markers", "graph: starts nodes; may run next to another graph")
     config.addinivalue_line("markers", "rates: asserts rates or delays of a graph; no other graph runs meanwhile")
+    config.addinivalue_line("markers", "slow: no unit test of the core; left out of ./gravcomp test --fast")
     if config.pluginmanager.has_plugin("dsession"):  # the controlling process of pytest-xdist, which runs no test
         handle, name = tempfile.mkstemp(prefix="gravcomp-tests-")
         os.close(handle)
@@ -69,6 +73,33 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.update(private_domain())
     for name in _OF_A_TERMINAL:
         os.environ.pop(name, None)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection(session: pytest.Session):
+    """Collect first in one process where modules have to be rewritten, which takes twice as long as the rest.
+
+    pytest rewrites the assertions of each test module that has changed, and keeps the result; in a new clone all processes would
+    do it at the same time.
+    """
+    # Without pytest-xdist the file is that of another run, whose graphs hold it.
+    if not hasattr(session.config, "workerinput") or sys.dont_write_bytecode or not _to_rewrite(session.config):
+        return (yield)
+    with open(os.environ[_LOCK], "rb") as first:
+        fcntl.flock(first, fcntl.LOCK_EX)
+        if _to_rewrite(session.config):
+            return (yield)
+    return (yield)
+
+
+def _to_rewrite(config: pytest.Config) -> bool:
+    """Return whether there are modules in the folders of this run that pytest has not rewritten as they are."""
+    kind = f"{sys.implementation.cache_tag}-pytest-{pytest.__version__}.pyc"
+    for module in (path for folder in config.args for path in (config.invocation_params.dir / folder).glob("test_*.py")):
+        rewritten = Path(cache_from_source(str(module))).with_name(f"{module.stem}.{kind}")
+        if not rewritten.exists() or rewritten.stat().st_mtime < module.stat().st_mtime:
+            return True
+    return False
 
 
 @pytest.fixture(autouse=True)

@@ -62,9 +62,9 @@ class Shell:
             assert self.process.poll() is None and time.monotonic() < end, self.output.read_text(encoding="utf-8")
             time.sleep(0.1)
 
-    def end(self) -> tuple[int, str]:
+    def end(self, patience: float = START) -> tuple[int, str]:
         """Return exit code and output of a command that ends by itself."""
-        code = self._wait(START)
+        code = self._wait(patience)
         return code, self.output.read_text(encoding="utf-8")
 
     def ctrl_c(self) -> int:

@@ -18,6 +18,8 @@ from gravcomp.load_estimation.anchored_follower import Answer, Question
 from gravcomp.load_estimation.message_pipe import framed
 from gravcomp.simulation import RobotModel
 
+pytestmark = pytest.mark.slow
+
 ROBOT = dataclasses.replace(load_robot_file("article").robot, elements=Elements(around=4, along=4))
 QUESTION = Question(0.0, np.array([0.0, 0.0, ROBOT.length]), np.array([-9.81, 0.0, 0.0]), np.zeros(6), ())
 

@@ -188,6 +188,7 @@ def disk_cases():
         return [row for row in csv.DictReader(file) if row["model"] == "straight_between_disks"][:3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", disk_cases(), ids=lambda case: f"case {case['case']}")
 def test_a_backbone_with_disks_goes_where_others_compute(case):
     robot = disk_robot(case, along=40)

@@ -298,6 +298,7 @@ def test_a_bridge_that_is_activated_again_has_its_zeros_although_the_cables_were
     assert bench.bridge.snapshot().displacement == pytest.approx([m.displacement for m in bench.motors], abs=2e-5)
 
 
+@pytest.mark.slow
 def test_homing_finds_where_the_cables_become_taut():
     bench = Bench(motors={"taut": 0.004}).start()
     assert bench.bridge.home(bench.now)[0]

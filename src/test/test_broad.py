@@ -13,6 +13,8 @@ from gravcomp.orientation.inclination import inclination_error, inclination_rmse
 from gravcomp.recordings.imu import read_recording
 from gravcomp.recordings.imu.broad_folder import WHERE, broad_files
 
+pytestmark = pytest.mark.slow
+
 VQF_DEG = {
     "02_undisturbed_slow_rotation_B": 0.454,
     "05_undisturbed_slow_rotation_with_breaks_B": 0.381,

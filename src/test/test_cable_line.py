@@ -276,6 +276,7 @@ def held(model, virtual):
     return np.linalg.norm(loop.trace.between(loop.time - 0.3).tip_position[:, :2], axis=1).mean()
 
 
+@pytest.mark.slow
 def test_the_loop_holds_a_stiff_robot_on_soft_lines_if_they_are_described():
     """Stiffness and load are such that the lines stretch by four times the displacement that straightens the robot."""
     segment = Segment("s", 0.1, 9e-3, 3e-3, material=Material(youngs_modulus=3e6, poissons_ratio=0.45, density=1145.0))

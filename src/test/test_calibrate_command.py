@@ -16,6 +16,8 @@ from gravcomp.description import load_robot_file
 from gravcomp.trials.free_fall import free_fall
 from gravcomp.trials.known_robot import known_setup, known_windows
 
+pytestmark = pytest.mark.slow
+
 MODULUS = 0.6e6  # Pa
 LOOSE = -0.03  # m
 KEPT = ("--no-places", "--no-weight", "--no-mount", "--no-friction")

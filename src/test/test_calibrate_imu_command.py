@@ -14,6 +14,8 @@ from gravcomp.orientation import BiasTemperatureModel, GravityEstimator, estimat
 from gravcomp.orientation import quaternion as quat
 from gravcomp.recordings.imu import Recording, read_recording
 
+pytestmark = pytest.mark.slow
+
 SCALE, OFFSET = np.array([1.02, 0.99, 1.01]), np.array([0.15, -0.1, 0.2])  # m/s^2
 GYRO_OFFSET = np.radians([0.8, -0.5, 0.3])
 MOUNT = (1.7, -0.1, 3.0)  # roll, pitch, yaw of the IMU in soft_base

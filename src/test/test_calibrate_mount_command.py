@@ -12,6 +12,8 @@ from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
+pytestmark = pytest.mark.slow
+
 MOUNT = (3.1, -1.5, 0.2)  # roll, pitch, yaw of the IMU in soft_base
 URDF = """<robot name="r"><link name="world"/><link name="a"/><link name="b"/><link name="soft_base"/>
 <joint name="left_j1" type="revolute"><parent link="world"/><child link="a"/><axis xyz="0 1 0"/></joint>

@@ -70,6 +70,7 @@ def windows(setup):
     return StillWindows(found.gravity[kept], found.displacement[kept], found.tip_position[kept], found.tip_direction[kept])
 
 
+@pytest.mark.slow
 def test_a_known_robot_is_recovered_within_two_per_cent(setup, windows):
     fit = fit_statics(setup.robot, windows, groups=GROUPS)
     assert fit.parameters.youngs_modulus == pytest.approx(0.6e6, rel=0.02)

@@ -71,6 +71,7 @@ def test_every_cable_is_pulled_and_each_station_has_the_released_robot(robot, pl
         assert any(not pose.pulled for pose in plan.poses if pose.station == station)
 
 
+@pytest.mark.slow
 def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
     """A turn that takes longer than all poses may; a robot that its cables hold, but that has no equilibrium without them."""
     orientations = ORIENTATIONS[:1]

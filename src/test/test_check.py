@@ -14,6 +14,7 @@ from gravcomp.commands.check import CHECKS, installed, run_check
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS)
 def test_the_source_passes(name):
     if not installed(CHECKS[name].tool):

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -87,6 +88,17 @@ def test_what_the_terminal_cannot_show_is_replaced(monkeypatch):
     output.result({}, "gr\u00f6\u00dfe: 3 mm")
     sys.stdout.flush()
     assert shown.getvalue() == b"gr??e: 3 mm\n"
+
+
+def test_without_a_terminal_nobody_draws_progress(capsys):
+    """A thread would make the picture ten times a second, for nobody."""
+    before = threading.active_count()
+    with output.stages("first") as show, output.display() as bar, output.busy("computing") as say:
+        show("second")
+        say("more")
+        bar.update(bar.add_task("training"), completed=1.0)
+        assert threading.active_count() == before
+    assert capsys.readouterr().err == ""
 
 
 def test_quiet_keeps_errors(capsys):

@@ -212,6 +212,7 @@ def setup():
     return Setup.of(load_robot_file("article"))
 
 
+@pytest.mark.slow
 def test_the_loop_lets_the_robot_sag_and_straightens_it(setup):
     loop = ClosedLoop(setup, StaticMotion(base_orientation(0.0)))
     target = target_of(setup, Case(0.0))
@@ -227,6 +228,7 @@ def test_the_loop_lets_the_robot_sag_and_straightens_it(setup):
     assert metrics.angle_between(felt, true) < np.radians(1.0)
 
 
+@pytest.mark.slow
 def test_gravity_of_a_resting_base_is_that_of_the_loop(setup):
     """To within the noise of another stream; the bias of the accelerometer is the same, and ten times as large."""
     base = base_orientation(np.radians(45.0), np.radians(30.0))

@@ -18,6 +18,8 @@ from gravcomp.firmware.image import build_image
 from gravcomp.firmware.settings import FAULTS, REAL, STATES, keys, value_of
 from gravcomp.firmware.stack import INTERRUPT_FRAME, largest_stack
 
+pytestmark = pytest.mark.slow
+
 KINDS = {"host": HostBoard, "image": ImageBoard}
 
 

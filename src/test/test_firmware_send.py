@@ -17,6 +17,8 @@ from gravcomp.description.hardware import CanInterface
 from gravcomp.firmware import client as client_module
 from gravcomp.firmware.client import BoardClient
 
+pytestmark = pytest.mark.slow
+
 JOYSTICK, LOOP_STATUS = 0x328, 0x318
 
 

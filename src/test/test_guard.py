@@ -19,6 +19,8 @@ from gravcomp.description.hardware import CanInterface, Hardware, Motor
 from gravcomp.motors.guard_client import GuardClient, GuardError
 from gravcomp.motors.guard_protocol import ANSWER_TIMEOUT, GuardSettings
 
+pytestmark = pytest.mark.slow
+
 COUNT = 2 * 8192 - 60
 """Count of motor 1 when the bridge dies: just before the angle wraps."""
 

@@ -188,6 +188,7 @@ MICRO = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_info_prints_and_draws_the_answer(tmp_path, capsys):
     file, picture = tmp_path / "rod.yaml", tmp_path / "sphere.png"
     file.write_text(FILE.replace("LIMIT", "0.5"), encoding="utf-8")

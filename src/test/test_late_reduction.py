@@ -163,6 +163,11 @@ def test_no_builder_is_started_for_a_model_that_is_known_to_be_stored(tmp_path, 
     with model_builder.ModelBuilder(str(robot)) as builder:
         builder.start()
     assert len(started) == 3
+    os.utime(file, ns=(2, 2))
+    model_builder.note_stored(str(robot), file)  # as `gravcomp model build` does, which has found or built it
+    with model_builder.ModelBuilder(str(robot)) as builder:
+        builder.start()
+    assert len(started) == 3
 
     def full(path: Path, content: str) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))

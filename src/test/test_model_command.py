@@ -10,6 +10,8 @@ from gravcomp.commands.model.reach import reach
 from gravcomp.description import Cable, Elements, Limits, Material, RestShape, Robot, Segment
 from gravcomp.simulation import Simulator
 
+pytestmark = pytest.mark.slow
+
 
 def test_solve_prints_the_shape(capsys):
     load = ["--gravity", "0", "0", "-9.81", "--tension", "0.1", "0", "0", "0", "0", "0"]

@@ -342,6 +342,7 @@ def test_a_folder_without_measurements_is_refused(tmp_path):
         measured.run(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (measured.default_folder() / "disks").is_dir(), reason="needs the folder disks in GRAVCOMP_DATA")
 def test_robots_with_disks_go_where_others_compute():
     result = measured.run(measured.default_folder(), names=("disks",), brief=True)

@@ -13,6 +13,8 @@ from gravcomp.commands.__main__ import main
 from gravcomp.description import load_robot_file
 from gravcomp.inverse import ControllerCode, bend_target
 
+pytestmark = pytest.mark.slow
+
 LENGTH = 0.1  # m
 HORIZONTAL = np.array([-9.81, 0.0, 0.0])
 RELAXING, KEPT = int(ControllerCode.RELAXING), int(ControllerCode.OK)

@@ -29,6 +29,7 @@ def test_the_estimate_is_about_the_distance_from_a_finer_mesh():
     assert estimate.element_length == pytest.approx(0.08 / 9, rel=1e-6) and 0.0 < estimate.place < 0.08
 
 
+@pytest.mark.slow
 def test_info_says_whether_the_mesh_of_a_file_is_fine_enough_and_what_would_be():
     shipped = load_robot_file("mesh_body").robot
     good = _file_error(MeshedModel(shipped))

@@ -184,3 +184,24 @@ def test_a_disk_that_refuses_ends_a_command_with_a_sentence(capsys, monkeypatch,
 
     monkeypatch.setattr(estimate, "run", run)
     refused(capsys, "estimate TRIAL", said)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["up", "--interface", "socketcan", "--channel", "nocan7"], "socketcan nocan7 cannot be opened"),
+        (["up", "--tracker", "5"], "--tracker needs --virtual"),
+        (["arm", "--xacro", "ARM"], "has no link 'soft_base'; it has: world"),
+        (["demo", "--duration", "1"], "--duration"),
+    ],
+    ids=" ".join,
+)
+def test_what_can_be_refused_at_once_starts_no_process(words, said, tmp_path, monkeypatch, capsys):
+    def start() -> None:
+        raise AssertionError("the nodes' host is started for nothing")
+
+    arm = tmp_path / "arm.urdf.xacro"
+    arm.write_text('<robot name="arm"><link name="world"/></robot>', encoding="utf-8")
+    monkeypatch.setattr("gravcomp.launcher.host_client.NodeHost", start)
+    assert main([str(arm) if word == "ARM" else word for word in words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())

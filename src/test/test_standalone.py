@@ -29,6 +29,8 @@ from gravcomp.orientation.guard import Problem
 from gravcomp.simulation import RobotModel
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
+pytestmark = pytest.mark.slow
+
 STEPS = 120
 
 

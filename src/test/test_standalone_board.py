@@ -8,6 +8,8 @@ from gravcomp.firmware.emulator.image_board import ImageBoard
 from gravcomp.firmware.host_board import HostBoard
 from gravcomp.firmware.settings import STATES
 
+pytestmark = pytest.mark.slow
+
 MOTORS = range(1, 7)
 SETTINGS = {"wiring": 1, "motors": 0b111111, "current_limit": 1000, "travel_per_count": 1e-6}
 

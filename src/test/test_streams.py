@@ -81,6 +81,7 @@ def test_the_unit_of_rates_is_known_apart_from_their_bias_where_the_sensor_hardl
     assert finding.text.startswith(f"the gyroscope is in {unit.removeprefix('gyro_in_').replace('_s', '/s')}:")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_is_reported_and_held(name, trial, short, clean_deg):
     fault = FAULTS[name]

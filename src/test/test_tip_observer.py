@@ -321,6 +321,7 @@ def test_commands_stay_the_same_while_no_measurement_arrives(setup: Setup, monke
     assert np.abs(without.trace.command - lost.trace.command).max() < 1e-10
 
 
+@pytest.mark.slow
 def test_tracker_removes_the_error_of_a_wrong_model(setup: Setup) -> None:
     loop = held(setup, 3.5, VirtualTrackerParameters(rate=5.0))
     last = loop.trace.between(loop.time - 1.0)

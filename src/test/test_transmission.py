@@ -119,6 +119,7 @@ def test_pairs_are_released_to_their_zero_positions_and_not_homed():
     assert waiting.bridge.state is State.STOPPED and "zero: start" in waiting.bridge.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preload", [0.0, 0.3e-3])
 def test_the_loop_holds_a_robot_with_one_motor_for_two_antagonists(preload):
     """The sag lies between the planes of the two pairs, so that both motors are needed."""

@@ -63,11 +63,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the tour. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
+    if args.xacro:
+        _check_arm(Path(args.xacro))  # before the host, which would import for nothing
     # Before the imports of the command: the host imports for the nodes at the same time.
     from gravcomp.launcher.host_client import NodeHost
 
     with NodeHost() as host:
         return _run(args, host)
+
+
+def _check_arm(xacro: Path) -> None:
+    """Raise ConfigError for an arm that cannot be read, or does not carry the robot."""
+    from gravcomp.arm.chain import Chain
+    from gravcomp.arm.description import expanded
+
+    Chain(expanded(xacro), "soft_base", "world", str(xacro))
 
 
 def _run(args: argparse.Namespace, host: "NodeHost") -> int:

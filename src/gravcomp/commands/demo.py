@@ -204,7 +204,7 @@ def _prepare_alone(robot: str) -> None:
         raise ConfigError(f"{robot}: --board standalone needs motors on the board's bus; this robot has hardware.joints")
     parameters = LoopParameters.of(file)
     prepare(robot)
-    with output.console().status("choosing the modes for the board, once for this robot"):
+    with output.busy("choosing the modes for the board, once for this robot"):
         blob_for(parameters)
 
 
@@ -235,12 +235,11 @@ def _follow(
     processes: "Graph", result_file: Path, args: argparse.Namespace, pictures: "PagePictures | None" = None
 ) -> dict[str, Any]:
     """Show progress until the node `judge` has evaluated the run. Returns its last state. Raises NodeDied, TimeoutError."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-    console = output.console()
     columns = (TextColumn("{task.description:<22}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[note]}"))
     deadline = time.monotonic() + args.duration + _START_TIMEOUT
-    with Progress(*columns, console=console, transient=True) as progress:
+    with output.display(*columns) as progress:
         task = progress.add_task("starting", total=args.duration, note="")
         phase = ""
         while True:
@@ -257,7 +256,7 @@ def _follow(
                 processes.check()
             if state.get("phase") and state["phase"] != phase:
                 phase = state["phase"]
-                console.print(f"{state['elapsed']:5.1f} s  {phase}")
+                progress.console.print(f"{state['elapsed']:5.1f} s  {phase}")
             if pictures:
                 pictures.follow(state.get("elapsed", 0.0), time.monotonic())
             error = state.get("tip_error_mm")

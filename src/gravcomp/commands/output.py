@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress
 
 _LINE_PERIOD = 5.0  # s between two lines of progress
 _options = argparse.Namespace(json=False, quiet=False)
@@ -38,16 +39,36 @@ def console() -> "Console":
     return _console(sys.stderr, quiet=_options.quiet)
 
 
-@contextlib.contextmanager
-def progress(what: str) -> Iterator[Callable[[float], None]]:
-    """Show on stderr how far something is, as a bar or in lines where there is no terminal; the function receives the share."""
+def display(*columns: Any) -> "Progress":
+    """Return a display of progress on stderr in these columns of rich, by default its own; without a terminal it does nothing.
+
+    It would show nothing there, but make its picture ten times a second, which takes a twentieth of a processor.
+    """
     from rich.progress import Progress
 
     shown = console()
-    if shown.is_terminal:
-        with Progress(console=shown, transient=True) as bar:
-            task = bar.add_task(what, total=1.0)
-            yield lambda done: bar.update(task, completed=done)
+    return Progress(*columns, console=shown, transient=True, disable=not shown.is_terminal)
+
+
+@contextlib.contextmanager
+def busy(what: str) -> Iterator[Callable[[str], None]]:
+    """Show on a terminal what is being done; the function changes the text."""
+    shown = console()
+    if not shown.is_terminal:
+        yield lambda text: None
+        return
+    with shown.status(what) as status:
+        yield status.update
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Callable[[float], None]]:
+    """Show on stderr how far something is, as a bar or in lines where there is no terminal; the function receives the share."""
+    shown = display()
+    if not shown.disable:
+        with shown:
+            task = shown.add_task(what, total=1.0)
+            yield lambda done: shown.update(task, completed=done)
         return
     last = time.monotonic()
 
@@ -63,10 +84,9 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
 @contextlib.contextmanager
 def stages(first: str) -> Iterator[Callable[[str], None]]:
     """Show on stderr the present stage of something, in a line with the time that has passed; the function changes the stage."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console(), transient=True) as shown:
+    with display(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()) as shown:
         task = shown.add_task(first)
         yield lambda stage: shown.update(task, description=stage)
 

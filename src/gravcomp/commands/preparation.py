@@ -46,7 +46,7 @@ def choose_mesh(described: "Robot") -> None:
     what = f"choosing the mesh of {described.name}, once for this robot (up to a minute)"
     if not output.console().is_terminal:
         output.note(what)  # there a status is not shown
-    with output.console().status(what), contextlib.suppress(MeshError):
+    with output.busy(what), contextlib.suppress(MeshError):
         with_chosen_elements(described)
 
 
@@ -61,7 +61,7 @@ def compile_parts(parts: tuple[str, ...]) -> None:
         text = f"compiling, once for this machine (a minute or two): {what}"
         if not output.console().is_terminal:
             output.note(text)  # there a status is not shown
-        with output.console().status(text):
+        with output.busy(text):
             for part, process in zip(missing, processes):
                 _, errors = process.communicate()
                 if process.returncode:

@@ -133,10 +133,10 @@ def _whole(path: str) -> str:
 
 def _follow(processes: "Graph", replay: str, duration: float, speed: float) -> None:
     """Show progress until the replay has ended. Raises NodeDied when a node fails."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=output.console(), transient=True) as progress:
+    with output.display(*columns) as progress:
         task = progress.add_task("starting", total=duration / speed if speed else None)
         log, started = processes.processes[replay].log, None
         while processes.processes[replay].exit_code is None:

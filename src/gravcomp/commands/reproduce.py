@@ -69,8 +69,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the experiments. Returns 0: every figure with a limit reached it, 1: at least one missed it. Raises ConfigError."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.commands.model.build import prepare_model
     from gravcomp.config import ConfigError
@@ -103,16 +101,14 @@ def run(args: argparse.Namespace) -> int:
     output.note(setup.true_robot.summary())
     prepare_model(args.robot)
     results, pages = [], []
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     # Processes take longer to start than the runs of a brief experiment take.
     workers = 1 if args.brief and args.workers is None else args.workers
-    with Sweep(workers, args.dask) as sweep, Progress(*columns, console=output.console(), transient=True) as progress:
-        task = progress.add_task("starting")
+    with Sweep(workers, args.dask) as sweep, output.stages("starting") as show:
         label = ""
         context = Context(
             setup,
             sweep,
-            lambda stage: progress.update(task, description=f"{label}: {stage}"),
+            lambda stage: show(f"{label}: {stage}"),
             args.brief,
         )
         for name in names:
@@ -128,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
                 result.notes.insert(0, "Run with --brief: fewer and shorter runs than the article's experiment.")
             pages.append(write_report(result, folder))
             results.append(result)
-            progress.console.print(f"{name}: {result.seconds:.0f} s")
+            output.note(f"{name}: {result.seconds:.0f} s")
             if args.write:
                 figures_table.renew(Path(args.write), f"reproduce {name}", result.figures)
     if len(results) > 1:
@@ -138,19 +134,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _measured(args: argparse.Namespace, folder: Path) -> int:
     """Evaluate what others measured. Returns the exit code: 2 where a folder could not be used, although others were."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
     from gravcomp.experiments import measured
     from gravcomp.report import figures_table
     from gravcomp.report.page import write_report
 
     started = time.perf_counter()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=output.console(), transient=True) as progress:
-        task = progress.add_task("measured")
+    with output.stages("measured") as show:
         result = measured.run(
             Path(args.data).expanduser() if args.data else measured.default_folder(),
-            lambda stage: progress.update(task, description=stage),
+            show,
             brief=args.brief,
         )
     result.seconds = time.perf_counter() - started

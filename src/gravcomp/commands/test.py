@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.usage = "gravcomp test [--fast] [--json] [--quiet] [PATH ...] [OPTIONS OF PYTEST]"
     parser.description = "Run all tests, or those in the given paths. Further arguments are passed to pytest, e.g. -k viewer -x."
-    parser.add_argument("--fast", action="store_true", help=f"only the unit tests of the core (folder {CORE})")
+    parser.add_argument(
+        "--fast", action="store_true", help=f"only the unit tests of the core (folder {CORE}, those without the mark slow)"
+    )
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="paths in place of all tests, and options of pytest")
 
 
@@ -60,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
         # pytest-xdist 3.8 waits for ever after it has replaced a process that crashed: it then hands out tests that are done (its
         # issue 1378). Without a replacement the run ends, and names the test that crashed.
         how += ["--max-worker-restart", "0"]
+        if args.fast:
+            how += ["-m", "not slow"]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *how, *targets, *given]
     if not args.json:
         return _exit_code(subprocess.run(command, cwd=root).returncode)

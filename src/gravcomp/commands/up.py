@@ -1,6 +1,7 @@
 """`gravcomp up`: start the graph on real hardware, or as the robot file says, until Ctrl-C."""
 
 import argparse
+import socket
 import time
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from gravcomp.commands.virtual_seed import add_seed_argument, seed_of
 from gravcomp.commands.virtual_tracker import add_tracker_argument, tracker_parameters
 
 if TYPE_CHECKING:
+    from gravcomp.description import RobotFile
     from gravcomp.launcher.host_client import NodeHost
 
 
@@ -46,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the graph until Ctrl-C (exit code 130). Raises ConfigError, LaunchError, NodeDied when a node ends by itself."""
+    _check(args)  # before the host, which would import for nothing
     # Before the imports of the command: the host imports for the nodes at the same time.
     from gravcomp.launcher.host_client import NodeHost
 
@@ -53,16 +56,32 @@ def run(args: argparse.Namespace) -> int:
         return _run(args, host)
 
 
-def _run(args: argparse.Namespace, host: "NodeHost") -> int:
-    from gravcomp.canbus.device import check_device
-    from gravcomp.commands.preparation import prepare
+def _check(args: argparse.Namespace) -> None:
+    """Raise ConfigError for options that exclude each other, and for a bus among them whose device this machine lacks."""
     from gravcomp.config import ConfigError
+
+    if args.tracker and not args.virtual:
+        raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
+    if args.interface == "socketcan" and not set(args.channel.split(",")) <= {name for _, name in socket.if_nameindex()}:
+        from gravcomp.description import load_robot_file
+
+        _check_devices(load_robot_file(args.robot), args.interface, args.channel)
+
+
+def _check_devices(file: "RobotFile", interface: str, channel: str) -> None:
+    """Raise ConfigError for a device of the robot's buses that this machine lacks."""
+    from gravcomp.canbus.device import check_device
+
+    for bus in () if file.has_joints else file.hardware.on(interface, channel).all_buses:
+        check_device(bus)
+
+
+def _run(args: argparse.Namespace, host: "NodeHost") -> int:
+    from gravcomp.commands.preparation import prepare
     from gravcomp.description import load_robot_file
     from gravcomp.launcher import Graph
     from gravcomp.launcher.robot_graph import RobotGraph, private_channels
 
-    if args.tracker and not args.virtual:
-        raise ConfigError("--tracker needs --virtual: a tracker of a real robot publishes measured/tip itself")
     logs = made_logs(args.logs)
     builder = prepare(args.robot, args.virtual, seed_of(args))
     interface, channel, file = args.interface, args.channel, load_robot_file(args.robot)
@@ -74,8 +93,7 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
         virtual |= {"truth_rate": 50.0, "feedback_rate": 125}
     if interface and not args.virtual:
         file.require_motors(interface)
-    for device in () if file.has_joints else file.hardware.on(interface, channel).all_buses:
-        check_device(device)  # before the nodes, which start for seconds
+    _check_devices(file, interface, channel)  # before the nodes, which start for seconds
     graph = RobotGraph(args.robot, interface, channel, args.namespace, seed=args.seed)
     specs = graph.loop(args.virtual, args.composed)
     if args.virtual:

@@ -104,7 +104,7 @@ class Hardware:
             raise ValueError(f"joints.motors wind the cables {', '.join(wound)}; the robot has {', '.join(named)}")
         _refuse_equal_effects(self.joint_transmission)
 
-    @property
+    @functools.cached_property
     def all_buses(self) -> tuple[CanBus, ...]:
         """The buses: those with names, or the only one, whose name is empty."""
         return self.buses or (CanBus(name="", **{f.name: getattr(self.can, f.name) for f in dataclasses.fields(CanInterface)}),)

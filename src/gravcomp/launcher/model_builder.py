@@ -1,8 +1,9 @@
 """The process that builds a robot's reduced model while its nodes already run on the full model.
 
-To see that the model is stored, the process imports and meshes for a second, next to nodes that have just started. So a note in
-the cache, under a key of the robot and of this package's code, names the stored file with its time of writing (another robot
-with the same ratios of its moduli may replace it); as long as they are right, no process is started.
+To see that the model is stored, the process imports and meshes for a second, next to nodes that have just started; where these
+take the whole machine, it does not come to that before a short run ends. So a note in the cache, under a key of the robot and of
+this package's code, names the stored file with its time of writing (another robot with the same ratios of its moduli may replace
+it); as long as they are right, no process is started. The note is of the process, or of `gravcomp model build`.
 """
 
 import contextlib
@@ -57,9 +58,8 @@ class ModelBuilder:
         if self._process.poll() is None:
             self._process.terminate()
         stored, _errors = self._process.communicate()
-        if self._note is not None and self._process.returncode == 0 and stored:
-            with contextlib.suppress(OSError):  # a full disk: the next start looks again
-                write_whole(self._note, stored.strip())
+        if self._process.returncode == 0 and stored:
+            _write(self._note, stored.strip())
 
 
 def note_of(robot: str) -> Path | None:
@@ -81,6 +81,22 @@ def is_stored(note: Path | None) -> bool:
         return bool(path) and Path(path).stat().st_mtime_ns == int(written)
     except (OSError, ValueError):
         return False
+
+
+def note_stored(robot: str, path: Path) -> None:
+    """Note that the reduced model of `robot` is stored at `path`: its next graph starts no process to find that out.
+
+    Raises ConfigError.
+    """
+    note = note_of(robot)
+    with contextlib.suppress(OSError):  # somebody has just deleted the file
+        _write(note, f"{path.stat().st_mtime_ns} {path}")
+
+
+def _write(note: Path | None, text: str) -> None:
+    with contextlib.suppress(OSError):  # a full disk: the next start looks again
+        if note is not None:
+            write_whole(note, text)
 
 
 def start_builder(robot: str, output: int = subprocess.DEVNULL) -> subprocess.Popen:

@@ -40,7 +40,16 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
 
     Raises ConfigError, MeshError.
     """
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from gravcomp.launcher.model_builder import note_stored
+    from gravcomp.reduction import path_of
+
+    model, reduction, seconds = _built(robot, force)
+    note_stored(robot, path_of(model))
+    return model, reduction, seconds
+
+
+def _built(robot: str, force: bool) -> tuple:
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from gravcomp.commands.preparation import choose_mesh
     from gravcomp.description import load_robot_file
@@ -55,7 +64,7 @@ def prepare(robot: str, *, force: bool = False) -> tuple:
     if reduction is not None:
         return model, reduction, 0.0
     columns = TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=output.console(), transient=True) as progress:
+    with output.display(*columns) as progress:
         task = progress.add_task("training", total=1.0)
         with alone(model, lambda: progress.update(task, description="waiting for another build")):
             reduction = None if force else load(model)

@@ -37,12 +37,12 @@ def answer(args: argparse.Namespace, model: "RobotModel") -> "Holdability | None
     """Return the answer, with progress and a first answer on stderr; None with --no-hold and for a robot without cables."""
     if args.no_hold or not model.robot.cables:
         return None
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from gravcomp.holdability import HoldOptions, holdability
 
     columns = TextColumn("{task.description:<40}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=output.console(), transient=True) as progress:
+    with output.display(*columns) as progress:
         task = progress.add_task("can it be held: linear estimate", total=None)
 
         def advance(count: int, total: int, latest: "DirectionAnswer | None") -> None:
