@@ -7,7 +7,7 @@ again without intervention (`recovered`).
 
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from gravcomp.bench.campaign import SAFE_TIMEOUT, Campaign
 from gravcomp.bench.fault_cases import CASES, Case, send_signal
@@ -29,11 +29,10 @@ def run(
     every: int = 1,
     stops: int = _STOPS,
     pause: float = 1.0,
-    processes: Sequence[str] = NODES,
 ) -> dict:
     """Run the campaign and return its figures; the names of the keys give their units.
 
-    kills: of each of the processes; frames: hostile frames and messages; every: only every `every`-th fault; stops: calls of
+    kills: of each process; frames: hostile frames and messages; every: only every `every`-th fault; stops: calls of
     ~/stop; pause: longest pause in s around a kill, and twice as long under a fault without a safe response.
     """
     with RunningGraph({"virtual_robot": {"motion": "tremor"}}) as graph:  # keeps the motors working
@@ -42,7 +41,7 @@ def run(
         campaign = Campaign(graph, seed)
         try:
             safe, unanswered, stuck = _faults(campaign, CASES[::every], stops, pause, progress)
-            recovery, kill_safe, late = _kills(campaign, [name for name in processes for _ in range(kills)], pause, progress)
+            recovery, kill_safe, late = _kills(campaign, kills, pause, progress)
             hostile = _hostile(campaign, frames, progress)
             if not campaign.make_active():
                 stuck.append("hostile frames and messages")
@@ -64,7 +63,7 @@ def run(
         "not_recovered": len(recovery) - sum(t <= _RECOVERY for t in times),
         "recovery_s": {
             "median": sorted(times)[len(times) // 2] if times else None,
-            "worst": {name: max((t for n, t in recovery if n == name and t is not None), default=None) for name in processes},
+            "worst": {name: max((t for n, t in recovery if n == name and t is not None), default=None) for name in NODES},
         },
         "late_recoveries": late,
         "safe_ms": {**safe, **kill_safe},
@@ -116,13 +115,14 @@ def _stop(campaign: Campaign) -> float | None:
 
 
 def _kills(
-    campaign: Campaign, order: list[str], pause: float, progress: Callable[[str], None]
+    campaign: Campaign, kills: int, pause: float, progress: Callable[[str], None]
 ) -> tuple[list[tuple[str, float | None]], dict, list[str]]:
-    """Kill and restart the processes, shuffled.
+    """Kill and restart processes at random.
 
     Return process and recovery time (s) of each kill, None without recovery; the worst time to the response (ms) by process; the
     messages of the bridge at recoveries that took too long.
     """
+    order = [name for name in NODES for _ in range(kills)]
     campaign.random.shuffle(order)
     recovery: list[tuple[str, float | None]] = []
     worst: dict[str, float] = {}

@@ -86,14 +86,7 @@ BRIEF: dict[str, dict[str, Any]] = {
     "board": {"frames": 10_000, "every": 5},
     "graph": {"listen": 1.0, "cost": 1.0, "warm_up": 0.2, "pairs": 1},
     "page": {"listen": 1.0, "settle": 0.2, "window": (500, 300)},
-    "faults": {
-        "kills": 1,
-        "frames": 2_000,
-        "every": 10,
-        "stops": 1,
-        "pause": 0.2,
-        "processes": ("can_bridge", "fem_simulator"),  # the death of one means zero current, that of the other holding
-    },
+    "faults": {"kills": 1, "frames": 2_000, "every": 10, "stops": 1, "pause": 0.2},
     "joints": {"messages": 1_000, "orientations": 0, "loops": 1, "poses": 2},
     "start": {},
     "soak": {"minutes": 0.05},
