@@ -8,7 +8,8 @@ from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import load_robot_file
 from gravcomp.scene import SceneSection
 from gravcomp.scene.distance import gap_to
-from gravcomp.scene.scene import Scene, world_rotation
+from gravcomp.scene.scene import Scene
+from gravcomp.scene.world_axes import world_rotation
 
 _TUBE = {"points_mm": [[0, 0, -20], [0, 5, 30], [10, 20, 80], [30, 30, 130]], "radius_mm": [8, 9, 7, 12]}
 

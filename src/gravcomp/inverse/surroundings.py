@@ -133,11 +133,10 @@ class Surroundings:
         if len(near.gap):
             gap = near.gap + near.change @ change
             k = int(np.argmin(gap))
-            place = f"the forbidden zone '{demands.names[k]}' at ({in_mm(near.position[k])}) mm"
+            if gap[k] < (_DISTANCE + _REACHED) * self._length:
+                zone = f"the forbidden zone '{demands.names[k]}' at ({in_mm(near.position[k])}) mm"
             if gap[k] < -_REACHED * self._length:
-                entered = f"the robot is {-1e3 * gap[k]:.2f} mm inside {place}"
-            elif gap[k] < (_DISTANCE + _REACHED) * self._length:
-                zone = place
+                zone, entered = "", f"the robot is {-1e3 * gap[k]:.2f} mm inside {zone}"
         if len(forces) and np.isfinite(largest):
             after = forces.force + forces.change @ change
             k = int(np.argmax(after))

@@ -38,6 +38,7 @@ _GATE_TIP, _GATE_TENSIONS = 21.1, 27.9
 _TOPICS = {"tip": "measured/tip", "tensions": "measured/tension"}
 # Outliers in a row: then it is the load that has changed. A tracker has fewer samples, and its spikes are single ones.
 _OUTLIERS = {"tip": 3, "tensions": 6}
+_RESTS = 0.5  # of the time of `zero`: at most so long the robot comes to rest before anything is learnt
 _REACH = 1.5  # lengths of the robot from its base: a tip that is measured beyond is none, however far the body stretches
 
 
@@ -59,7 +60,7 @@ class LoadObserver:
         self._check = TensionCheck(self._robot.cable_names, largest, self.options.tension_offset * largest)
         self._before: collections.deque[LoadFilter] = collections.deque(maxlen=LEAST)  # before each reading of tensions
         self._scale = 0.0  # of the load: N, or kg of a payload
-        self._zero_until, self.zeroed, self._released = -np.inf, False, False
+        self._learns_from, self._zero_until, self.zeroed, self._released = -np.inf, -np.inf, False, False
         self._last_change: tuple[float, np.ndarray] | None = None
         self._applied, self._applied_at = np.zeros(self._numbers), -np.inf
         self._seen: dict[str, float] = {}
@@ -132,8 +133,13 @@ class LoadObserver:
             self._before.clear()
 
     def zero(self, now: float) -> None:
-        """Begin to learn the model's errors and the sensors' zeros: the robot carries no load for `zero_time` s."""
+        """Begin to learn the model's errors and the sensors' zeros: the robot carries no load for `zero_time` s.
+
+        The model lets go at once of what it has carried, and the cables move. Friction turns round then, and the robot is behind
+        the model; both would be taken for errors that last. So what is measured in the first `friction_time` is not learnt.
+        """
         self._zero_until = now + self.options.zero_time
+        self._learns_from = now + min(self.options.friction_time, _RESTS * self.options.zero_time)
         self._before.clear()
         if self._filter is not None:
             self._filter.set_load(np.zeros(self._numbers), np.zeros((self._numbers, self._numbers)))
@@ -277,6 +283,9 @@ class LoadObserver:
     def _take(self, source: str, then: Prediction, step: Callable[[LoadFilter], float], gate: float) -> None:
         """Let the filter take a measurement; an outlier is left out, and several in a row mean that the load has changed."""
         assert self._filter is not None
+        if self._filter.learning and then.stamp < self._learns_from:
+            self._seen[source] = then.stamp
+            return
         taken = self._filter.copy()
         if step(taken) > gate:
             self._outliers[source] = self._outliers.get(source, 0) + 1

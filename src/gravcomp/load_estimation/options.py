@@ -69,7 +69,12 @@ class LoadEstimationOptions:
         " hides shows in the sensors, and the estimate begins again",
     )
     zero_time: float = parameter(
-        2.0, unit="s", minimum=0.1, maximum=600.0, description="duration of ~/zero_load, in which the robot carries no load"
+        3.0,
+        unit="s",
+        minimum=0.1,
+        maximum=600.0,
+        description="duration of ~/zero_load, in which the robot carries no load; for friction_time, at most the half of it, it"
+        " comes to rest",
     )
     response: float = parameter(
         300.0, edge="ms", minimum=0.0, maximum=60000.0, description="time constant with which the model takes a new estimate"

@@ -10,11 +10,11 @@ from gravcomp.config import ConfigError
 from gravcomp.scene.declared import BoxWall, MeshWall, PlaneWall, SceneSection, SphereWall, TubeWall, Wall
 from gravcomp.scene.distance import BOX, PLANE, SPHERE, SURFACE, TUBE, SceneArrays, nearest_of_all
 from gravcomp.scene.surface_distance import SurfaceArrays, surface_arrays
+from gravcomp.scene.world_axes import world_rotation
 
 _SAMPLES = 9  # places on each piece of a tube from which the nearest one is searched
 # Sizes of a surface, as parts of the robot's length, that need no other unit.
 _SIZES = 1e-2, 1e2
-_UPRIGHT = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class Scene:
@@ -44,7 +44,7 @@ class Scene:
             self._rows += self._made(number, wall)
         self._own = self._arrays()
         self.in_world = np.array([self.walls[row.number].frame == "world" for row in self._rows], dtype=bool)
-        self.arrays = self.turned(_UPRIGHT)
+        self.arrays = self.turned(world_rotation(np.zeros(3)))
 
     def __bool__(self) -> bool:
         """Whether there are obstacles; the robot itself is one with `self_contact`."""
@@ -54,13 +54,13 @@ class Scene:
         """Return the obstacles in soft_base where `rotation` (3, 3) turns soft_base into the world."""
         if not self.in_world.any():
             return self._own
-        back = np.where(self.in_world[:, None, None], np.asarray(rotation).T, np.eye(3))
-        return self._own._replace(
-            rotation=np.ascontiguousarray(back @ self._own.rotation), origin=np.einsum("kij,kj->ki", back, self._own.origin)
-        )
+        turned, origin, inside = self._own.rotation.copy(), self._own.origin.copy(), self.in_world
+        turned[inside] = np.asarray(rotation).T @ turned[inside]
+        origin[inside] = origin[inside] @ rotation
+        return self._own._replace(rotation=turned, origin=origin)
 
     def under_gravity(self, gravity: np.ndarray) -> SceneArrays:
-        """Return the obstacles in soft_base for gravity (3,) there. See `world_rotation`."""
+        """Return the obstacles in soft_base for gravity (3,) there. See `world_axes`."""
         return self.turned(world_rotation(gravity)) if self.in_world.any() else self._own
 
     def nearest(self, points: np.ndarray, arrays: SceneArrays | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -132,24 +132,6 @@ class Scene:
             samples=np.ascontiguousarray(samples),
             surface=self._surface,
         )
-
-
-def world_rotation(gravity: np.ndarray) -> np.ndarray:
-    """Return the rotation (3, 3) from soft_base to the world for gravity (3,) in soft_base.
-
-    Gravity fixes it but for the turn about the vertical. The world is that of a horizontal robot, whose x axis points up and
-    whose z axis is the world's x axis, turned by the shortest way to this gravity; without gravity, that of the horizontal robot.
-    """
-    size = float(np.linalg.norm(gravity))
-    if size == 0.0:
-        return _UPRIGHT
-    up = -np.asarray(gravity, dtype=float) / size
-    from_up = np.array([1.0, 0.0, 0.0])
-    axis, cosine = np.cross(up, from_up), float(up @ from_up)
-    if cosine < -1.0 + 1e-12:
-        return _UPRIGHT @ np.diag([-1.0, -1.0, 1.0])
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return _UPRIGHT @ (np.eye(3) + cross + cross @ cross / (1.0 + cosine))
 
 
 @dataclasses.dataclass(frozen=True)

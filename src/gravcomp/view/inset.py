@@ -60,7 +60,7 @@ class Inset:
         surfaces: list[Surface] = []
         turn = np.eye(3)
         if snapshot.gravity is not None and any(shape.in_world for shape in self._shapes):
-            from gravcomp.scene.scene import world_rotation  # imports Numba
+            from gravcomp.scene.world_axes import world_rotation  # imports Numba
 
             turn = world_rotation(snapshot.gravity)
         for shape in self._shapes:

@@ -120,7 +120,7 @@ class Scene:
         arrow = self._robot.length * GRAVITY_LENGTH / 9.81 * snapshot.gravity
         self._gravity.points = scaled(np.array([[middle, middle + arrow]]))
         if self._obstacles.in_world:
-            from gravcomp.scene.scene import world_rotation  # imports Numba
+            from gravcomp.scene.world_axes import world_rotation  # imports Numba
 
             self._obstacles.turn(quaternion_wxyz(world_rotation(snapshot.gravity).T))
         rotation = self._world.follow(snapshot.gravity)
