@@ -16,7 +16,7 @@ import numpy as np
 
 _NO_DIRECTION = np.zeros(3)
 REACH = 1.5  # of the robot's length
-LARGEST_WEIGHT = 1e3  # more would count beside what keeps the cables within their bounds (`solver`), and ends its convergence
+LARGEST_WEIGHT = 1e3  # more comes near the cost that keeps the cables within their bounds (`solver`)
 _DIRECTION_SHARE = 0.1  # of the square of the robot's length
 
 
