@@ -88,7 +88,7 @@ def test_what_is_no_robot_file_is_refused(capsys, line, robot, said):
         ("firmware build --output empty.yaml", "--output is empty.yaml: is a file"),
         ("firmware model article --output empty.yaml", "--output is empty.yaml: is a file"),
         (
-            "firmware send binary.yaml",
+            "firmware send binary.yaml --interface udp_multicast --channel x",
             "binary.yaml is no model for the board; `./gravcomp firmware model",
         ),
         ("reproduce measured none", "none: is no folder; needed is one with tentacle, beam"),
