@@ -80,9 +80,10 @@ class Robot:
             found = "both" if self.segments else "neither"
             raise ValueError(f"{found} of segments and body given; exactly one is needed")
         _refuse_name("name", self.name)
-        for what, parts in (("segments", self.segments), ("cables", self.cables)):
-            for index, part in enumerate(parts):
-                _refuse_name(f"{what}[{index}].name", part.name)
+        for index, segment in enumerate(self.segments):
+            _refuse_name(f"segments[{index}].name", segment.name)
+        for index, cable in enumerate(self.cables):
+            _refuse_name(f"cables[{index}].name", cable.name)
         _refuse_repeats("segments", [s.name for s in self.segments])
         _refuse_repeats("cables", [c.name for c in self.cables])
         self._fill_cables()
