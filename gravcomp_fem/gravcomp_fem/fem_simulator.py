@@ -34,6 +34,7 @@ from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.simulation import DynamicSimulator, Shape, ShapeStatus, Simulator
 from gravcomp.simulation.late_reduction import LateReduction
+from gravcomp.standard_gravity import LARGEST_GRAVITY
 from gravcomp_fem.conversion import pose_message, seconds, vector_of
 from gravcomp_fem.deformed import PublishedShape
 from gravcomp_fem.load_inputs import LoadInputs
@@ -43,7 +44,6 @@ from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 # No base accelerates more than this; a larger value is a broken message.
-_GRAVITY_LIMIT = 100.0  # m/s^2
 # Motion over a longer gap between two stamps is not computed, because it would delay the following samples.
 _LONGEST_GAP = 0.1  # s
 # Commands respect the cables' speed limit; the model follows a command at up to this multiple of it.
@@ -195,8 +195,8 @@ class FemSimulator(ManagedNode):
     def _on_gravity(self, message: Vector3Stamped) -> None:
         self._read_cables()
         gravity = vector_of(message.vector)
-        if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > _GRAVITY_LIMIT:
-            self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {_GRAVITY_LIMIT:g} m/s^2 are needed")
+        if not np.isfinite(gravity).all() or np.linalg.norm(gravity) > LARGEST_GRAVITY:
+            self._refuse(f"gravity is {gravity.tolist()}; finite numbers up to {LARGEST_GRAVITY:g} m/s^2 are needed")
             return
         stamp = seconds(message.header)
         last, self._last_stamp = self._last_stamp, stamp

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import yaml
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, QuaternionStamped, Vector3, Vector3Stamped
 from gravcomp_node.managed_node import ERROR, OK, WARN
 from gravcomp_node.polled import Polled
@@ -20,7 +19,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from gravcomp.canbus.bus import BusError
-from gravcomp.config import ConfigError
+from gravcomp.config import ConfigError, parse_yaml
 from gravcomp.firmware.model_fit import blob_for
 from gravcomp.firmware.model_settings import LoopParameters
 from gravcomp.graph.parameters.virtual_robot import VirtualRobotNodeParameters
@@ -176,10 +175,10 @@ class VirtualRobotNode(ManagedNode):
     def _obey(self, message: String, topic: str, order: Callable[[Any, str], None]) -> bool:
         """Carry out an order in YAML and return True; one that is refused is named in the log and changes nothing."""
         try:
-            wanted = yaml.safe_load(message.data)
+            wanted = parse_yaml(message.data, topic)
             with self._live.lock:
                 order(wanted, topic)
-        except (ConfigError, yaml.YAMLError) as error:
+        except ConfigError as error:
             self.get_logger().error(str(error))
             return False
         return True

@@ -2,6 +2,7 @@
 
 import os
 import time
+from types import SimpleNamespace
 
 os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
 
@@ -99,18 +100,21 @@ def test_a_base_that_is_not_steerable_has_no_subscription():
         assert publisher.get_subscription_count() == 0
 
 
-def test_faults_begin_and_end_and_wrong_ones_are_refused():
+def test_faults_begin_and_end_and_wrong_ones_are_refused(monkeypatch):
     with Graph() as graph:
         graph.start()
         publisher = graph.listener.create_publisher(String, "virtual/fault", 20)
         graph.until(lambda: publisher.get_subscription_count() == 1, "the node does not subscribe to virtual/fault")
-        robot = graph.node._live.robot
+        robot, refused = graph.node._live.robot, []
+        monkeypatch.setattr(graph.node, "get_logger", lambda: SimpleNamespace(error=refused.append, info=len))
         publisher.publish(String(data="{kind: imu_stuck}"))
         graph.until(lambda: [f.kind for f in robot.faults] == ["imu_stuck"], "the fault does not begin")
         for bad in ("{kind: explode}", "{kind: [", "7", "{kind: stall, cable: s9}"):
             publisher.publish(String(data=bad))
         publisher.publish(String(data="clear"))
         graph.until(lambda: robot.faults == (), "the faults do not end")
+        assert len(refused) == 4 and not any("\n" in sentence for sentence in refused)
+        assert refused[1].startswith("virtual/fault, line 1, column 9: expected the node content")
 
 
 def test_a_hand_pulls_the_tip_until_it_lets_go_or_is_not_heard_of():

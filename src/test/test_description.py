@@ -100,6 +100,15 @@ MISTAKES = [
         change(["segments", 1, "cap"], {"length_mm": 2, "material": {"law": "yeoh", "c30_ratio": -0.2}}),
         ["robot.segments[1].cap.material: the law yeoh is not stable", "from a stretch of 0.5 to 2"],
     ),
+    (change(["segments", 0, "material", "c20_ratio"], 0.3), ["c20_ratio is 0.3, a constant of the law yeoh; the law svk has no"]),
+    (
+        change(["segments", 0, "material"], {"law": "yeoh", "c01_ratio": 0.1}),
+        ["the law yeoh has c20_ratio, c30_ratio: leave c01_ratio out, or write law: mooney_rivlin"],
+    ),
+    (change(["name"], "../up"), ["robot: name is '../up', after which files", "1 to 100 characters, without /"]),
+    (change(["name"], ""), ["robot: name is ''"]),
+    (change(["cables", 1, "name"], " left"), ["cables[1].name is ' left'", "without spaces at the ends"]),
+    (change(["segments", 0, "name"], "a\nb"), ["segments[0].name is 'a\\nb'"]),
     (change(["cables", 1, "angle_deg"], 0.0), ["'s1c1' and 's1c2' are the same line"]),
     (change(["cables", 1], BACKWARDS), ["cables[1]", "begin at z = 50 and end at 5", "farther from the base"]),
 ]

@@ -20,7 +20,8 @@ def test_arc_has_its_length_and_ends_in_its_direction():
         ({"tip_position": [0, 0]}, "tip_position has the shape (2,)"),
         ({"tip_position": [0, 0, np.nan]}, "finite"),
         ({"tip_position": [0, 0, 1], "tip_direction": [0, 0, 0]}, "length 0"),
-        ({"tip_position": [0, 0, 1], "tip_position_weight": -1.0}, "at least 0"),
+        ({"tip_position": [0, 0, 1], "tip_position_weight": -1.0}, "from 0 to 1000 are needed"),
+        ({"tip_position": [0, 0, 1], "tip_position_weight": 1e300}, "from 0 to 1000 are needed"),
         ({"tip_position": [0, 0, 1], "tip_position_weight": 0.0}, "every weight is 0"),
         ({"tip_position": [0, 0, 1], "tip_direction_weight": 1.0}, "without a tip_direction"),
         (

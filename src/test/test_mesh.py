@@ -130,6 +130,13 @@ def test_quality_sees_a_distorted_element():
     assert bad.jacobian_ratio < 0.1 and "distorted" in bad.advice[0]
 
 
+def test_long_elements_are_no_flaw():
+    """Whether they are too long, the estimated error of the tip says, not their shape."""
+    rod = Robot("rod", segments=(Segment("a", 0.1, 1.5e-3, 0.7e-3),), elements=Elements(around=6, along=4))
+    quality = mesh_quality(tube_mesh(rod))
+    assert quality.aspect_ratio > 50.0 and quality.advice == ()
+
+
 @pytest.mark.parametrize("kind", ["tet10", "hex20"])
 def test_divided_elements_have_the_same_surface_and_contain_the_same_shapes(kind):
     """A rounded element, divided: the same volume, and a quadratic displacement of the old nodes is that of the new ones."""

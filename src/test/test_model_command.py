@@ -67,7 +67,7 @@ def test_a_mesh_that_has_to_be_chosen_is_announced(command, monkeypatch, tmp_pat
     ("arguments", "words"),
     [
         (["solve", "nowhere"], "does not exist"),
-        (["solve", "--tension", "1"], "(6,) is needed"),
+        (["solve", "--tension", "1"], "--tension has 1 numbers; one for each cable is needed: s1c1"),
         (["solve", "--direction", "0", "0", "1"], "--target"),
     ],
 )

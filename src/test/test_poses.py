@@ -258,11 +258,28 @@ def test_a_table_is_read_in_the_frame_of_the_base(tmp_path, mapping):
         ("1.5,20", ",20", "line 2: pull_n is empty"),
         ("1.5,20", "strong,20", "line 2: pull_n is 'strong'"),
         ("1.5,20", "-1.5,20", "line 2: the tension of 'c' is -1.5 N"),
+        ("-9.81", "-1.0", r"line 2: gravity is 1 m/s\^2 long \(in g, not in m/s\^2\?\); 9.81 \+- 10%, or 0, is needed"),
+        ("weight_g", "pull_n", "the column 'pull_n' is there 2 times; it must be unique"),
+        ("case,gx,gy,gz,pull_n,weight_g,m_x_mm,m_y_mm,m_z_mm", "case\tgx\tgy", "separated by tabs; commas are needed"),
+        ("case", "PK\x03\x04", "is not a UTF-8 text file; export the table as CSV"),
     ],
 )
 def test_a_table_that_cannot_be_read_is_named(tmp_path, mapping, old, new, words):
     with pytest.raises(MeasurementError, match=words):
         read(tmp_path, mapping, TABLE.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    ("fit", "words"),
+    [
+        ("[]", "fit contains nothing; allowed: one or more of modulus"),
+        ("[gain, modulus, gain]", "fit contains 'gain' more than once"),
+    ],
+)
+def test_a_mapping_that_fits_nothing_or_the_same_twice_is_refused(tmp_path, fit, words):
+    (tmp_path / "m.yaml").write_text(MAPPING.replace("[modulus, gain]", fit), encoding="utf-8")
+    with pytest.raises(ConfigError, match=words):
+        load_mapping(tmp_path / "m.yaml")
 
 
 def test_mixed_units_are_named(tmp_path, mapping):

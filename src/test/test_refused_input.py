@@ -87,6 +87,11 @@ def test_what_is_no_robot_file_is_refused(capsys, line, robot, said):
         ("model info article --picture folder", "--picture is folder: is a folder"),
         ("firmware build --output empty.yaml", "--output is empty.yaml: is a file"),
         ("firmware model article --output empty.yaml", "--output is empty.yaml: is a file"),
+        (
+            "firmware send binary.yaml --interface udp_multicast --channel x",
+            "binary.yaml is no model for the board; `./gravcomp firmware model",
+        ),
+        ("reproduce measured none", "none: is no folder; needed is one with tentacle, beam"),
         ("reproduce static --out empty.yaml", "--out is empty.yaml: is a file"),
         ("reproduce static --write binary.yaml", "--write is binary.yaml: is not a UTF-8 text file"),
         ("bench engine --write binary.yaml", "--write is binary.yaml: is not a UTF-8 text file"),
@@ -116,6 +121,8 @@ def test_a_place_that_cannot_be_used_is_named(capsys, line, said):
         ("model info article --target 0 0 900", "tip_position is 0.9 m from the base"),
         ("model solve article --target 0 0 900", "tip_position is 0.9 m from the base"),
         ("model solve article --gravity nan 0 0", "--gravity is [nan, 0.0, 0.0]; finite numbers are needed"),
+        ("model solve article --gravity -9810 0 0", "--gravity is 9810 m/s^2 long; allowed: up to 100"),
+        ("model view article --displacement 1", "--displacement has 1 numbers; one for each cable is needed: s1c1"),
     ],
 )
 def test_numbers_out_of_range_are_refused_before_the_model_is_built(capsys, monkeypatch, line, said):

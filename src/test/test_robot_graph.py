@@ -32,6 +32,15 @@ def test_a_robot_with_joints_keeps_its_bridge_and_its_stand_in():
     assert together == (apart[0], COMPOSED, apart[-1]) and apart[1:-1] == LOOP[1:]
 
 
+def test_a_section_of_no_node_is_refused_with_the_name_that_was_meant(tmp_path):
+    """Its parameters would reach nobody."""
+    document = yaml.safe_load(JOINTS.read_text(encoding="utf-8")) | {"nodes": {"fem_simulatr": {"marker_rate": 1.0}}}
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(yaml.safe_dump(document), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"unknown key 'nodes.fem_simulatr' \(did you mean 'fem_simulator'\?\); allowed: "):
+        check_robot_file(str(robot))
+
+
 @pytest.mark.parametrize(
     ("section", "said"),
     [

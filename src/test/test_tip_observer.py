@@ -125,6 +125,18 @@ def test_outliers_and_dropouts_do_not_move_the_estimate() -> None:
     assert made.status.state == TrackerState.STALE and "3.4 s" in made.status.sentence
 
 
+def test_a_tracker_that_is_switched_off_is_no_longer_refused() -> None:
+    made = model()
+    made.run(0.5)
+    for _ in range(30):
+        made.run(0.05)
+        assert not made.measure(made.tip, frame="optitrack")
+    assert made.status.state == TrackerState.REFUSED
+    made.run(60.0)
+    assert made.status.state == TrackerState.STALE
+    assert made.status.sentence.startswith("no measured/tip has come for 60.0 s; the last ones were refused: it is in the frame")
+
+
 def test_moved_tracker_begins_again() -> None:
     made = model()
     made.run(0.5, held=1.0)

@@ -159,7 +159,7 @@ def test_a_single_number_stands_for_a_list_with_it(stranger):
         ({"board": {"grade": "perfect"}}, "bmi088, consumer, industrial"),
         ({"description": "article"}, "a robot with the cables s1c1"),
         ({"description": "article", "body": {"density": 1000.0}}, "body cannot be given next to it"),
-        ({"description": "nowhere.yaml"}, "does not exist"),
+        ({"description": "nowhere.yaml"}, r"virtual_robot\.description: nowhere.yaml: does not exist"),
         ({"seed": -1}, "seed is -1"),
         ({"segments": []}, "unknown key 'virtual_robot.segments'"),
     ],

@@ -10,6 +10,8 @@ import numpy as np
 
 from gravcomp.calibration.measured import MeasurementError
 
+_NO_TEXT = "is not a UTF-8 text file; export the table as CSV (UTF-8, commas)"
+
 
 @dataclasses.dataclass(frozen=True)
 class CsvTable:
@@ -28,10 +30,15 @@ class CsvTable:
                 reader = csv.reader(file)
                 header = tuple(name.strip() for name in next(reader, []))
                 read = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
+        except UnicodeDecodeError as error:
+            raise MeasurementError(f"{path}: {_NO_TEXT}") from error
+        except (OSError, csv.Error) as error:
             raise MeasurementError(f"{path}: cannot be read as CSV: {error}") from error
-        if len(header) == 1 and ";" in header[0]:
-            raise MeasurementError(f"{path}: its columns are separated by semicolons; commas are needed")
+        for character, name in ((";", "semicolons"), ("\t", "tabs")):
+            if len(header) == 1 and character in header[0]:
+                raise MeasurementError(f"{path}: its columns are separated by {name}; commas are needed")
+        if not all(name.isprintable() for name in header):
+            raise MeasurementError(f"{path}: {_NO_TEXT}")
         for line, cells in read:
             if len(cells) < len(header) or any(cell.strip() for cell in cells[len(header) :]):
                 raise MeasurementError(
@@ -42,13 +49,20 @@ class CsvTable:
         return CsvTable(path, header, rows, tuple(line for line, _ in read))
 
     def require(self, names: Sequence[str], hint: str = "") -> None:
-        """Raise MeasurementError for the first of the columns `names` that is missing; hint: what is added to the sentence."""
+        """Raise MeasurementError for the first of the columns `names` that is missing, or there twice.
+
+        hint: what is added to the sentence about a missing one.
+        """
         missing = [name for name in names if name not in self.header]
         if missing:
             needed = f"; needed: {', '.join(names)}" if len(names) > 1 else ""
             raise MeasurementError(
                 f"{self.path}: the column '{missing[0]}' is missing{hint}{needed}; found: {', '.join(self.header)}"
             )
+
+        for name in names:
+            if (count := self.header.count(name)) > 1:
+                raise MeasurementError(f"{self.path}: the column '{name}' is there {count} times; it must be unique")
 
     def only(self, which: Sequence[bool]) -> "CsvTable":
         """Return the table of the rows for which `which` holds."""

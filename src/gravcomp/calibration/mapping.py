@@ -122,6 +122,9 @@ class Mapping:
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"markers: the name '{name}' is given {names.count(name)} times; names must differ")
+        if not self.fit or len(set(self.fit)) < len(self.fit):
+            found = f"'{next(name for name in self.fit if self.fit.count(name) > 1)}' more than once" if self.fit else "nothing"
+            raise ValueError(f"fit contains {found}; allowed: one or more of {', '.join(FITTED)}, each once")
         if "base" in self.fit and len(names) < 3:
             raise ValueError(f"fit contains base, whose pose needs at least 3 markers; {len(names)} given ({', '.join(names)})")
         if "gain" in self.fit and "gain_per_cable" in self.fit:

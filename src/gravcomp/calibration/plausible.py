@@ -59,14 +59,18 @@ class PlausibilityOptions:
     duration: float = parameter(36e3, unit="s", minimum=600.0, maximum=1e7, description="longest time of a trial")
 
 
+def check_gravity(length: float, source: str, or_none: bool = False) -> None:
+    """Raise MeasurementError where gravity, `length` in m/s^2, is not that of the earth; or_none: nor zero."""
+    if abs(length / STANDARD_GRAVITY - 1.0) <= _GRAVITY or (or_none and length == 0.0):
+        return
+    guess = " (in g, not in m/s^2?)" if abs(length - 1.0) < _GRAVITY else ""
+    allowed = f"{STANDARD_GRAVITY:.2f} +- {_GRAVITY:.0%}{', or 0,' if or_none else ''}"
+    raise MeasurementError(f"{source}: gravity is {length:.3g} m/s^2 long{guess}; {allowed} is needed")
+
+
 def check_units(robot: Robot, measured: Measured | StillWindows, source: str) -> None:
     """Raise MeasurementError where gravity, tips or displacements are in other units, or beyond what the robot can reach."""
-    gravity = float(np.median(np.linalg.norm(measured.gravity, axis=1)))
-    if abs(gravity / STANDARD_GRAVITY - 1.0) > _GRAVITY:
-        guess = " (in g, not in m/s^2?)" if abs(gravity - 1.0) < _GRAVITY else ""
-        raise MeasurementError(
-            f"{source}: gravity is {gravity:.3g} m/s^2 long{guess}; {STANDARD_GRAVITY:.2f} +- {_GRAVITY:.0%} is needed"
-        )
+    check_gravity(float(np.median(np.linalg.norm(measured.gravity, axis=1))), source)
     away = float(np.median(np.linalg.norm(measured.tip_position, axis=1))) / robot.length
     for factor, words in _UNITS.items():
         if abs(away / factor - 1.0) < _NEAR:

@@ -9,6 +9,7 @@ import numpy as np
 from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.mapping import UNITS, Mapping, MarkerColumns
 from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.plausible import check_gravity
 from gravcomp.calibration.poses import Poses
 from gravcomp.description import PointLoad
 
@@ -21,7 +22,7 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
     """Read a CSV file with a header and one row for each pose.
 
     Raises MeasurementError, naming file, line and column, for a missing column, a cell that is empty or not a number, a column
-    whose name ends in another unit than the mapping says, markers at distances in another unit, and a cable that the robot does
+    whose name ends in another unit than the mapping says, gravity or markers in another unit, and a cable that the robot does
     not have.
     """
     table = CsvTable.read(Path(path).expanduser())
@@ -33,6 +34,8 @@ def read_poses(path: str | Path, mapping: Mapping, cables: tuple[str, ...]) -> P
     gravity = np.tile(np.array(mapping.gravity or (0.0, 0.0, 0.0)), (count, 1))
     if mapping.gravity_columns is not None:
         gravity = np.column_stack([_column(table, name) for name in mapping.gravity_columns])
+    for line, length in zip(table.lines, np.linalg.norm(gravity, axis=1)):  # none: for a robot that lies on a plane
+        check_gravity(float(length), f"{path}, line {line}", or_none=True)
     masses = [_column(table, entry.column, entry.unit) for entry in mapping.mass_columns]
     loads = tuple(
         (*mapping.loads, *(PointLoad(e.at, float(m[k])) for e, m in zip(mapping.mass_columns, masses) if m[k]))

@@ -157,6 +157,7 @@ def _send(args: argparse.Namespace) -> int:
     from gravcomp.config import ConfigError
     from gravcomp.description.hardware import CanInterface
     from gravcomp.firmware.client import BoardClient
+    from gravcomp.firmware.model_blob import MAGIC
     from gravcomp.firmware.model_transfer import forgetting, sending
 
     path = Path(args.model).expanduser()
@@ -166,6 +167,8 @@ def _send(args: argparse.Namespace) -> int:
         raise ConfigError(
             f"{path} cannot be read: {error.strerror}; `./gravcomp firmware model ROBOT` writes such a file"
         ) from None
+    if not blob.startswith(MAGIC):
+        raise ConfigError(f"{path} is no model for the board; `./gravcomp firmware model ROBOT` writes such a file")
     with BoardClient(CanInterface(args.interface, args.channel)) as client:
         if args.forget:
             client.transfer(forgetting())

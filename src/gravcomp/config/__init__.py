@@ -5,7 +5,7 @@ from gravcomp.config.errors import ConfigError
 from gravcomp.config.given import check_given, flattened
 from gravcomp.config.reading import convert, from_mapping, unknown_key
 from gravcomp.config.writing import DeclaredParameter, declared_parameters, to_mapping
-from gravcomp.config.yaml_file import load_yaml
+from gravcomp.config.yaml_file import load_yaml, parse_yaml
 
 __all__ = [
     "ConfigError",
@@ -18,6 +18,7 @@ __all__ = [
     "from_mapping",
     "load_yaml",
     "parameter",
+    "parse_yaml",
     "to_mapping",
     "unknown_key",
 ]

@@ -1,4 +1,4 @@
-"""Reading YAML files, with errors that name file, line and column."""
+"""Reading YAML, with errors that name the file, or where else it comes from, line and column."""
 
 import contextlib
 from pathlib import Path
@@ -42,16 +42,21 @@ def load_yaml(path: str | Path) -> Any:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not a UTF-8 text file") from error
+    return parse_yaml(text, path)
+
+
+def parse_yaml(text: str, source: str | Path) -> Any:
+    """Return the document in the text. Raises ConfigError, which begins with `source`, when it is not YAML."""
     try:
         if sum(map(text.count, "[{-?:")) < _LARGEST:
             with contextlib.suppress(yaml.YAMLError):
                 return yaml.load(text, Loader=_FastLoader)
         return yaml.load(text, Loader=_StrictLoader)
     except RecursionError as error:
-        raise ConfigError(f"{path}: is nested too deeply") from error
+        raise ConfigError(f"{source}: is nested too deeply") from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        raise ConfigError(f"{path}{place}: {error.problem}") from error
+        raise ConfigError(f"{source}{place}: {error.problem}") from error
     except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: is not YAML: {error}") from error
+        raise ConfigError(f"{source}: is not YAML: {error}") from error

@@ -6,6 +6,9 @@ import math
 from gravcomp.config import parameter
 from gravcomp.description.law_stability import RANGE_OF_USE, yeoh_falls
 
+# The constants that a law has of its own, by their fields of `Material`. `materials.laws` has the laws.
+OWN_CONSTANTS = {"mooney_rivlin": ("c01_ratio",), "yeoh": ("c20_ratio", "c30_ratio")}
+
 # Below it (kg/m^3) there are no solids but aerogels: the number is in another unit.
 _LIGHTEST = 10.0
 
@@ -68,6 +71,7 @@ class Material:
                 f"density is {self.density:g} kg/m^3; allowed: 0 (weightless) or {_LIGHTEST:g} to 30000"
                 f" ({self.density:g} g/cm^3 would be {1e3 * self.density:g} kg/m^3)"
             )
+        self._refuse_constants_of_other_laws()
         falling = yeoh_falls(self.c20_ratio, self.c30_ratio) if self.law == "yeoh" else ""
         if falling:
             raise ValueError(
@@ -86,6 +90,19 @@ class Material:
         for time in times:
             if times.count(time) > 1:
                 raise ValueError(f"prony has the time {time:g} s {times.count(time)} times; the terms' times must differ")
+
+    def _refuse_constants_of_other_laws(self) -> None:
+        """Raise ValueError for a constant that the law does not have: it would change nothing, and nobody would notice."""
+        defaults = {field.name: field.default for field in dataclasses.fields(self)}
+        for law, names in OWN_CONSTANTS.items():
+            for name in names:
+                value = getattr(self, name)
+                if law != self.law and value != defaults[name]:
+                    own = ", ".join(OWN_CONSTANTS.get(self.law, ())) or "no such constants"
+                    raise ValueError(
+                        f"{name} is {value:g}, a constant of the law {law}; the law {self.law} has {own}: leave {name} out, or"
+                        f" write law: {law}"
+                    )
 
     @property
     def axial_modulus(self) -> float:

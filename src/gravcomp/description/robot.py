@@ -25,6 +25,8 @@ from gravcomp.description.pieces import Piece, piece_at, pieces_of_segments
 from gravcomp.description.point_load import PointLoad
 from gravcomp.description.segment import Segment
 
+_LONGEST_NAME = 100  # characters; file systems take 255 bytes with what is appended
+
 
 @dataclasses.dataclass(frozen=True)
 class Effectors:
@@ -77,6 +79,11 @@ class Robot:
         if bool(self.segments) == (self.body is not None):
             found = "both" if self.segments else "neither"
             raise ValueError(f"{found} of segments and body given; exactly one is needed")
+        _refuse_name("name", self.name)
+        for index, segment in enumerate(self.segments):
+            _refuse_name(f"segments[{index}].name", segment.name)
+        for index, cable in enumerate(self.cables):
+            _refuse_name(f"cables[{index}].name", cable.name)
         _refuse_repeats("segments", [s.name for s in self.segments])
         _refuse_repeats("cables", [c.name for c in self.cables])
         self._fill_cables()
@@ -205,6 +212,17 @@ class Robot:
             return dataclasses.replace(self, body=dataclasses.replace(self.body, material=materials[0]))
         segments = tuple(dataclasses.replace(s, material=material) for s, material in zip(self.segments, materials))
         return dataclasses.replace(self, segments=segments)
+
+
+def _refuse_name(key: str, name: str) -> None:
+    """Raise ValueError for a name that cannot be that of a file, a column of a table or a joint, which are named after it."""
+    wrong = "/" in name or "\\" in name or not name.isprintable()
+    if wrong or not name or name != name.strip() or name.startswith(".") or len(name) > _LONGEST_NAME:
+        found = f"{name[:_LONGEST_NAME]!r}{' and longer' if len(name) > _LONGEST_NAME else ''}"
+        raise ValueError(
+            f"{key} is {found}, after which files, columns and joints are named; allowed: 1 to {_LONGEST_NAME} characters,"
+            " without / and \\ and control characters, without a dot in front and without spaces at the ends"
+        )
 
 
 def _refuse_repeats(what: str, names: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 """The parameters of nodes in a robot file, checked before any node starts."""
 
-from gravcomp.config import ConfigError, check_given
+from gravcomp.config import ConfigError, check_given, unknown_key
 from gravcomp.description import RobotFile
 from gravcomp.graph.nodes import NODES
 
@@ -8,6 +8,10 @@ from gravcomp.graph.nodes import NODES
 def check_node_sections(file: RobotFile) -> None:
     """Check the section `nodes`, whose keys are executables. Raises ConfigError for a key or a value that is not allowed."""
     sections = file.section("nodes")
+    executables = dict.fromkeys(entry.executable for entry in NODES)
+    for name in sections:
+        if name not in executables:
+            raise ConfigError(f"{file.source}: {unknown_key(name, executables, 'nodes')}")
     for entry in NODES:
         given = sections.get(entry.executable)
         if not given:

@@ -16,6 +16,7 @@ import numpy as np
 
 _NO_DIRECTION = np.zeros(3)
 REACH = 1.5  # of the robot's length
+LARGEST_WEIGHT = 1e3  # more comes near the cost that keeps the cables within their bounds (`solver`)
 _DIRECTION_SHARE = 0.1  # of the square of the robot's length
 
 
@@ -58,8 +59,8 @@ class Target:
             found = f"{stations.min():g} to {stations.max():g}"
             raise TargetError(f"backbone_station runs from {found}; allowed: 0 (base) to 1 (tip)")
         weights = np.array([self.tip_position_weight, self.tip_direction_weight, *self.backbone_weight])
-        if not np.all(np.isfinite(weights)) or weights.min() < 0.0:
-            raise TargetError(f"weights are {weights.tolist()}; finite numbers of at least 0 are needed")
+        if not np.all(np.isfinite(weights)) or weights.min() < 0.0 or weights.max() > LARGEST_WEIGHT:
+            raise TargetError(f"weights are {weights.tolist()}; finite numbers from 0 to {LARGEST_WEIGHT:g} are needed")
         if self.tip_direction is None and self.tip_direction_weight > 0.0:
             raise TargetError("tip_direction_weight is given without a tip_direction")
         if weights.max() == 0.0:

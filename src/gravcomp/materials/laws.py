@@ -5,8 +5,9 @@ To add a law:
 1. A file in this folder with compiled `stress(constants, e, s, d, tangent)` and `energy(constants, e)`, and the equation and
    its source in the docstring. `constants` are lambda and mu of small strain, then the law's own constants.
 2. Here: an entry in `LAWS`, and a branch in `stress` and in `energy`.
-3. In `description.Material`: the name in the choices of `law`, and a field for each constant of the law's own. These are ratios
-   to the stiffness at small strain, so that one Young's modulus scales the whole law; a reduction needs that too.
+3. In `description/body.py`: the name in the choices of `law`, and a field for each constant of the law's own, which
+   `OWN_CONSTANTS` lists. These are ratios to the stiffness at small strain, so that one Young's modulus scales the whole law;
+   a reduction needs that too.
 
 `test/test_mechanics.py` checks the derivatives of every law in `LAWS`.
 """
@@ -16,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.description.body import OWN_CONSTANTS
 from gravcomp.materials import mooney_rivlin, neo_hookean, st_venant_kirchhoff, yeoh
 from gravcomp.rounding import REORDERED
 
@@ -37,8 +39,8 @@ class Law(NamedTuple):
 LAWS = {
     "svk": Law(0, quadratic=True, softening_strain=st_venant_kirchhoff.SOFTENING_STRAIN),
     "neo_hookean": Law(1),
-    "mooney_rivlin": Law(2, own_constants=("c01_ratio",)),
-    "yeoh": Law(3, own_constants=("c20_ratio", "c30_ratio")),
+    "mooney_rivlin": Law(2, own_constants=OWN_CONSTANTS["mooney_rivlin"]),
+    "yeoh": Law(3, own_constants=OWN_CONSTANTS["yeoh"]),
 }
 
 

@@ -41,6 +41,4 @@ def mesh_quality(mesh: Mesh) -> MeshQuality:
         advice.append(
             f"an element is badly distorted (Jacobian ratio {jacobian_ratio:.2g}): use smaller elements where the surface curves"
         )
-    if aspect_ratio > 20.0:
-        advice.append(f"an element is {aspect_ratio:.0f} times as long as it is thin: use more elements along the robot")
     return MeshQuality(mesh.kind, len(mesh.nodes), len(mesh.elements), jacobian_ratio, aspect_ratio, tuple(advice))

@@ -32,7 +32,7 @@ _SUPPORT = ("vertex", "line", "line3", *_SURFACES)
 def read(path: Path, elements_max: int) -> RawMesh:
     """Return the mesh in the file. Raises MeshError: no such file, an unknown format, more cells than the limits, no cells."""
     if not path.is_file():
-        raise MeshError(f"{path}: {'is a folder' if path.is_dir() else 'the file of the body does not exist'}")
+        raise MeshError(f"{path}: {'is a folder' if path.is_dir() else 'does not exist'}")
     suffix = path.suffix.lower()
     allowed = (*SURFACE_SUFFIXES, *MESH_SUFFIXES, *SOLID_SUFFIXES)
     if suffix not in allowed:

@@ -80,9 +80,11 @@ class TubeWall(Wall):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.points) < 2:
-            raise ValueError(f"points has {len(self.points)} entries; at least 2 are needed")
+            raise ValueError(f"points_mm: {len(self.points)} given; at least 2 are needed")
         if len(self.radius) not in (1, len(self.points)):
-            raise ValueError(f"radius_mm has {len(self.radius)} entries; 1 or as many as points ({len(self.points)}) are needed")
+            raise ValueError(
+                f"radius_mm has {len(self.radius)} entries; 1 or as many as points_mm ({len(self.points)}) are needed"
+            )
         for index, (one, other) in enumerate(zip(self.points, self.points[1:])):
             if one == other:
                 raise ValueError(f"points_mm[{index}] and points_mm[{index + 1}] are the same; neighbours must differ")

@@ -256,7 +256,7 @@ class Simulator:
         """Return the reason why no equilibrium was found under gravity (3,), as a sentence."""
         if state.load_fraction == 1.0:  # no search was made
             return "no equilibrium was found near the last shape, which is kept"
-        message = f"no equilibrium was found beyond {100 * state.load_fraction:.0f} % of the load"
+        message = f"no equilibrium was found beyond {100 * state.load_fraction:.2g} % of the load"
         narrow = "" if self.solver.contact is None else self.solver.contact.squeezed(state.u, gravity)
         return f"{message}: {narrow or beyond_range(self.model, state.u) or _LIMIT_POINT}"
 

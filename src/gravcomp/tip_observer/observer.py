@@ -82,7 +82,7 @@ class TipObserver:
         self._used = self._refused = self._restarts = 0
         self._applied, self._applied_at = np.zeros(3), -np.inf
         self._followed = np.zeros(3)  # m, what the model has moved by the correction; none where it leans on an obstacle
-        self._last_used = self._last_stamp = -np.inf
+        self._last_used = self._last_stamp = self._last_refused = -np.inf
         self._refusal, self._in_a_row = "", 0
         self._largest_sag = 0.0
         self._motion = MotionCheck(self._length, options.std, options.response)
@@ -133,7 +133,7 @@ class TipObserver:
         if reason:
             self._refused += 1
             self._in_a_row += 1
-            self._refusal = reason
+            self._refusal, self._last_refused = reason, arrival
             return False
         self._used, self._in_a_row, self._last_used = self._used + 1, 0, arrival
         return True
@@ -160,7 +160,11 @@ class TipObserver:
     def status(self, now: float) -> TrackerStatus:
         """Return the state of the tracker at `now` (s)."""
         state, sentence = TrackerState.NONE, ""
-        if self._in_a_row >= _REFUSED:
+        silent = now - self._last_refused
+        if self._in_a_row >= _REFUSED and silent > self.options.stale_after:
+            state = TrackerState.STALE
+            sentence = f"no measured/tip has come for {silent:.1f} s; the last ones were refused: {self._refusal}"
+        elif self._in_a_row >= _REFUSED:
             state, sentence = TrackerState.REFUSED, f"measured/tip is refused: {self._refusal}"
         elif self._used and now - self._last_used > self.options.stale_after:
             state = TrackerState.STALE

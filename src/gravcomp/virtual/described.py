@@ -45,7 +45,10 @@ def described(file: RobotFile, seed: int | None = None) -> Described:
             )
         path = Path(given.description).expanduser()
         near = Path(file.source).resolve().parent / path
-        origin = load_robot_file(near if near.is_file() else given.description)
+        try:
+            origin = load_robot_file(near if near.is_file() else given.description)
+        except ConfigError as error:
+            raise ConfigError(f"{key}: {error}") from error
         if origin.section("virtual_robot").get("description"):
             raise ConfigError(f"{key} is '{given.description}', which itself names a description; name the first file")
         if origin.robot.cable_names != file.robot.cable_names:

@@ -51,13 +51,21 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
     from gravcomp.description import load_robot_file
     from gravcomp.launcher import compilation
     from gravcomp.simulation import Simulator
+    from gravcomp.standard_gravity import LARGEST_GRAVITY
 
     if args.direction is not None and args.target is None:
         raise ValueError("--direction needs --target, which is not given")
     if not np.isfinite(args.gravity).all():
         raise ValueError(f"--gravity is {args.gravity}; finite numbers are needed")
+    if (size := float(np.linalg.norm(args.gravity))) > LARGEST_GRAVITY:
+        raise ValueError(f"--gravity is {size:g} m/s^2 long; allowed: up to {LARGEST_GRAVITY:g} (9.81 on the earth)")
     wrenches = wrenches_of(args)
     file = load_robot_file(args.robot)
+    names = file.robot.cable_names
+    for option, values in (("--tension", args.tension), ("--displacement", args.displacement)):
+        if values is not None and len(values) != len(names):
+            needed = f"one for each cable is needed: {', '.join(names)}" if names else "the robot has no cables"
+            raise ValueError(f"{option} has {len(values)} numbers; {needed}")
     wanted = _wanted(args, file.robot.length)
     if file.scene or file.zones:
         parts = ("model", "contact") if wanted is None else compilation.LOOP + compilation.SURROUNDED

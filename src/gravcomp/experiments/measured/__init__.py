@@ -49,7 +49,8 @@ def run(
     if failures and not found:
         raise ConfigError("\n".join(failures))
     if not found:
-        raise ConfigError(f"{folder}: contains none of the folders {', '.join(names)}")
+        what = "contains none of the folders" if folder.is_dir() else "is no folder; needed is one with"
+        raise ConfigError(f"{folder}: {what} {', '.join(names)}")
     return Result(
         name="measured",
         title=TITLE,

@@ -4,6 +4,7 @@ import dataclasses
 
 from gravcomp.config import parameter
 from gravcomp.inverse.options import InverseOptions
+from gravcomp.inverse.target import LARGEST_WEIGHT
 from gravcomp.tip_observer.options import TipObserverOptions
 
 
@@ -14,7 +15,10 @@ class InverseControllerParameters:
     enabled: bool = parameter(True, description="send commands; ~/enable changes it")
     hold_straight: bool = parameter(True, description="keep the shape at rest, straight or bent, until the first target arrives")
     tip_position_weight: float = parameter(
-        1.0, minimum=0.0, maximum=1e3, description="weight of the tip position for a target pose and for the shape at rest"
+        1.0,
+        minimum=0.0,
+        maximum=LARGEST_WEIGHT,
+        description="weight of the tip position for a target pose and for the shape at rest",
     )
     tip_direction_weight: float | None = parameter(
         None, unit="m^2", minimum=0.0, maximum=10.0,
