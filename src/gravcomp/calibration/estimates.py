@@ -18,7 +18,7 @@ _PARTNER = 0.3  # of the largest entry of a weak combination: what belongs to it
 
 _UNITS = {
     "modulus": ("MPa", 1e-6), "offset": ("mm", 1e3), "compliance": ("mm/N", 1e3), "radius": ("%", 100.0),
-    "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi),
+    "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi), "bias": ("m/s^2", 1.0),
 }  # fmt: skip
 
 
@@ -58,6 +58,7 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
         "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
+        "bias": f"bias of the accelerometer along {'xyz'[min(first, 2)]}",
     }  # fmt: skip
     return names[unknown.kind]
 

@@ -30,7 +30,15 @@ from gravcomp.materials.material_classes import class_of
 from gravcomp.mesh.coarse import with_coarse_elements
 
 _KINDS = {"modulus"} | {kind for kinds in GROUPS.values() for kind in kinds}
-_EVEN = {"modulus": 0.08, "density": 0.02, "radius": 0.01, "angle": np.radians(1.0), "winding": 0.003, "mount": np.radians(0.5)}
+_EVEN = {
+    "modulus": 0.08,
+    "density": 0.02,
+    "radius": 0.01,
+    "angle": np.radians(1.0),
+    "winding": 0.003,
+    "mount": np.radians(0.5),
+    "bias": 0.08,
+}
 """Half widths of the even distributions of what is drawn, in the units of `StaticParameters`; the modulus in its logarithm."""
 
 _LINE, _ZERO, _FRICTION = 0.1, 2e-3, 0.1  # stretch, relative; zero of a cable, over the length; coefficient of friction
