@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from gravcomp.calibration import pose_candidates
+from gravcomp.calibration import planning, pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
@@ -18,6 +18,7 @@ from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
 from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.pose_candidates import ORIENTATIONS
+from gravcomp.calibration.unknowns import Unknown
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
 from gravcomp.inverse import InverseOptions
@@ -124,6 +125,24 @@ def test_a_filled_table_becomes_windows_at_rest(robot, plan, tmp_path):
     np.testing.assert_array_equal(np.isnan(windows.displacement), released)
     with pytest.raises(MeasurementError, match="of another robot"):
         read_plan_table(path, ("other",))
+
+
+def test_orientations_come_before_what_hardly_moves_the_tip_in_use():
+    """Each orientation tells an error of its own of the tip in use; each pull a larger one of its cable alone."""
+    poses, usual, rows = [], [], []
+    for station in range(3):
+        for cable in (None, 0, 1, 2):
+            pulled = () if cable is None else (f"c{cable}",)
+            poses.append(PlannedPose(0.0, float(station), np.zeros(3), pulled, np.zeros(3), np.zeros(3)))
+            usual.append(cable is None)
+            row = np.zeros((6, 7))
+            row[0, station if cable is None else 3 + cable] = 2.0 if cable is None else 3.0
+            rows.append(row)
+    unknowns = [Unknown("modulus", (0,), 1.0) if k == 6 else Unknown("offset", (k,), 1.0) for k in range(7)]
+    sought = planning._sought(np.array(rows), usual, unknowns)
+    options = PlanOptions(budget=5 * 8.0)
+    chosen = planning._chosen(poses, usual, np.array(rows), np.eye(7), sought, 7.0, options)
+    assert {poses[k].station for k in chosen} == {(0.0, 0.0), (0.0, 1.0), (0.0, 2.0)}
 
 
 def session_plan() -> Plan:

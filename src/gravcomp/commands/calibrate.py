@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
         "Fit a robot to measured tip positions: Young's modulus of each segment, density, zero, stretch and place of each cable,"
-        " capstan radius, friction, mount of the IMU, damping and creep, as far as the data tell them. DATA is a CSV file with"
+        " capstan radius, friction, mount and offset of the IMU, damping and creep, as far as the data tell them. DATA is a CSV file with"
         " the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
         " measured/tip (geometry_msgs/PoseStamped in soft_base); or the table that --plan writes, filled in. With --mapping, DATA"
