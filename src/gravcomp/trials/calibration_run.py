@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gravcomp.calibration.apply import calibrated_hardware, calibrated_imu, calibrated_robot
-from gravcomp.calibration.approach import approached
+from gravcomp.calibration.approach import approached, as_pulled
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
@@ -71,7 +71,8 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
         orientations = ORIENTATIONS[::_FEWER]
     period = first_period(setup.robot)
     inverse = setup.controller.inverse
-    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
+    robot = as_pulled(setup.robot, setup.hardware)
+    return make_plan(robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
 
 
 def measure(context: Context, plan: Plan) -> Measured:
@@ -152,7 +153,7 @@ class _Rig:
         self._virtual = VirtualRobot(warm, setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion)
         self._heater = warm_heater(setup)
         self._bridge = Bridge(setup.hardware, require_imu=False)
-        self._stream, self._limits = ImuStream(), setup.robot.limits
+        self._stream, self._limits = ImuStream(), as_pulled(setup.robot, setup.hardware).limits
         self._estimator = GravityEstimator(setup.estimator.estimator, quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy))
         self._transmission = setup.hardware.transmission
         self._sent = np.zeros(len(setup.robot.cables))

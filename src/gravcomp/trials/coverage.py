@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.approach import as_pulled
 from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
 from gravcomp.calibration.measured import History, Start, StillWindows
@@ -219,7 +220,7 @@ def coverage_of_robots(
     found = {}
     for file in files:
         setup = Setup.of(load_robot_file(file))
-        robot = setup.robot
+        robot = as_pulled(setup.robot, setup.hardware)
         inverse = setup.controller.inverse
         plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress, inverse=inverse)
         progress(f"{robot.name}: coverage over {len(seeds)} seeds")
