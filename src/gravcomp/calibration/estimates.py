@@ -85,10 +85,10 @@ def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: l
 
 
 def told_together(unknowns: list[Unknown], reasons: list[str]) -> list[str]:
-    """Return the reasons without those of the IMU's errors, where one of these is told.
+    """Return the reasons without those of the IMU's errors, where the data show one of these.
 
     Mount and bias tilt the same gravity: a mount that is fitted without the bias stands for it in the measured poses, and is
-    wrong in all others. Fitted together, what the data do not tell stays near its prior.
+    wrong in all others. Fitted together, what the data do not show stays near its prior.
     """
     of_imu = [unknown.kind in ("mount", "bias") for unknown in unknowns]
     if all(reason for reason, own in zip(reasons, of_imu) if own):
