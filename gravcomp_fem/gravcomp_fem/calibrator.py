@@ -15,6 +15,7 @@ from gravcomp_node.managed_node import OK, WARN
 from rclpy.task import Future
 from std_srvs.srv import SetBool
 
+from gravcomp.calibration.approach import as_pulled
 from gravcomp.calibration.bag import direction_of_poses
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
@@ -43,7 +44,9 @@ class Calibrator(ManagedNode):
         if not p.plan or not p.out:
             raise ConfigError("calibrator: plan and out are needed; ./gravcomp calibrate --live gives both")
         try:
-            self._session = LiveSession(self.robot_file.robot, load_plan(Path(p.plan)), Path(p.out))
+            self._session = LiveSession(
+                as_pulled(self.robot_file.robot, self.robot_file.hardware), load_plan(Path(p.plan)), Path(p.out)
+            )
         except MeasurementError as error:
             raise ConfigError(str(error)) from error
         self._command = self.create_publisher(CableCommand, "cable/command", COMMAND)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration import one_mesh
-from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, write_calibrated
+from gravcomp.calibration.apply import calibrated_hardware, calibrated_imu, calibrated_robot, write_calibrated
 from gravcomp.calibration.course import predict_course
 from gravcomp.calibration.files import read_measured, write_csv
 from gravcomp.calibration.fit import fit_statics
@@ -51,10 +51,11 @@ def test_derivatives_of_tips_are_those_of_finite_differences(robot):
     windows = StillWindows(GRAVITY[None], np.array([[1.2e-3, np.nan, np.nan, 1.0e-3, np.nan, np.nan]]), np.zeros((1, 3)))
     predictor = StaticPredictor(with_coarse_elements(robot), windows)  # whose slopes are taken
     base = StaticParameters(np.array([0.8e6, 0.8e6]), np.zeros(6), np.full(6, 0.1e-3))
-    slopes = predictor.differentiate(base, {"modulus", "radius", "angle", "density", "mount", "friction"})
+    slopes = predictor.differentiate(base, {"modulus", "radius", "angle", "density", "mount", "bias", "friction"})
     for kind, index, step in (
         ("offset", 0, 2e-6), ("offset", 3, 2e-6), ("compliance", 0, 5e-6), ("compliance", 3, 5e-6), ("modulus", 1, 2e-3),
-        ("radius", 3, 2e-3), ("angle", 0, 2e-3), ("density", 0, 2e-3), ("mount", 1, 1e-2), ("friction", 0, 5e-3),
+        ("radius", 3, 2e-3), ("angle", 0, 2e-3), ("density", 0, 2e-3), ("mount", 1, 1e-2), ("bias", 2, 0.1),
+        ("friction", 0, 5e-3),
     ):  # fmt: skip
         tips = [predictor.predict(base.changed(kind, (index,), sign * step)).tip[0, :3] for sign in (1, -1)]
         difference = (tips[0] - tips[1]) / (2 * step)
@@ -168,12 +169,19 @@ def test_calibrated_values_lie_over_the_robot_file(tmp_path, robot):
     source = load_robot_file("article")
     hardware = source.hardware
     parameters = StaticParameters(
-        np.array([0.7512e6, 0.81e6]), np.array([0.1e-3, 0, 0, 0, 0, -0.2e-3]), np.array([0.2e-3] * 3 + [0.0] * 3)
+        np.array([0.7512e6, 0.81e6]),
+        np.array([0.1e-3, 0, 0, 0, 0, -0.2e-3]),
+        np.array([0.2e-3] * 3 + [0.0] * 3),
+        bias=np.array([0.02, -0.03, 0.01]),
     )
     path = tmp_path / "mine.yaml"
     fitted = calibrated_robot(robot, parameters).with_material(damping_time=0.031)
-    write_calibrated(source.source, path, robot, fitted, calibrated_hardware(hardware, parameters))
+    imu = calibrated_imu(Setup.of(source).estimator.calibration, robot, parameters)
+    write_calibrated(source.source, path, robot, fitted, calibrated_hardware(hardware, parameters), imu=imu)
     mine = load_robot_file(path)
+    assert robot.imu_mount.rotation @ Setup.of(mine).estimator.calibration.accel_offset == pytest.approx(
+        parameters.bias, abs=2e-5
+    )
     motors = mine.hardware.motors
     assert [m.offset for m in motors] == pytest.approx(parameters.offset, abs=1e-9)
     assert [s.material.youngs_modulus for s in mine.robot.segments] == pytest.approx([0.7512e6, 0.81e6])

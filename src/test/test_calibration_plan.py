@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from gravcomp.calibration import pose_candidates
-from gravcomp.calibration.approach import APPROACH, approached
+from gravcomp.calibration import planning, pose_candidates
+from gravcomp.calibration.approach import APPROACH, approached, as_pulled
 from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError
@@ -18,13 +18,16 @@ from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
 from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.pose_candidates import ORIENTATIONS
+from gravcomp.calibration.unknowns import Unknown
+from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
-from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment
+from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
 from gravcomp.inverse import InverseOptions
 from gravcomp.mesh import MeshError
 from gravcomp.mesh.body import body_mesh
 from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.mesh.tube import coarse_elements
+from gravcomp.trials.calibration_run import run_plan
 from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
@@ -125,6 +128,53 @@ def test_a_filled_table_becomes_windows_at_rest(robot, plan, tmp_path):
     np.testing.assert_array_equal(np.isnan(windows.displacement), released)
     with pytest.raises(MeasurementError, match="of another robot"):
         read_plan_table(path, ("other",))
+
+
+def test_orientations_come_before_what_hardly_moves_the_tip_in_use():
+    """Each orientation tells an error of its own of the tip in use; each pull a larger one of its cable alone."""
+    poses, usual, rows = [], [], []
+    for station in range(3):
+        for cable in (None, 0, 1, 2):
+            pulled = () if cable is None else (f"c{cable}",)
+            poses.append(PlannedPose(0.0, float(station), np.zeros(3), pulled, np.zeros(3), np.zeros(3)))
+            usual.append(cable is None)
+            row = np.zeros((6, 7))
+            row[0, station if cable is None else 3 + cable] = 2.0 if cable is None else 3.0
+            rows.append(row)
+    unknowns = [Unknown("modulus", (0,), 1.0) if k == 6 else Unknown("offset", (k,), 1.0) for k in range(7)]
+    sought = planning._sought(np.array(rows), usual, unknowns)
+    options = PlanOptions(budget=5 * 8.0)
+    chosen = planning._chosen(poses, usual, np.array(rows), np.eye(7), sought, 7.0, options)
+    assert {poses[k].station for k in chosen} == {(0.0, 0.0), (0.0, 1.0), (0.0, 2.0)}
+
+
+def test_cables_are_pulled_no_faster_than_their_motors_follow():
+    """Small capstans wind in slowly; where a cable runs over a motor at a third of its stroke, slower still."""
+    file = load_robot_file("catheter")
+    speed, hardware = file.hardware.drive.velocity_limit, file.hardware
+    slow = dataclasses.replace(hardware, drive=dataclasses.replace(hardware.drive, velocity_limit=0.1 * speed))
+    assert as_pulled(file.robot, slow).limits.displacement_rate == pytest.approx(0.09 * speed)
+    motors = (dataclasses.replace(slow.motors[0], ratio=1.0 / 3.0), *slow.motors[1:])
+    geared = dataclasses.replace(slow, motors=motors)
+    assert as_pulled(file.robot, geared).limits.displacement_rate == pytest.approx(0.03 * speed)
+    fast = dataclasses.replace(hardware, drive=dataclasses.replace(hardware.drive, velocity_limit=10.0))
+    assert as_pulled(file.robot, fast).limits == file.robot.limits
+
+
+def test_the_virtual_robot_rests_when_its_commands_do():
+    """With capstans that wind in 2 mm/s; a rest that begins before the cables have arrived counts as a body that creeps."""
+    setup = Setup.of(load_robot_file("article"), 1)
+    hardware = dataclasses.replace(setup.hardware, drive=dataclasses.replace(setup.hardware.drive, velocity_limit=2e-3))
+    setup = dataclasses.replace(setup, hardware=hardware)
+    count = len(setup.robot.cables)
+    pulled, tension = np.full(count, -1e-3), np.zeros(count)
+    pulled[0], tension[0] = 3e-3, 0.5
+    pose = PlannedPose(0.0, 0.0, pulled, (setup.robot.cable_names[0],), tension, np.zeros(3))
+    measured = run_plan((setup, Plan((pose,), (2.8,), 0.5, 0.7)))
+    began = int(np.flatnonzero(np.abs(measured.displacement - measured.displacement[-1]).max(axis=1) < 2e-5)[0])
+    way = np.linalg.norm(measured.tip_position[began:] - measured.tip_position[-1], axis=1)
+    assert 5 < began < len(way) + began - 4
+    assert way[1:].max() < 0.1 * np.linalg.norm(measured.tip_position[0] - measured.tip_position[-1])
 
 
 def session_plan() -> Plan:

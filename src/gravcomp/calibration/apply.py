@@ -18,6 +18,7 @@ from gravcomp.description.hardware import Hardware
 from gravcomp.description.overlay import make_paths_whole
 from gravcomp.description.suited_capstan import has_motors
 from gravcomp.orientation.calibration import RestCalibration
+from gravcomp.orientation.imu_calibration import ImuCalibration
 
 if TYPE_CHECKING:
     from ruamel.yaml import YAML
@@ -91,6 +92,15 @@ def calibrated_hardware(hardware: Hardware, parameters: StaticParameters) -> Har
     return dataclasses.replace(hardware, motors=motors, drive=drive)
 
 
+def calibrated_imu(imu: ImuCalibration, robot: Robot, parameters: StaticParameters) -> ImuCalibration:
+    """Return the IMU with the fitted bias in its offset; `imu` and the mount of `robot`: as gravity was measured with."""
+    if not parameters.bias.any():
+        return imu
+    own = robot.imu_mount.rotation.T @ parameters.bias / np.array(imu.accel_scale)
+    x, y, z = (np.array(imu.accel_offset) + own).tolist()
+    return dataclasses.replace(imu, accel_offset=(x, y, z))
+
+
 def robot_of_poses(robot: Robot, parameters: PoseParameters) -> Robot:
     """Return the robot with the modulus and the places of the cables that were fitted to poses."""
     return with_moved_cables(robot.with_material(youngs_modulus=parameters.youngs_modulus), parameters)
@@ -111,12 +121,14 @@ def write_calibrated(
     hardware: Hardware | None,
     virtual_seed: int | None = None,
     origin: dict[str, Any] | None = None,
+    imu: ImuCalibration | None = None,
 ) -> None:
     """Write to `target` what is different in `robot` from `before`, the robot of the file `source`, and the motors' offsets.
 
     The new file names `source` as its `base`, so that what is changed there later still counts. virtual_seed: of the virtual
     robot that was measured; the new file names `source` as its description, because a virtual robot drawn around the calibrated
-    values would be another one. origin: where the values are from, for the key `calibration`. Raises ConfigError if it cannot be
+    values would be another one. origin: where the values are from, for the key `calibration`; imu: with another
+    offset of the accelerometer, None: it keeps that of the file. Raises ConfigError if it cannot be
     written, and for a target that is the source.
     """
     source, target = Path(source), Path(target)
@@ -133,6 +145,9 @@ def write_calibrated(
     with_motors = has_motors(dict(load_robot_file(source).sections.get("hardware") or {}))
     if hardware is not None and (with_motors or hardware.drive.capstan_assumed):
         document["hardware"] = _changed_hardware(hardware, with_motors)
+    if imu is not None:
+        offset = [round(value, 5) for value in imu.accel_offset]
+        document["nodes"] = {"imu_estimator": {"calibration": {"accel_offset": offset}}}
     if virtual_seed is not None:
         document["virtual_robot"] = {"description": base, "seed": virtual_seed}
     about = f"Calibrated on {datetime.date.today().isoformat()}. What is not given here is in the file that `base` names."

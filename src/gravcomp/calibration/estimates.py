@@ -18,7 +18,7 @@ _PARTNER = 0.3  # of the largest entry of a weak combination: what belongs to it
 
 _UNITS = {
     "modulus": ("MPa", 1e-6), "offset": ("mm", 1e3), "compliance": ("mm/N", 1e3), "radius": ("%", 100.0),
-    "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi),
+    "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi), "bias": ("m/s^2", 1.0),
 }  # fmt: skip
 
 
@@ -58,6 +58,7 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
         "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
+        "bias": f"bias of the accelerometer along {'xyz'[min(first, 2)]}",
     }  # fmt: skip
     return names[unknown.kind]
 
@@ -81,6 +82,18 @@ def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: l
         found, most = 1.0 + value * unknown.scale, IMPLAUSIBLE * unknown.scale
         return f"{found:.3f} fits best, and no capstan is wrong by more than {most:.0%}: the description is wrong elsewhere"
     return ""
+
+
+def told_together(unknowns: list[Unknown], reasons: list[str]) -> list[str]:
+    """Return the reasons without those of the IMU's errors, where the data show one of these.
+
+    Mount and bias tilt the same gravity: a mount that is fitted without the bias stands for it in the measured poses, and is
+    wrong in all others. Fitted together, what the data do not show stays near its prior.
+    """
+    of_imu = [unknown.kind in ("mount", "bias") for unknown in unknowns]
+    if all(reason for reason, own in zip(reasons, of_imu) if own):
+        return reasons
+    return ["" if own else reason for reason, own in zip(reasons, of_imu)]
 
 
 def partners_of(information: np.ndarray, unknowns: list[Unknown], priors: Priors) -> list[list[int]]:

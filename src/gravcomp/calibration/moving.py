@@ -14,7 +14,7 @@ _DENSE = 0.2  # of a window at rest, between two samples
 
 
 def moving(measured: Measured, parameters: StaticParameters, still: Standstill) -> list[Measured]:
-    """Return the courses with the fastest motion, each from a rest or a trial's start on, with offsets and winding applied."""
+    """Return the courses with the fastest motion, each from a rest or a trial's start on, with cables and gravity corrected."""
     found = []
     for trial in measured.trials():
         if len(trial.time) < _FEWEST or np.median(np.diff(trial.time)) >= _DENSE * still.time:
@@ -29,6 +29,7 @@ def moving(measured: Measured, parameters: StaticParameters, still: Standstill) 
             turned = np.ptp(course.gravity / np.linalg.norm(course.gravity, axis=1, keepdims=True), axis=0).max()
             if moved > still.moving and turned < 4.0 * still.gravity:
                 wound = parameters.winding * course.displacement + parameters.offset
-                found.append((moved, dataclasses.replace(course, displacement=wound)))
+                gravity = parameters.true_gravity(course.gravity)
+                found.append((moved, dataclasses.replace(course, displacement=wound, gravity=gravity)))
     found.sort(key=lambda entry: -entry[0])
     return [course for _, course in found[:_COURSES]]

@@ -17,9 +17,9 @@ class StaticParameters:
 
     youngs_modulus (s,) in Pa of the segments, or of the body from a file; offset (m,) in m; compliance (m,) in m/N; winding:
     ratio w; radius (m,): of each cable's place over the described one, minus 1; angle (m,) in rad, beyond the described one;
-    density and payload: over the described ones; mount (3,): rotation vector in rad that turns the measured gravity into the true
-    one, in soft_base; creep (b,): stiffness of each branch over the long-term one; friction: added to the coefficient of every
-    cable.
+    density and payload: over the described ones; bias (3,) in m/s^2: of the measured specific force, along the axes of soft_base
+    as the mount is described; mount (3,): rotation vector in rad that turns measured gravity without the bias into the true one;
+    creep (b,): stiffness of each branch over the long-term one; friction: added to the coefficient of every cable.
     """
 
     youngs_modulus: np.ndarray
@@ -30,6 +30,7 @@ class StaticParameters:
     angle: np.ndarray = None  # type: ignore[assignment]
     density: float = 1.0
     payload: float = 1.0
+    bias: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
     mount: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
     creep: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     friction: float = 0.0
@@ -43,6 +44,17 @@ class StaticParameters:
     def key(self) -> bytes:
         """All values as bytes: equal for equal parameters."""
         return b"".join(np.asarray(getattr(self, field.name), dtype=float).tobytes() for field in dataclasses.fields(self))
+
+    def true_gravity(self, measured: np.ndarray) -> np.ndarray:
+        """Return gravity (k, 3) of its right direction, in soft_base, for gravity (k, 3) that an IMU measured."""
+        from scipy.spatial.transform import Rotation
+
+        if not self.bias.any() and not self.mount.any():
+            return measured
+        # The specific force at rest is minus gravity; a filter gives its direction only.
+        corrected = measured + self.bias
+        corrected *= np.linalg.norm(measured, axis=1, keepdims=True) / np.linalg.norm(corrected, axis=1, keepdims=True)
+        return np.asarray(Rotation.from_rotvec(self.mount).apply(corrected))
 
     def values(self, kind: str) -> np.ndarray:
         """Return the values (n,) of a kind: a field, or 'modulus'."""

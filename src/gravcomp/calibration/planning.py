@@ -1,13 +1,15 @@
 """Planning a calibration: the poses that tell most about the robot, in the time that it may take.
 
 The model gives the derivatives J_k of the tip by all unknowns of the fit (`unknowns`) in each candidate (`pose_candidates`).
-Poses are chosen one by one so that they add most to
+Poses are chosen one by one so that they lower most, for the time that they take (a turn of the base takes longer than a pull),
 
-    log det (P + sum_k J_k^T W J_k)
+    tr (C A),    C = (P + sum_k J_k^T W J_k)^-1,    A = mean over the poses of use of J^T W J + ...
 
-for the time that they take (a turn of the base takes longer than a pull), with the prior P and the noise W of `fit`. This greedy
-choice is D-optimal up to a constant factor, because the determinant's logarithm is submodular (Nemhauser, Wolsey and Fisher,
-Math. Programming 14, 1978; for designs: Pukelsheim, Optimal Design of Experiments, 1993).
+with the prior P and the noise W of `fit`: Bayesian A-optimality (Chaloner and Verdinelli, Statistical Science 10, 1995). It is
+the squared error of the tip that is left in the poses in which the robot is used, released and held at rest in all orientations;
+pulls of single cables count less, and the moduli by themselves, because errors of two segments can cancel at the tip. The
+determinant of C counts each unknown alike instead: it spends the time on places and zeros of single cables, in the fewest
+orientations, which hardly tell mount and bias of the IMU.
 """
 
 import dataclasses
@@ -23,7 +25,7 @@ from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions
 from gravcomp.calibration.pose_candidates import ORIENTATIONS, pose_candidates
 from gravcomp.calibration.statics import StaticPredictor
-from gravcomp.calibration.unknowns import Priors, prior_rows, unknowns_of
+from gravcomp.calibration.unknowns import Priors, Unknown, prior_rows, unknowns_of
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
@@ -34,6 +36,8 @@ _MEAN_TURN = math.radians(80.0)  # of the base from station to station
 _LEAST_REST = 0.3  # of the longest time that a pose may take
 _MOST_OF_REST = 0.5  # is left out where turns take longer than was expected
 _WIDEST = 0.5  # deviation of the logarithm of all moduli together before the measurement
+_PULL = 0.25  # what the tips under pulls of single cables count, of those in use
+_MODULUS = 0.04  # relative error of a modulus that counts as much as a tip that is wrong by one deviation
 
 
 def make_plan(
@@ -83,7 +87,7 @@ def make_plan(
     pull = _pull_time(candidates, robot)
     rest = max(wanted - pull, _LEAST_REST * longest)
     held = rest + pull
-    chosen = _chosen(candidates, usual, rows, prior, held, options)
+    chosen = _chosen(candidates, usual, rows, prior, _sought(rows, usual, unknowns), held, options)
     if not chosen:
         raise ConfigError(
             f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
@@ -102,13 +106,14 @@ def _chosen(
     usual: list[bool],
     rows: np.ndarray,
     prior: np.ndarray,
+    sought: np.ndarray,
     held: float,
     options: PlanOptions,
 ) -> list[int]:
     """Return the chosen candidates.
 
     usual: which are measured at every station that is visited: the released robot, which no error of a cable disturbs, and the
-    one that is held at rest; rows (k, 6, u): derivatives over the noise; held: time in s of each pose.
+    one that is held at rest; rows (k, 6, u): derivatives over the noise; sought (u, u): A; held: time in s of each pose.
     """
     information = prior.T @ prior
     always: dict[tuple[float, float], list[int]] = {}
@@ -118,9 +123,9 @@ def _chosen(
     turn = _MEAN_TURN / options.rate
     spent, stations = held, set()  # the last pose, released
     while True:
-        factor = np.linalg.inv(information)
-        gain = np.linalg.slogdet(np.eye(6) + np.einsum("kiu,uv,kjv->kij", rows, factor, rows))[1]
+        factor = np.linalg.inv(information)  # C
         new = [[k] if pose.station in stations else sorted({k, *always[pose.station]}) for k, pose in enumerate(candidates)]
+        gain = np.array([_gain(factor, rows[poses].reshape(-1, rows.shape[2]), sought) for poses in new])
         cost = held * np.array([len(poses) for poses in new])
         cost = cost + np.array([0.0 if pose.station in stations else turn for pose in candidates])
         gain = gain / cost
@@ -134,6 +139,21 @@ def _chosen(
             information = information + rows[k].T @ rows[k]
         chosen += new[best]
         stations.add(candidates[best].station)
+
+
+def _sought(rows: np.ndarray, usual: list[bool], unknowns: list[Unknown]) -> np.ndarray:
+    """Return A (u, u) from rows (k, 6, u); usual: the poses of use."""
+    squares, used = np.einsum("kiu,kiv->kuv", rows, rows), np.array(usual)
+    found = squares[used].mean(axis=0)
+    if not used.all():
+        found = found + _PULL * squares[~used].mean(axis=0)
+    return np.asarray(found + np.diag([(unknown.kind == "modulus") / _MODULUS**2 for unknown in unknowns]))
+
+
+def _gain(covariance: np.ndarray, rows: np.ndarray, sought: np.ndarray) -> float:
+    """Return by how much rows (r, u) over the noise lower the trace of covariance (u, u) times sought (u, u)."""
+    known = rows @ covariance
+    return float(np.sum(np.linalg.solve(np.eye(len(rows)) + known @ rows.T, known) * (known @ sought)))
 
 
 def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:

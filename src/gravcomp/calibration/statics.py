@@ -2,7 +2,8 @@
 
 A cable that the motor displaces by u pulls the path in by w u + o - c lambda, where o is its offset, c its compliance, lambda its
 tension and w the winding ratio of all motors. The path itself may lie farther from the axis and be turned about it; gravity acts
-through the density, the payload and the mount of the IMU; the body creeps by branches of given times (`full_model.viscosity`).
+through the density, the payload, and the IMU's bias and mount; the body creeps by branches of given times
+(`full_model.viscosity`).
 
 One model serves all parameters: moduli scale the stiffness of its elements, density and payload its weights. Windows are computed
 in the order of time, so that each begins with what the branches hold (`walk`).
@@ -31,12 +32,12 @@ from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.mesh.coarse import with_coarse_elements
 
 _STEPS = {
-    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 1e-2, "creep": 1e-2, "friction": 2e-2, "radius": 5e-3,
-    "angle": 5e-3,
+    "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 1e-2, "bias": 0.1, "creep": 1e-2, "friction": 2e-2,
+    "radius": 5e-3, "angle": 5e-3,
 }  # fmt: skip
 """Steps of the difference quotients, in the units of `StaticParameters`; of the modulus: of its logarithm."""
 
-_CENTRAL = ("mount",)
+_CENTRAL = ("mount", "bias")
 """Kinds whose effect is about as much quadratic as linear: under a turned gravity a horizontal robot is also pressed together."""
 
 _SMALL = 1e-9  # ratio of a branch that does not creep, so that the model has it
@@ -142,16 +143,11 @@ class StaticPredictor:
 
     def _inputs(self, parameters: StaticParameters, steps: list[Step] | None = None) -> list[Step]:
         """Return the steps (None: its own) with the gravity and displacements that the parameters make of the measured ones."""
-        from scipy.spatial.transform import Rotation
-
-        turn = Rotation.from_rotvec(parameters.mount)
+        steps = self._steps if steps is None else steps
+        gravity = parameters.true_gravity(np.array([step.gravity for step in steps]))
         return [
-            dataclasses.replace(
-                step,
-                gravity=turn.apply(step.gravity),
-                displacement=parameters.winding * step.displacement + parameters.offset,
-            )
-            for step in (self._steps if steps is None else steps)
+            dataclasses.replace(step, gravity=true, displacement=parameters.winding * step.displacement + parameters.offset)
+            for step, true in zip(steps, gravity)
         ]
 
     def _apply(self, parameters: StaticParameters) -> None:
@@ -188,18 +184,26 @@ class StaticPredictor:
         return tuple(places.ravel().tolist())
 
     def _by_forces(self, parameters: StaticParameters, shown: list[Step]) -> dict[str, np.ndarray]:
-        """Return the derivatives (k, 6, n) by moduli, density, payload and mount; none where a shape has no linear response.
+        """Return the derivatives (k, 6, n) by moduli, weights and errors of the IMU; none where a shape has no linear response.
 
         What creep held back before a window counts as given.
         """
+        from scipy.spatial.transform import Rotation
+
         self._apply(parameters)
         found: dict[str, list[np.ndarray]] = {kind: [] for kind in _FORCES}
+        model, axes = self._model, Rotation.from_rotvec(parameters.mount).as_matrix().T
         for step in shown:
-            weights = {"density": self._model.body_weight, "payload": self._payload, "mount": self._model.nodal_weight}
+            along = step.gravity / np.linalg.norm(step.gravity)
+            pulls = {
+                "density": (model.body_weight, step.gravity[None]),
+                "payload": (self._payload, step.gravity[None]),
+                "mount": (model.nodal_weight, np.cross(np.eye(3), step.gravity)),
+                "bias": (model.nodal_weight, axes - np.outer(axes @ along, along)),
+            }
             forces = {"modulus": self._response.elastic_forces(step, self._elements)}
-            for kind, weight in weights.items():
-                pulls = np.cross(np.eye(3), step.gravity) if kind == "mount" else step.gravity[None]
-                forces[kind] = np.column_stack([np.outer(weight[: self._model.n_free], pull).ravel() for pull in pulls])
+            for kind, (weight, directions) in pulls.items():
+                forces[kind] = np.column_stack([np.outer(weight[: model.n_free], pull).ravel() for pull in directions])
             try:
                 moved = self._response.tips(step, np.hstack([*forces.values()]))
             except NotPositiveDefinite:
@@ -242,8 +246,8 @@ class StaticPredictor:
         return result
 
 
-_FORCES = {"modulus", "density", "payload", "mount"}
-_WALKED = ("modulus", "density", "payload", "mount", "creep", "friction")
+_FORCES = {"modulus", "density", "payload", "mount", "bias"}
+_WALKED = ("modulus", "density", "payload", "mount", "bias", "creep", "friction")
 
 
 def _on_either_side(quotient: Callable[[float], np.ndarray], step: float) -> np.ndarray:

@@ -21,6 +21,7 @@ GROUPS = {
     "places": ("radius", "angle"),
     "weight": ("density", "payload"),
     "mount": ("mount",),
+    "bias": ("bias",),
     "creep": ("creep",),
     "friction": ("friction",),
 }
@@ -46,6 +47,9 @@ class Priors:
     density: float = parameter(0.012, minimum=1e-6, maximum=1.0, description="error of the density, relative")
     payload: float = parameter(0.02, minimum=1e-6, maximum=1.0, description="error of the payload's mass, relative")
     mount: float = parameter(0.5, edge="deg", minimum=1e-4, maximum=90.0, description="error of the IMU's mount about each axis")
+    bias: float = parameter(
+        0.05, unit="m/s^2", minimum=1e-4, maximum=1.0, description="bias of an accelerometer along each axis, at its temperature"
+    )
     creep: float = parameter(
         0.6, minimum=1e-6, maximum=100.0, description="error of a branch of creep, over the largest of the material's class"
     )
@@ -88,7 +92,8 @@ def unknowns_of(
     """Return the unknowns that the windows of `before`, the prediction at the start, can show.
 
     They are the moduli, first; of `groups` (None: all `GROUPS`): offset, place, winding of the cables that are taut in a window,
-    one compliance for all cables of a segment with a taut cable, density, payload, mount, branches of creep, friction.
+    one compliance for all cables of a segment with a taut cable, density, payload, mount, bias of the accelerometer, branches of
+    creep, friction.
     """
     wanted = set(GROUPS) if groups is None else groups
     taut = [c for c in range(len(robot.cables)) if (before.tension[:, c] > _TAUT * robot.limits.tension_max).any()]
@@ -111,6 +116,8 @@ def unknowns_of(
             unknowns.append(Unknown("payload", (0,), priors.payload))
     if "mount" in wanted:
         unknowns += [Unknown("mount", (axis,), priors.mount) for axis in range(3)]
+    if "bias" in wanted:
+        unknowns += [Unknown("bias", (axis,), priors.bias) for axis in range(3)]
     if "creep" in wanted:
         scale = priors.creep * max(class_of(robot.materials[0].youngs_modulus).creep_ratio)
         unknowns += [Unknown("creep", (b,), scale) for b in range(len(initial.creep))]

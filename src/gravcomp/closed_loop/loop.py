@@ -27,7 +27,7 @@ from gravcomp.closed_loop.load_finding import LoadFinding
 from gravcomp.closed_loop.loop_failed import LoopFailed
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.closed_loop.trace import Trace
-from gravcomp.closed_loop.warm_board import true_thermal, with_warm_board
+from gravcomp.closed_loop.warm_board import warm_heater, with_warm_board
 from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.firmware import requests
 from gravcomp.firmware.model_fit import blob_for
@@ -102,9 +102,8 @@ class ClosedLoop:
         self._mount = setup.robot.imu_mount.rotation
         mount = quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy)
         self._estimator = GravityEstimator(setup.estimator.estimator, mount)
-        # The first reading of a board that starts warm is not the ambient temperature.
-        ambient = true_thermal(setup).ambient if warm else setup.estimator.heater.ambient
-        self._heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=ambient)) if heating else None
+        control = warm_heater(setup) if warm else HeaterControl(setup.estimator.heater)
+        self._heater = control if heating else None
         self._simulator = Simulator(setup.robot, scene=setup.modelled_scene)
         # Walls and zones in the world turn with the gravity of the model: it has to be the true one.
         around = (setup.modelled_scene is not None and setup.modelled_scene.walls) or setup.zones

@@ -13,6 +13,7 @@ from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
 from gravcomp.graph.parameters.imu_estimator import ImuEstimatorParameters
 from gravcomp.graph.parameters.inverse_controller import InverseControllerParameters
 from gravcomp.inverse import direction_weight
+from gravcomp.orientation.imu_calibration import ImuCalibration
 from gravcomp.scene.scene import Scene
 from gravcomp.virtual.body import build_rod, first_frequency
 from gravcomp.virtual.described import described
@@ -89,6 +90,12 @@ class Setup:
         """Period in s of the virtual robot's first bending motion."""
         return 2.0 * math.pi / first_frequency(build_rod(self.true_robot))
 
-    def with_model(self, robot: Robot, hardware: Hardware | None = None) -> "Setup":
-        """Return the same virtual robot with another model, and with the motor offsets of `hardware` where it is given."""
-        return dataclasses.replace(self, robot=robot, hardware=hardware or self.hardware, nominal_hardware=self.virtual_hardware)
+    def with_model(self, robot: Robot, hardware: Hardware | None = None, imu: ImuCalibration | None = None) -> "Setup":
+        """Return the same virtual robot with another model; with the motor offsets of `hardware` and with `imu`, where given."""
+        return dataclasses.replace(
+            self,
+            robot=robot,
+            hardware=hardware or self.hardware,
+            nominal_hardware=self.virtual_hardware,
+            estimator=self.estimator if imu is None else dataclasses.replace(self.estimator, calibration=imu),
+        )

@@ -3,6 +3,7 @@
 import dataclasses
 
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.thermal import HeaterControl
 from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.virtual.parameters import VirtualRobotParameters
 
@@ -13,6 +14,11 @@ def with_warm_board(setup: Setup) -> VirtualRobotParameters:
     target = thermal.ambient + heater.rise if heater.target is None else heater.target
     thermal = dataclasses.replace(thermal, start=target)
     return dataclasses.replace(truth, board=dataclasses.replace(truth.board, thermal=thermal))
+
+
+def warm_heater(setup: Setup) -> HeaterControl:
+    """Return the temperature control of such a board: its first reading is not the temperature of the surroundings."""
+    return HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=true_thermal(setup).ambient))
 
 
 def true_thermal(setup: Setup) -> ThermalPlantOptions:

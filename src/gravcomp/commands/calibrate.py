@@ -30,8 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
         "Fit a robot to measured tip positions: Young's modulus of each segment, density, zero, stretch and place of each cable,"
-        " capstan radius, friction, mount of the IMU, damping and creep, as far as the data tell them. DATA is a CSV file with"
-        " the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
+        " capstan radius, friction, mount and offset of the IMU, damping and creep, as far as the data tell them. DATA is a CSV"
+        " file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
         " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
         " measured/tip (geometry_msgs/PoseStamped in soft_base); or the table that --plan writes, filled in. With --mapping, DATA"
         " is a table of poses at rest with any"
@@ -159,6 +159,7 @@ def _plan(args: argparse.Namespace, file: "RobotFile") -> int:
 
 def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     """Return the plan of the robot. Raises ConfigError, and MeshError for a body that cannot be meshed."""
+    from gravcomp.calibration.approach import as_pulled
     from gravcomp.calibration.planning import make_plan
     from gravcomp.closed_loop.setup import Setup
     from gravcomp.full_model.modes import first_period
@@ -167,7 +168,9 @@ def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     inverse = None if args.plan else setup.controller.inverse  # by hand, one cable at a time is enough
     period, transmission = first_period(setup.robot), setup.hardware.transmission
     with output.stages("planning") as show:
-        return make_plan(setup.robot, period, transmission, plan_options(args), progress=show, inverse=inverse)
+        return make_plan(
+            as_pulled(setup.robot, setup.hardware), period, transmission, plan_options(args), progress=show, inverse=inverse
+        )
 
 
 def _measured_live(args: argparse.Namespace, file: "RobotFile") -> Path | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KEPT = {
     "offsets": "the zeros of the cables", "compliance": "the cables' stretch", "winding": "the capstan radius",
     "places": "radii and angles of the cables", "weight": "density and payload", "mount": "the mount of the IMU",
-    "slow-creep": "the creep", "friction": "the friction of the cables",
+    "bias": "the offset of the accelerometer", "slow-creep": "the creep", "friction": "the friction of the cables",
 }  # fmt: skip
 """What is not fitted if its option is given."""
 
@@ -33,7 +33,7 @@ def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Resu
 
     Raises ConfigError, and MeshError for a body that cannot be meshed.
     """
-    from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot, with_behaviour, write_calibrated
+    from gravcomp.calibration.apply import calibrated_hardware, calibrated_imu, calibrated_robot, with_behaviour, write_calibrated
     from gravcomp.calibration.fit import fit_statics
     from gravcomp.calibration.measured import MeasurementError
     from gravcomp.calibration.moving import moving
@@ -61,6 +61,7 @@ def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Resu
             )
             robot = calibrated_robot(setup.robot, statics.parameters, creep_times=statics.creep_times)
             hardware = calibrated_hardware(setup.hardware, statics.parameters)
+            imu = calibrated_imu(setup.estimator.calibration, setup.robot, statics.parameters)
             courses = [] if args.no_damping or data.measured is None else moving(data.measured, statics.parameters, still)
             motion, kept = _motion(robot, courses, args, sweep, show)
             if motion is not None and motion.damping_seen:
@@ -75,6 +76,7 @@ def fit_tips(args: argparse.Namespace, file: "RobotFile", target: Path) -> "Resu
         hardware,
         setup.seed if args.data == "virtual" else None,
         origin_of(file.source, data.source, statics),
+        None if imu == setup.estimator.calibration else imu,
     )
     result = calibration_result(data.source, str(target), statics, motion, courses, setup.robot.materials[0].damping_time)
     if data.duration is not None:

@@ -1,8 +1,9 @@
 """A calibration run on the virtual robot: the measurement that a user makes on the real robot with a camera.
 
 The base turns from pose to pose of a plan (`calibration.plan`), and the bridge pulls the cables by the planned displacements;
-model and controller take no part. Recorded are the estimated gravity, the commanded displacements, and the true tip with a
-tracker's noise (`tracker.Tracker`). The robot is weighed on a balance.
+model and controller take no part. The board is as warm as in use, because its accelerometer's bias changes with the temperature:
+what a fit finds of the IMU holds at that temperature only. Recorded are the estimated gravity, the commanded displacements, and
+the true tip with a tracker's noise (`tracker.Tracker`). The robot is weighed on a balance.
 """
 
 import dataclasses
@@ -12,8 +13,8 @@ import can
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gravcomp.calibration.apply import calibrated_hardware, calibrated_robot
-from gravcomp.calibration.approach import approached
+from gravcomp.calibration.apply import calibrated_hardware, calibrated_imu, calibrated_robot
+from gravcomp.calibration.approach import approached, as_pulled
 from gravcomp.calibration.data import WINDOWS
 from gravcomp.calibration.fit import StaticFit, TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, still_windows
@@ -21,9 +22,11 @@ from gravcomp.calibration.plan import Plan, PlanOptions, creep_times
 from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.pose_candidates import ORIENTATIONS
 from gravcomp.calibration.standstill import Standstill
+from gravcomp.canbus import codec
 from gravcomp.canbus.imu_stream import IMU_FRAMES, ImuStream
 from gravcomp.closed_loop.loop_failed import LoopFailed
 from gravcomp.closed_loop.setup import Setup
+from gravcomp.closed_loop.warm_board import warm_heater, with_warm_board
 from gravcomp.description import Robot
 from gravcomp.full_model.modes import first_period
 from gravcomp.full_model.robot_model import RobotModel
@@ -39,6 +42,7 @@ from gravcomp.virtual.robot import VirtualRobot
 
 _BUS_STEP, _SAMPLE_PERIOD = 0.002, 0.010  # s
 _CONTROL_STEPS = 2  # bus steps in a control period of the bridge: 250 Hz
+_HEATER_STEPS = 50  # bus steps between commands of the heater: 10 Hz
 _DECIMATION = 5  # samples of the IMU: 20 Hz, the rate of a slow camera
 _LONGEST_START = 5.0  # s
 _BRIEF, _FEWER = 0.12, 6  # of the budget; every so many of the orientations
@@ -67,7 +71,8 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
         orientations = ORIENTATIONS[::_FEWER]
     period = first_period(setup.robot)
     inverse = setup.controller.inverse
-    return make_plan(setup.robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
+    robot = as_pulled(setup.robot, setup.hardware)
+    return make_plan(robot, period, setup.hardware.transmission, options, context.progress, orientations, inverse)
 
 
 def measure(context: Context, plan: Plan) -> Measured:
@@ -98,6 +103,7 @@ def calibrate_on_virtual_robot(context: Context) -> Calibration:
     calibrated = setup.with_model(
         calibrated_robot(setup.robot, fit.parameters, creep_times=fit.creep_times),
         calibrated_hardware(setup.hardware, fit.parameters),
+        calibrated_imu(setup.estimator.calibration, setup.robot, fit.parameters),
     )
     return Calibration(measured, fit, calibrated)
 
@@ -143,9 +149,11 @@ class _Rig:
     """The virtual robot, the bridge and the estimator, without model and controller. rows: one for each sample of the IMU."""
 
     def __init__(self, setup: Setup, motion: WaypointMotion):
-        self._virtual = VirtualRobot(setup.truth, setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion)
+        warm = with_warm_board(setup)
+        self._virtual = VirtualRobot(warm, setup.nominal, setup.virtual_hardware, seed=setup.seed, motion=motion)
+        self._heater = warm_heater(setup)
         self._bridge = Bridge(setup.hardware, require_imu=False)
-        self._stream, self._limits = ImuStream(), setup.robot.limits
+        self._stream, self._limits = ImuStream(), as_pulled(setup.robot, setup.hardware).limits
         self._estimator = GravityEstimator(setup.estimator.estimator, quat.from_roll_pitch_yaw(*setup.robot.imu_mount.rpy))
         self._transmission = setup.hardware.transmission
         self._sent = np.zeros(len(setup.robot.cables))
@@ -177,7 +185,10 @@ class _Rig:
             sample = self._stream.on_frame(frame, now)
             if sample is None:
                 continue
-            estimate = self._estimator.update(round(1e9 * sample.stamp), sample.angular_rate, sample.specific_force)
+            stamp_ns = round(1e9 * sample.stamp)
+            self._estimator.add_temperature(stamp_ns, sample.temperature)
+            self._heater.update(stamp_ns, sample.temperature)
+            estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
             if not isinstance(estimate, Problem):
                 self._gravity = np.array(estimate.gravity)
             if displacement is not None and tension is not None:
@@ -185,6 +196,9 @@ class _Rig:
         self._steps += 1
         if self._steps % _CONTROL_STEPS == 0:
             self._outgoing += self._bridge.tick(now)
+        if self._steps % _HEATER_STEPS == 0:
+            sequence = self._steps // _HEATER_STEPS % 256
+            self._outgoing.append(codec.encode("HeaterCommand", duty=self._heater.state.duty, sequence=sequence))
 
     def _command(self, displacement: np.ndarray, tension: np.ndarray, now: float) -> None:
         moved = approached(displacement, self._sent, self._limits, _SAMPLE_PERIOD)

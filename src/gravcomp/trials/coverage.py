@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gravcomp.calibration.approach import as_pulled
 from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
 from gravcomp.calibration.measured import History, Start, StillWindows
@@ -30,7 +31,15 @@ from gravcomp.materials.material_classes import class_of
 from gravcomp.mesh.coarse import with_coarse_elements
 
 _KINDS = {"modulus"} | {kind for kinds in GROUPS.values() for kind in kinds}
-_EVEN = {"modulus": 0.08, "density": 0.02, "radius": 0.01, "angle": np.radians(1.0), "winding": 0.003, "mount": np.radians(0.5)}
+_EVEN = {
+    "modulus": 0.08,
+    "density": 0.02,
+    "radius": 0.01,
+    "angle": np.radians(1.0),
+    "winding": 0.003,
+    "mount": np.radians(0.5),
+    "bias": 0.08,
+}
 """Half widths of the even distributions of what is drawn, in the units of `StaticParameters`; the modulus in its logarithm."""
 
 _LINE, _ZERO, _FRICTION = 0.1, 2e-3, 0.1  # stretch, relative; zero of a cable, over the length; coefficient of friction
@@ -211,7 +220,7 @@ def coverage_of_robots(
     found = {}
     for file in files:
         setup = Setup.of(load_robot_file(file))
-        robot = setup.robot
+        robot = as_pulled(setup.robot, setup.hardware)
         inverse = setup.controller.inverse
         plan = make_plan(robot, first_period(robot), setup.hardware.transmission, progress=progress, inverse=inverse)
         progress(f"{robot.name}: coverage over {len(seeds)} seeds")

@@ -9,11 +9,10 @@ import numpy as np
 
 from gravcomp.canbus.imu_stream import ImuStream
 from gravcomp.closed_loop.setup import Setup
-from gravcomp.closed_loop.warm_board import true_thermal, with_warm_board
+from gravcomp.closed_loop.warm_board import warm_heater, with_warm_board
 from gravcomp.orientation import GravityEstimator, Problem
 from gravcomp.orientation import quaternion as quat
 from gravcomp.standard_gravity import STANDARD_GRAVITY
-from gravcomp.thermal import HeaterControl
 from gravcomp.virtual.board import STATUS_PERIOD, VirtualBoard
 from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 
@@ -27,7 +26,7 @@ def gravity_at_rest(setup: Setup, base: np.ndarray) -> np.ndarray:
     board = VirtualBoard(true.board, np.random.default_rng(np.random.SeedSequence(true.seed).spawn(4)[2]))
     mount = setup.robot.imu_mount
     estimator = GravityEstimator(setup.estimator.estimator, quat.from_roll_pitch_yaw(*mount.rpy))
-    heater = HeaterControl(dataclasses.replace(setup.estimator.heater, ambient=true_thermal(setup).ambient))
+    heater = warm_heater(setup)
     force = mount.rotation.T @ base.T @ np.array([0.0, 0.0, STANDARD_GRAVITY])  # specific force in imu_link
     stream, estimates = ImuStream(), []
     for k in range(round(_TIME / SAMPLE_PERIOD)):
