@@ -39,6 +39,7 @@ _SOFT = 1e-7  # of the mean compliance of the normals: shares the force among pl
 _SWITCHES, _PATIENCE = 40, 4  # changes of wrong states; those of all at once that may leave as many wrong ones as before
 _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before each, halvings of one
 _STIFF = 1e-2  # of the stiffness that forces which turn have to leave, to be part of a step
+_RUNAWAY = 2.0  # of the largest force: growth in a step along which the sum has no minimum
 _SMALL = 1e-12  # m of slack that is rounding error
 _ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
 
@@ -258,12 +259,19 @@ def _solve_free(w: np.ndarray, q: np.ndarray, index: np.ndarray, force: np.ndarr
 
 @njit(cache=True)
 def _lowered(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, force: np.ndarray) -> bool:
-    """Look for the minimum by steps that each lower the sum: slower, but they cannot go round in circles."""
+    """Look for the minimum by steps that each lower the sum: slower, but they cannot go round in circles.
+
+    A body that only walls keep from buckling has a response w that is not positive definite, and the sum may have no minimum: the
+    search then ends with the forces before they ran away.
+    """
     n = len(q)
+    for a in range(n):
+        if w[a, a] <= 0.0 and low[a] < high[a]:
+            return False
     index = np.empty(n, dtype=np.int64)
     allowed = _SMALL + 1e-10 * np.abs(q).max()
     for _ in range(_STEPS):
-        slope = q + w @ force
+        before, slope = force.copy(), q + w @ force
         for _ in range(_SWEEPS):
             for a in range(n):
                 if low[a] < high[a]:
@@ -287,6 +295,10 @@ def _lowered(w: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray, fo
                 force[:] = clipped
                 break
             share *= 0.5
+        way = force - before
+        if way @ (w @ way) < 0.0 and np.abs(force).max() > _RUNAWAY * np.abs(before).max():
+            force[:] = before
+            return False
         slope, left = q + w @ force, 0.0
         for a in range(n):
             if low[a] < high[a]:
