@@ -11,12 +11,15 @@ from gravcomp.bench.contact import slender_rod
 from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.config import ConfigError
 from gravcomp.contact.condensed import OPEN, SLIDING, STICKING, contact_forces
+from gravcomp.contact.places import all_gaps
 from gravcomp.contact.stability import unstable_motions
 from gravcomp.description import Elements, load_robot_file
+from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.supports import SupportedFactor
 from gravcomp.full_model.wrench import Wrench
 from gravcomp.inverse import ControllerCode, InverseController, InverseOptions, Target, direction_weight, straight_target
 from gravcomp.mesh import tube_mesh
+from gravcomp.reduction.clear_of_obstacles import ClearOfObstacles
 from gravcomp.references import calculix_contact
 from gravcomp.references.calculix_contact import cylinder, stored_rests
 from gravcomp.references.contact_beams import buckled_in_tube, over_peg
@@ -96,6 +99,16 @@ def in_scene(model, **kinds):
     return Simulator(model, reduced=False, scene=scene_of(**kinds))
 
 
+def test_a_sum_without_a_minimum_is_given_up_before_its_forces_run_away():
+    """Of a body that only walls keep from buckling: the farther the two places are pressed apart, the lower the sum."""
+    force, _, _, settled = contact_forces(
+        np.array([[1.0, -2.0], [-2.0, 1.0]]), np.full(2, -1.0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(2), np.zeros(2),
+        np.zeros(0), np.zeros(0), np.ones(2), np.zeros((2, 2)),
+    )  # fmt: skip
+    assert not settled
+    assert np.abs(force).max() < 100.0
+
+
 def test_a_sagging_robot_rests_on_a_plane_without_penetration(model):
     simulator = in_scene(model, planes=[{"normal": [1, 0, 0], "point_mm": [-15, 0, 0]}])
     shape = simulator.solve(G)
@@ -106,6 +119,36 @@ def test_a_sagging_robot_rests_on_a_plane_without_penetration(model):
     mesh_force = model.elements.internal_force(simulator.displacements)[model.n_free :].sum(axis=0)
     clamp = mesh_force - model.nodal_weight[model.n_free :].sum() * G
     assert clamp + shape.contacts.force.sum(axis=0) == pytest.approx(-model.mass * G, abs=1e-6)
+
+
+def test_steps_without_contact_are_made_only_where_no_obstacle_is_near_on_the_way(model):
+    """The body bends along x by one coordinate, next to a ball and over a table that turns with gravity."""
+    ball = {"centre_mm": [-12, 0, 100], "radius_mm": 1}
+    table = {"normal": [0, 0, 1], "point_mm": [0, 0, -30], "frame": "world"}
+    full = FullContact(model, scene_of(spheres=[ball], planes=[table]))
+    bent = np.zeros((1, *model.mesh.nodes.shape))
+    bent[0, :, 0] = (model.mesh.nodes[:, 2] / model.length) ** 2
+    change, start, skipped = full.changes(bent), np.zeros(1), 0
+    clear = ClearOfObstacles(full, change)
+
+    def gap(q, gravity):
+        sections, arrays = full.sections_at_rest + change @ q, full.scene.under_gravity(gravity)
+        reach, slots = np.full(len(sections), np.inf), (len(arrays.kind), len(sections))
+        return all_gaps(
+            arrays, full.surface, sections, reach, np.ones(slots, bool), np.zeros((*slots, 2)), np.zeros((*slots, 3))
+        ).min()
+
+    random = np.random.default_rng(0)
+    for k in range(300):
+        angle = 1.2 * np.sin(0.05 * k)  # the base turns downward, until the tip is in the table
+        gravity, q = 9.81 * np.array([-np.cos(angle), 0.0, np.sin(angle)]), start + 1e-3 * random.standard_normal(1)
+        if clear.stays_far(start, q, gravity):
+            skipped += 1
+            assert min(gap(start + share * (q - start), gravity) for share in np.linspace(0.0, 1.0, 5)) > full.margin
+        start = np.clip(q, -0.008, 0.03)
+    assert 50 < skipped < 290
+    assert gap(np.zeros(1), G) > full.margin < gap(np.full(1, -0.025), G)
+    assert not clear.stays_far(np.zeros(1), np.full(1, -0.025), G)  # past the ball
 
 
 def test_friction_holds_a_robot_that_is_pushed_along_a_wall(model):
