@@ -102,8 +102,8 @@ def described_for_mesh(robot: Robot) -> list[Any]:
     if robot.body is None:
         return [robot]
     placed = robot.body.placed()
-    others = [robot.body.material, robot.cables, robot.limits, robot.payload, robot.loads]
-    return [*map(dataclasses.asdict, (placed.axis, others[0])), placed.nodes, placed.cells, *others[1:]]
+    described = [dataclasses.asdict(placed.axis), dataclasses.asdict(robot.body.material)]
+    return [*described, placed.nodes, placed.cells, robot.cables, robot.limits, robot.payload, robot.loads]
 
 
 def _rounded(robot: Robot) -> Robot:

@@ -113,8 +113,8 @@ class ReducedTracker:
         weight = self.model.weight @ gravity
         if force is not None:
             weight = weight + force
-        contact, stiffness = self.contact, (1.0 + stiffer, offset)
-        if contact is not None and not (self.clear is not None and self.clear.far):
+        contact, clear, stiffness = self.contact, self.clear, (1.0 + stiffer, offset)
+        if contact is not None and not (clear is not None and clear.far):
             return self._touching(gravity, weight, wound, given, *stiffness, iterations)
         converged, point, expected, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
@@ -131,7 +131,7 @@ class ReducedTracker:
             iterations,
             *self._limits,
         )
-        if contact is not None and not (converged and self.clear.stays_far(state.q, q, gravity)):
+        if contact is not None and not (converged and clear is not None and clear.stays_far(state.q, q, gravity)):
             return self._touching(gravity, weight, wound, given, *stiffness, iterations)
         self._point, self._expected = point, expected
         if not converged:
