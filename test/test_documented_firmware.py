@@ -42,6 +42,6 @@ def test_the_firmware_is_tested(type_in):
 )
 def test_a_board_without_its_can_device_is_reported(type_in, folder, line, expected):
     (folder / "build" / "firmware").mkdir(parents=True, exist_ok=True)
-    (folder / "build" / "firmware" / "NAME.model").write_bytes(MAGIC)  # what it begins with: the board judges the rest
+    (folder / "build" / "firmware" / "NAME.model").write_bytes(MAGIC)  # what it begins with: the board checks the rest
     code, output = type_in(line, ROBOT="ROBOT.yaml")
     assert code == expected and "can0" in output and "Traceback" not in output, output
