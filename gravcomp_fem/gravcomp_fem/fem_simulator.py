@@ -43,7 +43,6 @@ from gravcomp_fem.transforms import TransformPublisher
 from gravcomp_msgs.msg import CableCommand, CableState, Deformation
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
-# No base accelerates more than this; a larger value is a broken message.
 # Motion over a longer gap between two stamps is not computed, because it would delay the following samples.
 _LONGEST_GAP = 0.1  # s
 # Commands respect the cables' speed limit; the model follows a command at up to this multiple of it.

@@ -127,9 +127,9 @@ def write_calibrated(
 
     The new file names `source` as its `base`, so that what is changed there later still counts. virtual_seed: of the virtual
     robot that was measured; the new file names `source` as its description, because a virtual robot drawn around the calibrated
-    values would be another one. origin: where the values are from, for the key `calibration`; imu: with another
-    offset of the accelerometer, None: it keeps that of the file. Raises ConfigError if it cannot be
-    written, and for a target that is the source.
+    values would be another one. origin: where the values are from, for the key `calibration`; imu: with another offset of the
+    accelerometer, None: it keeps that of the file. Raises ConfigError if it cannot be written, and for a target that is the
+    source.
     """
     source, target = Path(source), Path(target)
     if target.exists() and target.samefile(source):

@@ -84,7 +84,7 @@ def unfit(unknown: Unknown, value: float, sigma: float, half: float, partners: l
     return ""
 
 
-def told_together(unknowns: list[Unknown], reasons: list[str]) -> list[str]:
+def fitted_together(unknowns: list[Unknown], reasons: list[str]) -> list[str]:
     """Return the reasons without those of the IMU's errors, where the data show one of these.
 
     Mount and bias tilt the same gravity: a mount that is fitted without the bias stands for it in the measured poses, and is

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.estimates import Estimate, estimate, name_of, partners_of, told_together, unfit, warnings
+from gravcomp.calibration.estimates import Estimate, estimate, fitted_together, name_of, partners_of, unfit, warnings
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
 from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
@@ -142,7 +142,7 @@ def fit_statics(
         unfit(u, entry, half, quantile * half, [names[j] for j in others], float(initial.values(u.kind)[u.index[0]]) / u.scale)
         for u, entry, half, others in zip(unknowns, x, deviation, partners)
     ]
-    reasons = told_together(unknowns, reasons)
+    reasons = fitted_together(unknowns, reasons)
     fitted = np.array([not reason for reason in reasons])
     x = problem.solve(np.where(fitted, x, 0.0), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)

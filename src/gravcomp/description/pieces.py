@@ -19,7 +19,6 @@ from gravcomp.description.outline import Outline, encloses
 from gravcomp.description.section_moments import SectionMoments, section_moments
 from gravcomp.description.segment import Segment, require_room
 
-# Anything with `start` and `length` in m along the robot.
 _Placed = TypeVar("_Placed", bound="HasPlace")
 
 # A transition whose length is not given: so many times as long as the outline moves in it, at least this part of the width.

@@ -7,7 +7,7 @@ import numpy as np
 
 from gravcomp.config import ConfigError, from_mapping
 from gravcomp.description import Robot, RobotFile
-from gravcomp.description.hardware import Hardware
+from gravcomp.description.hardware import MOTOR_IDS, Hardware
 from gravcomp.external_loads.base_turn import BaseTurn
 from gravcomp.external_loads.options import BaseTurnOptions
 from gravcomp.graph.parameters.fem_simulator import FemSimulatorParameters
@@ -23,7 +23,6 @@ CABLES_MAX = 9
 """Room for cables in the firmware (GC_CABLES_MAX)."""
 BRANCHES_MAX = 4
 """Room for terms of creep in the firmware (GC_BRANCHES_MAX)."""
-_MOTORS_MAX = 8  # a C610's number is 1 to 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,8 +54,8 @@ class LoopParameters:
     def refuse_too_large(self) -> None:
         """Raise ConfigError, with the number, for what is seen in the description: to build the reduced model takes minutes."""
         cables = len(self.robot.cables)
-        if cables > min(CABLES_MAX, _MOTORS_MAX):
-            raise ConfigError(f"{self.source}: has {cables} cables; the bus of the board has room for {_MOTORS_MAX} motors")
+        if cables > min(CABLES_MAX, len(MOTOR_IDS)):
+            raise ConfigError(f"{self.source}: has {cables} cables; the bus of the board has room for {len(MOTOR_IDS)} motors")
         materials = [piece.material for piece in self.robot.pieces] or self.robot.materials
         branches = {material.branches for material in materials}
         if len(branches) > 1:

@@ -7,23 +7,15 @@ from typing import Protocol
 import numpy as np
 
 from gravcomp.description import Material, SectionMoments
-from gravcomp.description.pieces import piece_at
+from gravcomp.description.pieces import HasPlace, piece_at
 from gravcomp.mesh.mesh import MeshError
 
 # Places at which the stiffness of sections is asked for, and how many times denser than at the stiffest one layers may be.
 _SAMPLES, _DENSEST = 100, 8.0
 
 
-class LayeredPiece(Protocol):
+class LayeredPiece(HasPlace, Protocol):
     """A part of one material that layers of elements divide, as `description.Piece` is."""
-
-    @property
-    def start(self) -> float:
-        """Arc length of its base (m)."""
-
-    @property
-    def length(self) -> float:
-        """Its length (m)."""
 
     @property
     def material(self) -> Material:

@@ -9,6 +9,7 @@ from gravcomp.contact.place_forces import Pressed
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.full_model.contact import FullContact
 from gravcomp.full_model.touch import Touch
+from gravcomp.reduction.clear_of_obstacles import ClearOfObstacles
 from gravcomp.scene.distance import SceneArrays
 
 
@@ -33,7 +34,10 @@ class Touching(NamedTuple):
 
 
 class ReducedContact:
-    """Contact of a reduced model. Remembers the forces at the places as guesses for the next solution."""
+    """Contact of a reduced model. Remembers the forces at the places as guesses for the next solution.
+
+    clear: whether the robot is clear of the obstacles; then steps are made without contact.
+    """
 
     def __init__(self, full: FullContact, section_change: np.ndarray):
         """full: contact of the full model; section_change (s, 3, 3, r): changes of its stations' p, f_1, f_2."""
@@ -41,6 +45,7 @@ class ReducedContact:
         self._full, self._change = full, np.ascontiguousarray(section_change.reshape(-1, r))
         self._middle_change = np.ascontiguousarray(section_change[:, 0].reshape(-1, r))
         self._rest = full.sections_at_rest
+        self.clear = ClearOfObstacles(full, section_change)
         self.forget()
 
     def forget(self) -> None:
@@ -48,6 +53,7 @@ class ReducedContact:
         self.force = np.zeros((len(self._full.arrays.kind), self._full.surface.slots, 3))
         self._pull = np.zeros((1, self._change.shape[1]))
         self._pressed: Pressed | None = None
+        self.clear.forget()
 
     def take_over(self, touch: Touch, basis: np.ndarray) -> None:
         """Take the forces of a solution of the full model as guesses; basis (3 n_free, r)."""

@@ -23,7 +23,6 @@ from gravcomp.full_model.shape import Response, Shape, ShapeStatus
 from gravcomp.full_model.statics import StaticSolver
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.mechanics.total_lagrangian import SolidElements
-from gravcomp.reduction.clear_of_obstacles import ClearOfObstacles
 from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.memory import Memory
 from gravcomp.reduction.near_itself import NearItself
@@ -67,7 +66,6 @@ class ReducedServing:
             change = full.contact.changes(fields(model, reduced.basis))
             if len(full.contact.arrays.kind):
                 self._tracker.contact = ReducedContact(full.contact, change)
-                self._tracker.clear = ClearOfObstacles(full.contact, change)
             if full.contact.own is not None:
                 self._itself = NearItself(full.contact, change)
         self.reset()
@@ -84,11 +82,11 @@ class ReducedServing:
 
     def warm_up(self) -> None:
         """Compile the functions of a step, or load them from the cache; afterwards the robot is straight."""
-        clear = self._tracker.clear
+        contact = self._tracker.contact
         for wound in (None, np.zeros(self._model.tendons.count)):
-            for far in (False,) if clear is None else (False, True):
-                if clear is not None:
-                    clear.far = far  # steps with and without contact are different functions
+            for far in (False,) if contact is None else (False, True):
+                if contact is not None:
+                    contact.clear.far = far  # steps with and without contact are different functions
                 state = self._tracker.track(np.zeros(3), CableInput(wound=wound))
                 self.reduced.observe(state.q, state.answer)
         self.reset()

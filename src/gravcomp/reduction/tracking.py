@@ -26,7 +26,6 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.reduction.body import Body, Point, body_of, elastic_force, kept_stiffness, point_at, stiffness_factor
 from gravcomp.reduction.cholesky import solve
-from gravcomp.reduction.clear_of_obstacles import ClearOfObstacles
 from gravcomp.reduction.contact import ReducedContact
 from gravcomp.reduction.contact_step import tracked_touching
 from gravcomp.reduction.law_deviation import KeptStiffness, forget
@@ -72,8 +71,6 @@ class ReducedTracker:
 
     contact: ReducedContact | None = None
     """With the obstacles of a scene; None: nothing is in the way."""
-    clear: ClearOfObstacles | None = None
-    """Of the same obstacles: where the robot is clear of them, steps are made without contact."""
 
     def place(self, q: np.ndarray, tension: np.ndarray, sliding: Sliding | None = None) -> None:
         """Start from the coordinates q (r,) under the tensions (m,). sliding: of the cables, default none."""
@@ -84,8 +81,6 @@ class ReducedTracker:
         self._expected = self._point.strain
         if self.contact is not None:
             self.contact.forget()
-        if self.clear is not None:
-            self.clear.forget()
 
     @property
     def strain(self) -> np.ndarray:
@@ -113,8 +108,8 @@ class ReducedTracker:
         weight = self.model.weight @ gravity
         if force is not None:
             weight = weight + force
-        contact, clear, stiffness = self.contact, self.clear, (1.0 + stiffer, offset)
-        if contact is not None and not (clear is not None and clear.far):
+        contact, stiffness = self.contact, (1.0 + stiffer, offset)
+        if contact is not None and not contact.clear.far:
             return self._touching(gravity, weight, wound, given, *stiffness, iterations)
         converged, point, expected, q, tension, displacement, compliance, answer, residual = _tracked(
             self._body,
@@ -131,7 +126,7 @@ class ReducedTracker:
             iterations,
             *self._limits,
         )
-        if contact is not None and not (converged and clear is not None and clear.stays_far(state.q, q, gravity)):
+        if contact is not None and not (converged and contact.clear.stays_far(state.q, q, gravity)):
             return self._touching(gravity, weight, wound, given, *stiffness, iterations)
         self._point, self._expected = point, expected
         if not converged:
@@ -171,8 +166,8 @@ class ReducedTracker:
         if not converged:
             return replace(state, residual=np.inf, converged=False)
         self.contact.keep(touching, pressed)
-        if self.clear is not None and not len(pressed.row):
-            self.clear.look(q, gravity)
+        if not len(pressed.row):
+            self.contact.clear.look(q, gravity)
         self.state = ReducedState(q, tension, displacement, compliance, answer, residual, True)
         return self.state
 
