@@ -19,7 +19,7 @@ from gravcomp.doctor.finding import Finding
 from gravcomp.graph.interface import Port
 from gravcomp.graph.nodes import NODES
 
-_DISCOVERY, _SETTLE, _LISTEN = 2.0, 1.0, 4.0  # s
+_QUIET, _LONGEST, _LISTEN = 1.0, 10.0, 4.0  # s
 _PERIOD = 0.2  # s between two reads
 _KEPT = QoSProfile(depth=500, reliability=ReliabilityPolicy.BEST_EFFORT)  # the messages of seconds: a busy machine reads late
 _TOLERANCE = 0.05
@@ -40,9 +40,8 @@ class GraphProbe:
 
     def examine(self) -> list[Finding]:
         """Return one finding per topic with a declared rate, and those about incompatible QoS."""
-        time.sleep(_DISCOVERY)
         topics = {name: Polled(self._node, _message_class(port.type), name, _KEPT) for name, port in self._ports.items()}
-        time.sleep(_SETTLE)
+        self._discover(topics)
         begin = time.monotonic()
         for name, topic in topics.items():
             topic.take_all()
@@ -53,6 +52,20 @@ class GraphProbe:
                 self._ages[name] += [1e-9 * (got.sent - _stamp_ns(got.message)) for got in topic.take_all()]
         self._listened = time.monotonic() - begin
         return [self._of_topic(port) for port in self._ports.values()] + self._quality()
+
+    def _discover(self, topics: dict[str, Polled]) -> None:
+        """Wait until no more publishers appear and each topic that has one has been received; a busy machine takes seconds."""
+        begin = changed = time.monotonic()
+        found: set[str] = set()
+        heard: set[str] = set()
+        while (now := time.monotonic()) - begin < _LONGEST:
+            published = {name for name in topics if self._node.count_publishers(name)}
+            heard |= {name for name, topic in topics.items() if topic.take_all()}
+            if published != found:
+                found, changed = published, now
+            if found and found <= heard and now - changed > _QUIET:
+                return
+            time.sleep(_PERIOD)
 
     def _of_topic(self, port: Port) -> Finding:
         ages = sorted(self._ages[port.name])
