@@ -108,8 +108,8 @@ class Material:
     def axial_modulus(self) -> float:
         """Young's modulus along the axis (Pa) of a bar that may contract across, where fibres wind about the axis.
 
-        Fibres add c (f . strain)^2 / 2 with f = (sin^2, cos^2) of their angle, around and along: a rank-one term of the stiffness,
-        so that the compliance along follows by the formula of Sherman and Morrison.
+        Fibres add c (f . strain)^2 / 2 with f = (sin^2, cos^2) of their angle, around and along: a rank-one term of the
+        stiffness, so that the compliance along follows by the formula of Sherman and Morrison.
         """
         if self.fibres is None:
             return self.youngs_modulus

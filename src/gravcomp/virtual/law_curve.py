@@ -59,7 +59,7 @@ def filaments(axial: np.ndarray) -> np.ndarray:
 
 @functools.lru_cache(maxsize=64)
 def _curve(law: str, nu: float, own: tuple[float, ...], wound: tuple[float, float], along: float) -> tuple[float, float, float]:
-    """See `curve_of_law`. wound: ratio of the fibres and their angle in rad; along: modulus along the axis over Young's modulus."""
+    """See `curve_of_law`. wound: ratio of the fibres, and their angle (rad); along: modulus along the axis over Young's."""
     constants = np.array([nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu)), *own])  # of Young's modulus 1
     ratio, angle = wound
     fibres = math.sqrt(ratio) * np.array([[0.0, math.sin(angle) ** 2, math.cos(angle) ** 2, 0.0, 0.0, 0.0]])
