@@ -112,7 +112,7 @@ def test_a_robot_on_an_edge_enters_nothing_and_gains_no_energy(model, tmp_path, 
     assert where != "across the robot" or gained > -1e-3 * work
 
 
-@pytest.mark.parametrize("turn", [0.0, 6.0, 15.0], ids=["in an edge", "beside it", "on a face"])
+@pytest.mark.parametrize("turn", [0.0, 6.0, 15.0], ids=["in an edge", "next to it", "on a face"])
 def test_a_robot_lies_in_a_lumen_of_flat_faces(model, tmp_path, turn):
     """A lumen from a file has faces that meet in hollow edges: a section in one touches both of its faces."""
     length, radius = 1e3 * model.length, 0.5e3 * model.robot.segments[0].outer_diameter

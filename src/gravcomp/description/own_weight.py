@@ -48,9 +48,9 @@ def _carried(robot: Robot) -> list[tuple[float, float]]:
     found = [(robot.length, robot.payload.mass), *((load.at[2], load.mass) for load in robot.loads)]
     base = 0.0
     for segment in robot.segments:
-        for height in segment.disks.heights(segment.length) if segment.disks else ():
-            hole = segment.hole_of_disks(height / segment.length).area
-            found.append((base + height, segment.disks.mass_of(hole)))
+        disks = segment.disks
+        for height in disks.heights(segment.length) if disks else ():
+            found.append((base + height, disks.mass_of(segment.hole_of_disks(height / segment.length).area)))
         base += segment.full_length
     return found
 

@@ -18,7 +18,7 @@ def face_groups(nodes: np.ndarray, faces: np.ndarray, sign: float) -> list[np.nd
     nodes (n, 3); faces (f, 3) of a closed surface, facing outward; sign: 1 where the robot is outside, -1 inside. Faces are
     coloured one after the other along edges that are not hollow, each like its neighbours if no hollow edge forbids it.
     """
-    beside, hollow = _neighbours(nodes, faces, sign)
+    beyond, hollow = _neighbours(nodes, faces, sign)
     if not hollow.any():
         return [np.arange(len(faces))]
     group = np.full(len(faces), -1)
@@ -28,7 +28,7 @@ def face_groups(nodes: np.ndarray, faces: np.ndarray, sign: float) -> list[np.nd
             face = waiting.popleft()
             if group[face] >= 0:
                 continue
-            others, apart = beside[face], hollow[face]
+            others, apart = beyond[face], hollow[face]
             forbidden = set(group[others[apart]])
             alike = [g for g in group[others[~apart]] if g >= 0 and g not in forbidden]
             group[face] = alike[0] if alike else next(g for g in range(4) if g not in forbidden)
@@ -38,17 +38,17 @@ def face_groups(nodes: np.ndarray, faces: np.ndarray, sign: float) -> list[np.nd
 
 
 def _neighbours(nodes: np.ndarray, faces: np.ndarray, sign: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the faces (f, 3) beyond the edges 01, 12 and 20 of each face, and whether those edges are hollow (f, 3)."""
+    """Return the faces (f, 3) across the edges 01, 12 and 20 of each face, and whether those edges are hollow (f, 3)."""
     edges = np.sort(faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
     order = np.lexsort(edges.T)  # a closed surface has every edge twice
     one, other = order[0::2], order[1::2]
-    beside = np.empty(len(edges), dtype=np.int64)
-    beside[one], beside[other] = other // 3, one // 3
+    beyond = np.empty(len(edges), dtype=np.int64)
+    beyond[one], beyond[other] = other // 3, one // 3
     corners = nodes[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     unit = across / np.linalg.norm(across, axis=1, keepdims=True)
     face = np.repeat(np.arange(len(faces)), 3)
-    middle = corners[beside].mean(axis=1) - corners[face, np.tile([0, 1, 2], len(faces))]
-    bent = np.linalg.norm(np.cross(unit[face], unit[beside]), axis=1) > _FLAT
+    middle = corners[beyond].mean(axis=1) - corners[face, np.tile([0, 1, 2], len(faces))]
+    bent = np.linalg.norm(np.cross(unit[face], unit[beyond]), axis=1) > _FLAT
     hollow = bent & (sign * (middle * unit[face]).sum(axis=1) > 0.0)
-    return beside.reshape(-1, 3), hollow.reshape(-1, 3)
+    return beyond.reshape(-1, 3), hollow.reshape(-1, 3)
