@@ -49,8 +49,9 @@ def _carried(robot: Robot) -> list[tuple[float, float]]:
     base = 0.0
     for segment in robot.segments:
         disks = segment.disks
-        for height in disks.heights(segment.length) if disks else ():
-            found.append((base + height, disks.mass_of(segment.hole_of_disks(height / segment.length).area)))
+        if disks is not None:
+            heights = disks.heights(segment.length)
+            found += [(base + s, disks.mass_of(segment.hole_of_disks(s / segment.length).area)) for s in heights]
         base += segment.full_length
     return found
 
