@@ -69,7 +69,14 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
     # The virtual robot and the model sag, straighten and turn alike.
-    assert answer.json["correlation"] > 0.9
+    figures = answer.json
+    assert figures["correlation"] > 0.9
+    for name in ("held", "moving"):
+        lateral, share = figures[f"{name}_lateral_mm"], figures[f"{name}_lateral_pct"]
+        assert 0.0 < lateral < figures["sag_mm"] / 2.0
+        assert share == pytest.approx(100.0 * lateral / figures["tip_error_without_mm"], rel=0.05, abs=0.1)
+    assert figures["settle_s"] is None or figures["settle_s"] >= 0.0
+    assert figures["unholdable"] is None, "the cables can hold the article's robot"
     assert marked(mark) == []
 
 

@@ -3,13 +3,27 @@
 import contextlib
 import csv
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 
 from gravcomp.cables.disks import disk_heights
 from gravcomp.config import ConfigError, from_mapping
-from gravcomp.description import Cable, Cap, Disks, Elements, Lumen, Material, RestShape, Robot, Section, Segment, Station
+from gravcomp.description import (
+    Cable,
+    Cap,
+    Disks,
+    Elements,
+    Lumen,
+    Material,
+    MeshBody,
+    RestShape,
+    Robot,
+    Section,
+    Segment,
+    Station,
+)
 from gravcomp.experiments.measured import default_folder
 from gravcomp.full_model import mesh_choice, mesh_error, mesh_loads
 from gravcomp.full_model.carried_shape import carried_shape
@@ -309,6 +323,19 @@ def test_cables_that_cross_are_refused_and_those_that_share_a_channel_are_not():
     assert Robot("r", segments=segments, cables=(straight, dataclasses.replace(straight, name="longer", segment="b")))
     meeting = dataclasses.replace(across, via_points=((3e-3, -2e-3, 0.0), (3e-3, 0.0, 0.1)))
     assert Robot("r", segments=segments, cables=(straight, meeting))
+
+
+def test_cables_in_a_body_from_a_file_do_not_cross_either():
+    def robot(*cables):
+        return Robot("r", body=MeshBody("not_read.stl", length=0.1), cables=cables)
+
+    straight, over = Cable("straight", 0.0, 3e-3, end=0.1), Cable("over", 0.0, 3e-3, end=0.1)
+    across = Cable("across", via_points=((3e-3, -2e-3, 0.0), (3e-3, 2e-3, 0.08)))
+    with pytest.raises(ValueError, match="'straight' and 'across' cross at 40 mm along the robot"):
+        robot(straight, across)
+    with pytest.raises(ValueError, match="'straight' and 'over' are the same line"):
+        robot(straight, over)
+    assert robot(straight, dataclasses.replace(over, end=0.05), Cable("opposite", math.pi, 3e-3, end=0.1))
 
 
 def test_a_cable_between_two_via_points_does_not_pass_a_lumen():

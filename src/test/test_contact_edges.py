@@ -110,3 +110,23 @@ def test_a_robot_on_an_edge_enters_nothing_and_gains_no_energy(model, tmp_path, 
     gained = model.elements.energy(moved) - first - net
     assert gained < 1e-3 * work
     assert where != "across the robot" or gained > -1e-3 * work
+
+
+@pytest.mark.parametrize("turn", [0.0, 6.0, 15.0], ids=["in an edge", "next to it", "on a face"])
+def test_a_robot_lies_in_a_lumen_of_flat_faces(model, tmp_path, turn):
+    """A lumen from a file has faces that meet in hollow edges: a section in one touches both of its faces."""
+    length, radius = 1e3 * model.length, 0.5e3 * model.robot.segments[0].outer_diameter
+    lumen = trimesh.creation.cylinder(radius + 6.0, 2.0 * length, sections=12)
+    lumen.apply_translation([0.0, 0.0, 0.5 * length])
+    lumen.export(tmp_path / "lumen.stl")
+    scene = scene_of(meshes=[{"file": str(tmp_path / "lumen.stl"), "side": "inside"}])
+    simulator = Simulator(model, reduced=False, scene=scene)
+    for angle in np.deg2rad([turn, turn + 4.0]):
+        down = np.array([np.cos(angle), np.sin(angle), 0.0])
+        shape = simulator.solve(9.81 * down) if angle == np.deg2rad(turn) else simulator.step(9.81 * down)
+        assert shape.is_equilibrium, shape.message
+        assert sampled_depth(simulator.solver.contact, simulator.displacements) < 2e-5
+    normals = shape.contacts.normal
+    held = shape.contacts.force.sum(axis=0) @ down
+    assert held < -0.2 * 9.81 * model.mass
+    assert turn != 0.0 or np.ptp(np.arctan2(normals[:, 1], normals[:, 0]) % (2 * np.pi)) > np.deg2rad(20.0)

@@ -9,7 +9,7 @@ import yaml
 
 from gravcomp.calibration.apply import write_calibrated
 from gravcomp.config import ConfigError
-from gravcomp.description import load_robot_file
+from gravcomp.description import Disks, Fibres, Payload, PointLoad, load_robot_file
 from gravcomp.description.drive import COUNTS_PER_TURN, Drive
 from gravcomp.description.own_weight import bend_by_own_weight
 from gravcomp.motors.encoder import Encoder
@@ -43,6 +43,22 @@ def test_a_tube_bends_by_its_weight_as_a_cantilever(robot):
     # q L^3 / (6 E I), with I / A = d^2 / 16
     expected = 1000 * 9.80665 * 0.05**3 / (6 * 2e6 * 0.004**2 / 16)
     assert bend_by_own_weight(robot(50, 4, 2.0).robot) == pytest.approx(expected, rel=2e-3)
+
+
+def test_what_a_robot_carries_and_its_fibres_count_in_its_bend(robot):
+    tube = dataclasses.replace(robot(50, 4, 2.0).robot, cables=())  # which would run inside a backbone
+    stiffness = 2e6 * math.pi / 64 * 0.004**4
+    segment = tube.segments[0]
+    disks = dataclasses.replace(segment, disks=Disks(count=1, outer_diameter=8e-3, mass=1e-3))
+    for loaded, place in (
+        (dataclasses.replace(tube, segments=(disks,)), 0.05),
+        (dataclasses.replace(tube, loads=(PointLoad((0.0, 0.0, 0.02), 1e-3),)), 0.02),
+        (dataclasses.replace(tube, payload=Payload(1e-3)), 0.05),
+    ):
+        more = bend_by_own_weight(loaded) - bend_by_own_weight(tube)
+        assert more == pytest.approx(1e-3 * 9.80665 * place**2 / (2 * stiffness), rel=2e-3)
+    braid = tube.with_material(fibres=Fibres(4.0, 0.0))
+    assert bend_by_own_weight(braid) == pytest.approx(bend_by_own_weight(tube) / 5.0)
 
 
 def test_a_tube_from_a_file_gets_the_capstans_of_the_described_one(robot, tmp_path):

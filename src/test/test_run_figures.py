@@ -39,6 +39,25 @@ def test_residual_is_split_into_lateral_and_axial_error():
     assert run_figures.residual(tips, STRAIGHT, UP, 5.0, 6.0) is None
 
 
+def test_lateral_errors_are_told_apart_at_rest_and_while_the_base_turns():
+    angle = np.radians(np.concatenate([np.zeros(300), np.linspace(0.0, 60.0, 200), np.full(300, 60.0)]))
+    gravity = track(9.81 * np.column_stack([-np.cos(angle), 0.0 * angle, np.sin(angle)]))
+    offset = np.where((np.arange(800) >= 300) & (np.arange(800) < 500), 4e-3, 1e-3)
+    tips = track(STRAIGHT + offset[:, None] * [1.0, 0.0, 0.0])
+    held, moving = run_figures.held_and_moving(tips, gravity, STRAIGHT, UP, 0.0, 8.0)
+    assert held == pytest.approx(1e-3, rel=0.05) and moving == pytest.approx(4e-3, rel=0.05)
+    held, moving = run_figures.held_and_moving(tips, gravity, STRAIGHT, UP, 0.0, 2.5)
+    assert held == pytest.approx(1e-3) and moving is None
+
+
+def test_the_settling_time_ends_where_the_lateral_error_stays():
+    lateral = np.concatenate([np.linspace(0.04, 1e-3, 200), np.full(400, 1e-3)])
+    tips = track(STRAIGHT + lateral[:, None] * [0.0, 1.0, 0.0])
+    # A twentieth of 40 mm: the error is within 2 mm of its last value from 3 mm on.
+    assert run_figures.settled(tips, STRAIGHT, UP, 0.0, 6.0, 0.04) == pytest.approx(2.0 * 37.0 / 39.0, abs=0.02)
+    assert run_figures.settled(tips, STRAIGHT, UP, 7.0, 9.0, 0.04) is None
+
+
 def test_correlation_ignores_an_offset_and_needs_motion():
     truth = swinging()
     model = track(truth + np.array([1e-3, 0.0, 2e-3]))

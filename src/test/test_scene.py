@@ -122,6 +122,29 @@ def test_the_gap_of_a_surface_is_exact_for_its_triangles(tmp_path, ball):
         assert (gap[contained] < 0).all()
 
 
+def test_faces_that_meet_in_a_hollow_edge_are_rows_of_their_own(tmp_path):
+    import trimesh
+
+    prism = trimesh.creation.cylinder(20.0, 200.0, sections=8)
+    outside = scene(tmp_path, meshes=[{"file": written(tmp_path, prism)}])
+    lumen = scene(tmp_path, meshes=[{"file": written(tmp_path, prism), "side": "inside"}])
+    assert len(outside.arrays.kind) == 1, "no edge of a prism is hollow from outside"
+    assert set(lumen.arrays.obstacle) == {0} and len(lumen.arrays.kind) > 1
+    # Half way between two faces, 1 mm from each: two rows are near, with the normals of the faces.
+    half = np.pi / 8
+    for turn in 2 * half * np.arange(8):
+        middle = 1e-3 * (20.0 * np.cos(half) - 1.0) / np.cos(half)
+        point = middle * np.array([np.cos(turn), np.sin(turn), 0.0])
+        normal = np.empty((len(lumen.arrays.kind), 3))
+        gap = np.array([gap_to(lumen.arrays, k, point, normal[k]) for k in range(len(normal))])
+        near = np.flatnonzero(gap < 1.001e-3)
+        assert len(near) == 2 and gap[near] == pytest.approx([1e-3, 1e-3])
+        between = np.arccos(normal[near[0]] @ normal[near[1]])
+        assert between == pytest.approx(2 * half)
+    points = np.random.default_rng(2).uniform(-0.025, 0.025, (200, 3))
+    assert lumen.nearest(points)[0] == pytest.approx(-outside.nearest(points)[0])
+
+
 def test_obstacles_in_the_world_keep_their_place_when_the_robot_turns():
     table = scene(planes=[{"normal": [0, 0, 1], "point_mm": [0, 0, -50], "frame": "world"}])
     point = np.array([[-0.03, 0.0, 0.1]])

@@ -77,6 +77,23 @@ def test_materials_behave_over_time_as_their_class_does(stranger):
     assert sum(soft.creep_ratio) < sum(stiff.creep_ratio) * 1.9
 
 
+def test_described_creep_is_drawn_around_its_branches(stranger):
+    series = [{"share": 0.1, "time_s": 0.5}, {"share": 0.15, "time_s": 40.0}]
+    for described_as, ratio, time in (
+        ({"prony": series}, np.array([0.1, 0.15]) / 0.75, (0.5, 40.0)),
+        ({"creep_ratio": 0.2, "creep_time": 3.0}, np.array([0.2]), (3.0,)),
+    ):
+        first, *others = ROBOT["segments"]
+        segments = [first | {"material": first["material"] | described_as}, *others]
+        file = stranger(robot=ROBOT | {"segments": segments})
+        for seed in range(3):
+            soft, stiff = described(file, seed).draw().materials
+            assert soft.creep_time == time
+            factor = np.array(soft.creep_ratio) / ratio
+            assert np.ptp(factor) < 1e-9 and 0.7 <= factor[0] <= 1.3
+            assert stiff.creep_time == stiff.kind.creep_time
+
+
 def test_a_given_value_wins_and_changes_no_other(stranger):
     free = described(stranger(seed=3)).draw()
     given = described(stranger(seed=3, body={"density": 1000.0}, tendons={"friction": 0.2})).draw()

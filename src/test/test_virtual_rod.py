@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from virtual_article import article, horizontal, reference_robot, true_robot, with_body
 
-from gravcomp.description import Material
+from gravcomp.description import Fibres, Material
 from gravcomp.references import calculix
 from gravcomp.virtual.band_solver import newton_step
 from gravcomp.virtual.body import build_rod
@@ -85,6 +85,17 @@ def test_a_filament_stiffens_with_its_strain_as_the_described_law_says(law, cons
     found = curve_of_law(Material(law=law, youngs_modulus=0.3e6, poissons_ratio=0.4999, **constants))
     assert found[0] == pytest.approx(c, abs=0.01)
     assert d is None or found[1] == pytest.approx(d, abs=0.02)
+
+
+@pytest.mark.parametrize(("ratio", "angle"), [(6.0, 0.0), (6.0, 0.6), (30.0, 0.9), (4.0, math.pi / 2)])
+def test_a_filament_with_fibres_has_the_modulus_of_a_bar_that_may_contract(ratio, angle):
+    material = Material(law="svk", youngs_modulus=0.3e6, poissons_ratio=0.45, fibres=Fibres(ratio, angle))
+    strength = np.array([0.0, math.sin(angle) ** 2, math.cos(angle) ** 2])  # across the wall, around, along
+    matrix = 0.3e6 / 1.45 * (np.eye(3) + 0.45 / 0.1)
+    compliance = np.linalg.inv(matrix + ratio * 0.3e6 * np.outer(strength, strength))
+    assert material.axial_modulus == pytest.approx(1.0 / compliance[2, 2])
+    # The stress of matrix and fibres is linear in Green's strain: so the bar stiffens as St. Venant-Kirchhoff's does.
+    assert curve_of_law(material)[:2] == pytest.approx((1.5, 0.5), abs=1e-4)
 
 
 def test_filaments_have_the_moments_of_their_section():

@@ -106,9 +106,25 @@ class Material:
 
     @property
     def axial_modulus(self) -> float:
-        """Young's modulus along the axis (Pa), with the part of the fibres' stiffness that lies along it."""
-        along = 0.0 if self.fibres is None else self.fibres.ratio * math.cos(self.fibres.angle) ** 4
-        return self.youngs_modulus * (1.0 + along)
+        """Young's modulus along the axis (Pa) of a bar that may contract across, where fibres wind about the axis.
+
+        Fibres add c (f . strain)^2 / 2 with f = (sin^2, cos^2) of their angle, around and along: a rank-one term of the
+        stiffness, so that the compliance along follows by the formula of Sherman and Morrison.
+        """
+        if self.fibres is None:
+            return self.youngs_modulus
+        ratio, nu = self.fibres.ratio, self.poissons_ratio
+        around, along = math.sin(self.fibres.angle) ** 2, math.cos(self.fibres.angle) ** 2
+        taken = ratio * (along - nu * around) ** 2 / (1.0 + ratio * (along**2 + around**2 - 2.0 * nu * along * around))
+        return self.youngs_modulus / (1.0 - taken)
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus (Pa) along and around the axis, by which the body twists, with the fibres that wind both ways."""
+        matrix = self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+        if self.fibres is None:
+            return matrix
+        return matrix + self.fibres.ratio * self.youngs_modulus * (math.sin(self.fibres.angle) * math.cos(self.fibres.angle)) ** 2
 
     @property
     def branches(self) -> tuple[tuple[float, float], ...]:

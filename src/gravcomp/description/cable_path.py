@@ -55,14 +55,16 @@ def check_path(
 
 
 def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
-    """Raise ValueError where two cables cross or are the same line.
+    """Raise ValueError where two cables cross or are the same line; a body from a file has no pieces.
 
     Cables that share a channel or only begin or end together do not cross.
     """
+    ends = [run.place(s) for run in runs for s in (run.start, run.end, *_via_heights(run))]
+    widest = max((math.hypot(*place) for place in ends), default=0.0)
     # A path that turns back is not known from its arc length alone.
     onward = [r for r in runs if not r.cable.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(r.cable.via_points))]
     for one, other in itertools.combinations(onward, 2):
-        heights = sorted({s for run in (one, other) for piece in pieces for s in _places(run, piece)})
+        heights = sorted({s for run in (one, other) for s in _heights(run, pieces)})
         low, high = max(one.start, other.start), min(one.end, other.end)
         s = np.array([height for height in heights if low <= height <= high])
         if len(s) < 2:
@@ -73,7 +75,7 @@ def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
             raise ValueError(
                 f"the cables '{one.cable.name}' and '{other.cable.name}' are the same line; leave one out or move it"
             )
-        place = _crossing(s, apart, pieces)
+        place = _crossing(s, apart, np.array([_half_width(pieces, height, widest) for height in s]))
         if place is not None:
             raise ValueError(
                 f"the cables '{one.cable.name}' and '{other.cable.name}' cross at {place * 1e3:.4g} mm along the robot;"
@@ -81,9 +83,28 @@ def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
             )
 
 
-def _crossing(s: np.ndarray, apart: np.ndarray, pieces: Sequence[Piece]) -> float | None:
-    """The arc length at which the distance vectors (k, 2) at the arc lengths s (k,) pass through zero; None where none do."""
-    near = np.array([_CROSSING * 2 * piece_at(pieces, height).section(height)[0].half_width for height in s])
+def _half_width(pieces: Sequence[Piece], s: float, otherwise: float) -> float:
+    """Half the width (m) of the section at the arc length s (m); `otherwise` in a body from a file, which is not read here."""
+    return piece_at(pieces, s).section(s)[0].half_width if pieces else otherwise
+
+
+def _heights(run: CableRun, pieces: Sequence[Piece]) -> list[float]:
+    """Arc lengths (m) of the points at which a cable is compared with others; between them it runs straight in a body."""
+    if pieces:
+        return [s for piece in pieces for s in _places(run, piece)]
+    return [run.start, *_via_heights(run), run.end]
+
+
+def _via_heights(run: CableRun) -> list[float]:
+    return [point[2] for point in run.cable.via_points or ()]
+
+
+def _crossing(s: np.ndarray, apart: np.ndarray, half_width: np.ndarray) -> float | None:
+    """The arc length at which the distance vectors (k, 2) at the arc lengths s (k,) pass through zero; None where none do.
+
+    half_width (k,) in m: of the sections there.
+    """
+    near = _CROSSING * 2 * half_width
     distance = np.hypot(*apart.T)
     for k in range(len(s) - 1):
         step = apart[k + 1] - apart[k]

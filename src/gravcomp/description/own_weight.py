@@ -15,10 +15,11 @@ _PARTS = 40  # of the length
 
 
 def bend_by_own_weight(robot: Robot) -> float | None:
-    """Return the turn in rad of the tip of the released robot, straight and held horizontally, with its payload.
+    """Return the turn in rad of the tip of the released robot, straight and held horizontally, with all that it carries.
 
     With the mass m per length and the bending stiffness E I of each section, theta = int g int_s^L m (x - s) dx / (E I) ds. Each
-    section bends about its weakest axis. None for a file that describes no body, which is refused where the body is needed.
+    section bends about its weakest axis. Disks, payload and hung weights are masses at their places along the robot. None for a
+    file that describes no body, which is refused where the body is needed.
     """
     try:
         step = robot.length / _PARTS
@@ -27,9 +28,10 @@ def bend_by_own_weight(robot: Robot) -> float | None:
     except MeshError:
         return None
     mass = np.array([material.density * section.area * step for material, section in sections])
-    flexibility = np.array([1.0 / (material.youngs_modulus * min(section.xx, section.yy)) for material, section in sections])
-    arm = np.maximum(station[None, :] - station[:, None], 0.0)
-    moment = STANDARD_GRAVITY * (arm @ mass + robot.payload.mass * (robot.length - station))
+    flexibility = np.array([1.0 / (material.axial_modulus * min(section.xx, section.yy)) for material, section in sections])
+    places, masses = np.array(_carried(robot)).T
+    arm = np.maximum(np.append(station, places)[None, :] - station[:, None], 0.0)
+    moment = STANDARD_GRAVITY * (arm @ np.append(mass, masses))
     return float((moment * flexibility).sum() * step)
 
 
@@ -39,6 +41,19 @@ def _sections(robot: Robot, stations: np.ndarray) -> list[tuple[Material, Sectio
         return [(robot.body.material, section) for section in body_sections(robot.body, stations)]
     pieces = [robot.piece_at(float(s)) for s in stations]
     return [(piece.material, piece.moments(float(s))) for piece, s in zip(pieces, stations)]
+
+
+def _carried(robot: Robot) -> list[tuple[float, float]]:
+    """Return the arc length in m and the mass in kg of the payload, of hung weights and of disks."""
+    found = [(robot.length, robot.payload.mass), *((load.at[2], load.mass) for load in robot.loads)]
+    base = 0.0
+    for segment in robot.segments:
+        disks = segment.disks
+        if disks is not None:
+            heights = disks.heights(segment.length)
+            found += [(base + s, disks.mass_of(segment.hole_of_disks(s / segment.length).area)) for s in heights]
+        base += segment.full_length
+    return found
 
 
 def largest_pitch_radius(robot: Robot) -> float:

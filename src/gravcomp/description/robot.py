@@ -99,8 +99,7 @@ class Robot:
             place = functools.cache(functools.partial(self.cable_place, cable))
             runs.append(CableRun(cable, self.cable_end(cable), place))
             check_path(key, runs[-1], self.pieces, self.segments, self.length, self._unit_hint)
-        if self.body is None:
-            check_crossings(runs, self.pieces)
+        check_crossings(runs, self.pieces)
 
     def _unit_hint(self, reached: float) -> str:
         """Return the unit in which the body would be as long as a cable reaches (m), as a sentence; empty where there is none."""

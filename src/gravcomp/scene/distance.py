@@ -25,9 +25,11 @@ _EXACT = 1e-7  # of a piece of a curve: after a step of Newton's method that is 
 class SceneArrays(NamedTuple):
     """Obstacles in `soft_base`, SI.
 
-    obstacle (k,): its number in the scene (a hollow cuboid is six planes of one number); kind (k,); rotation (k, 3, 3) and origin
+    obstacle (k,): its number in the scene (a hollow cuboid is six planes of one number, a surface with hollow edges some groups
+    of faces); kind (k,); rotation (k, 3, 3) and origin
     (k, 3): x = rotation y + origin for y in the obstacle's own frame; size (k, 3): half edges of a cuboid, or the radius; sign
-    (k,): 1 where the robot is outside, -1 inside; first and last (k,): its curve pieces; closed (k,): as in `TubeWall`;
+    (k,): 1 where the robot is outside, -1 inside; first and last (k,): its curve pieces, or the roots of
+    its faces and, where these are a group, of the whole surface, else -1; closed (k,): as in `TubeWall`;
     stiffness (k,) in Pa, infinite: rigid; friction (k,). curve (c, 4, 4): coefficients of x, y, z, radius (columns) of each
     piece by descending powers of the place in it, 0 to 1; samples (c, s, 4): x, y, z, radius at s places of each piece;
     surface: `SurfaceArrays` of all meshes.
@@ -86,12 +88,26 @@ def gap_to(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) ->
             scene.curve, scene.samples, scene.first[k], scene.last[k], scene.sign[k], scene.closed[k], own_x, own_y, own_z, normal
         )
     else:
-        gap = scene.sign[k] * surface_gap(scene.surface, scene.first[k], np.array([own_x, own_y, own_z]), normal)
-        for i in range(3):
-            normal[i] *= scene.sign[k]
+        gap = _surface(scene, k, np.array([own_x, own_y, own_z]), normal)
     here_x, here_y, here_z = normal[0], normal[1], normal[2]
     for i in range(3):
         normal[i] = r[i, 0] * here_x + r[i, 1] * here_y + r[i, 2] * here_z
+    return gap
+
+
+@njit(cache=True)
+def _surface(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) -> float:
+    """Return the gap to a surface, or to a group of its faces.
+
+    A group is open: what is behind it is in the wall only where no other face is nearer.
+    """
+    gap, side = scene.sign[k] * surface_gap(scene.surface, scene.first[k], point, normal), scene.sign[k]
+    if gap < 0.0 and scene.last[k] >= 0:
+        whole = scene.sign[k] * surface_gap(scene.surface, scene.last[k], point, np.empty(3))
+        if gap < whole:
+            gap, side = -gap, -side
+    for i in range(3):
+        normal[i] *= side
     return gap
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from gravcomp.config import ConfigError
 from gravcomp.scene.declared import BoxWall, MeshWall, PlaneWall, SceneSection, SphereWall, TubeWall, Wall
 from gravcomp.scene.distance import BOX, PLANE, SPHERE, SURFACE, TUBE, SceneArrays, nearest_of_all
+from gravcomp.scene.hollow_edges import face_groups
 from gravcomp.scene.surface_distance import SurfaceArrays, surface_arrays
 from gravcomp.scene.world_axes import world_rotation
 
@@ -99,12 +100,21 @@ class Scene:
                 _Row(number, TUBE, sign=_sign(wall.side), first=first, last=len(self._pieces), closed=wall.closed),
             ]
         assert isinstance(wall, MeshWall)
-        root = len(self._surface.child)
         nodes, faces, notes = _read_surface(wall, self.source, f"scene.meshes ('{self.names[number]}')")
         self.notes += [f"{self.names[number]}: {note}" for note in notes]
         self._surface_sizes[self.names[number]] = float(np.ptp(nodes, axis=0).max())
-        self._surface = self._surface.joined(surface_arrays(nodes, faces))
-        return [_Row(number, SURFACE, _rotation(wall.rotate), np.array(wall.move), sign=_sign(wall.side), first=root)]
+        sign, whole = _sign(wall.side), self._add(nodes, faces)
+        row = _Row(number, SURFACE, _rotation(wall.rotate), np.array(wall.move), sign=sign, first=whole, last=-1)
+        groups = face_groups(nodes, faces, sign)
+        if len(groups) == 1:
+            return [row]
+        return [dataclasses.replace(row, first=self._add(nodes, faces, chosen), last=whole) for chosen in groups]
+
+    def _add(self, nodes: np.ndarray, faces: np.ndarray, chosen: np.ndarray | None = None) -> int:
+        """Add the tree of a surface, or of the chosen ones of its triangles, to those of the scene, and return its root."""
+        root = len(self._surface.child)
+        self._surface = self._surface.joined(surface_arrays(nodes, faces, chosen))
+        return root
 
     def _arrays(self) -> SceneArrays:
         rows = self._rows

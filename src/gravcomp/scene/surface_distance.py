@@ -43,13 +43,18 @@ class SurfaceArrays(NamedTuple):
         return SurfaceArrays(*(np.concatenate(pair) for pair in parts))
 
 
-def surface_arrays(nodes: np.ndarray, faces: np.ndarray) -> SurfaceArrays:
-    """Return the tree of a closed surface of nodes (n, 3) and triangles (f, 3) that face outward; its root is box 0."""
+def surface_arrays(nodes: np.ndarray, faces: np.ndarray, chosen: np.ndarray | None = None) -> SurfaceArrays:
+    """Return the tree of a closed surface of nodes (n, 3) and triangles (f, 3) that face outward; its root is box 0.
+
+    chosen (c,): indices of the triangles that the tree has, None: all. Their normals are those in the whole surface.
+    """
     corners = nodes[faces]
     normals = _pseudonormals(nodes, faces, corners)
+    if chosen is not None:
+        corners, normals = corners[chosen], normals[chosen]
     centre = corners.mean(axis=1)
     low, high, child, leaf, order = [], [], [], [], list[np.ndarray]()
-    boxes = [np.arange(len(faces))]
+    boxes = [np.arange(len(corners))]
     index = 0
     while index < len(boxes):
         chosen = boxes[index]

@@ -45,7 +45,7 @@ def build_rod(true: TrueRobot) -> RodModel:
     for e, z in enumerate(middle):
         stretch = stretch_at(stretches, z)
         section, material = stretch.section(z), stretch.material
-        stiffness[e] = section.stiffness(material.youngs_modulus, material.poissons_ratio, material.axial_modulus)
+        stiffness[e] = section.stiffness(material)
         filament[e], curve[e] = filaments(stiffness[e][2:5, 2:5]), curve_of_law(material)
         rest_strain[e, 3:5] = _curvature(axis, z)
         half = material.density * section.area * length[e] / 2

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.description import BlendedOutline, Outline
+from gravcomp.description import BlendedOutline, Material, Outline
 from gravcomp.description.section_moments import boundary_moments
 
 
@@ -45,20 +45,20 @@ class CrossSection:
         """Centre (x, y) of the area, m."""
         return self.first[0] / self.area, self.first[1] / self.area
 
-    def stiffness(self, modulus: float, nu: float, axial_modulus: float | None = None) -> np.ndarray:
+    def stiffness(self, material: Material) -> np.ndarray:
         """Return the stiffness (6, 6) of the strains of rod.py: N, N m and N m^2.
 
-        axial_modulus (Pa): along the axis, where it is another one than `modulus`, from which the shear modulus follows.
+        Shear has the modulus by which the body twists: in the wall of a tube it acts along and around the axis.
         """
         (x, y), (yy, xx, xy) = self.first, self.second
-        along = modulus if axial_modulus is None else axial_modulus
-        axial = along * np.array([[self.area, y, -x], [y, yy, -xy], [-x, -xy, xx]])
-        shear = modulus / (2 * (1 + nu))
+        axial = material.axial_modulus * np.array([[self.area, y, -x], [y, yy, -xy], [-x, -xy, xx]])
+        shear = material.shear_modulus
         cx, cy = self.centroid
         at_centroid = np.array([[1.0, 0.0, -cy], [0.0, 1.0, cx]])
+        across = self._shear_coefficient(material.poissons_ratio) * shear * self.area
         stiffness = np.zeros((6, 6))
         stiffness[np.ix_((2, 3, 4), (2, 3, 4))] = axial
-        stiffness[np.ix_((0, 1, 5), (0, 1, 5))] = self._shear_coefficient(nu) * shear * self.area * at_centroid.T @ at_centroid
+        stiffness[np.ix_((0, 1, 5), (0, 1, 5))] = across * at_centroid.T @ at_centroid
         stiffness[5, 5] += shear * self.torsion
         return stiffness
 

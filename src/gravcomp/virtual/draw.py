@@ -108,8 +108,8 @@ def _materials(robot: Robot, body: Body, random: np.random.Generator) -> tuple[T
         kind = class_of(described.youngs_modulus)
         creep, damping, slip, strain = 1.0 + random.uniform(-_MATERIAL_SPREAD, _MATERIAL_SPREAD, 4)
         ratio, time = kind.creep_ratio, kind.creep_time
-        if described.creep_ratio > 0.0:
-            ratio, time = (described.creep_ratio,), (described.creep_time,)
+        if described.branches:
+            ratio, time = zip(*described.branches)
         found.append(
             TrueMaterial(
                 kind,
