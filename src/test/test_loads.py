@@ -1,5 +1,6 @@
 """External loads while the robot runs: wrenches, payloads, tension sensors, and what is found of an unknown load."""
 
+import collections
 import dataclasses
 
 import numpy as np
@@ -11,6 +12,7 @@ from gravcomp.external_loads import ExternalLoadOptions, LivePayload, WrenchInpu
 from gravcomp.full_model.shape import Response, Shape
 from gravcomp.load_estimation import LoadEstimationOptions, LoadObserver
 from gravcomp.load_estimation.load_filter import LoadFilter
+from gravcomp.load_estimation.needed_force import NeededForce
 from gravcomp.load_estimation.sensitivity import HeldRobot
 from gravcomp.load_estimation.tension_check import TensionCheck
 from gravcomp.simulation import Simulator
@@ -251,6 +253,45 @@ def test_a_robot_that_still_moves_when_zeroing_begins_is_not_taken_for_a_softer_
     assert abs(found.mass - mass) < 0.2 * mass
 
 
+def test_what_a_robot_measures_while_a_payload_lets_it_move_does_not_last(shape):
+    """The robot is its model. Once the payload pulls more for 0.9 s, as one that falls does."""
+    tip, shape = shape
+    mass, held, found = 0.012, HeldRobot(shape, tip, shape.cable_displacement, REST), []
+    for falls in (0.3, 0.0):
+        observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="payload"))
+        random = np.random.default_rng(6)
+        for k in range(160):
+            now = 0.04 * k
+            observer.predict(now, shape, tip, ZERO, shape.cable_displacement)
+            if k == 2:
+                observer.zero(now)
+            pull = mass * (1.0 + falls * (k < 112)) * (k >= 90)
+            tension = shape.cable_tension + held.under(pull * GRAVITY).tension
+            observer.measure_tensions(now, tension * (1 + 0.01 * random.normal(size=3)) + 1e-3 * random.normal(size=3))
+        found.append(observer.estimate(GRAVITY, now).mass)
+    assert abs(found[0] - found[1]) < 0.005 * mass
+    assert abs(found[0] - mass) < 0.05 * mass
+
+
+def test_a_payload_that_friction_may_hide_is_in_the_interval(shape):
+    """It comes 2 s after zeroing, and changes the tensions by less than a contradiction: it could be friction that turns."""
+    tip, shape = shape
+    observer = LoadObserver(dataclasses.replace(ROBOT, cables=ROBOT.cables[:3]), LoadEstimationOptions(kind="payload"))
+    random, mass, held = np.random.default_rng(2), 0.004, HeldRobot(shape, tip, shape.cable_displacement, REST)
+    for k in range(330):
+        now = 0.04 * k
+        observer.predict(now, shape, tip, ZERO, shape.cable_displacement)
+        if k == 50:
+            observer.zero(now)
+        tension = shape.cable_tension + held.under(mass * GRAVITY * (k >= 175)).tension
+        observer.measure_tensions(now, tension * (1 + 0.01 * random.normal(size=3)))
+        if k == 170:
+            assert observer.estimate(GRAVITY, now).mass_std < 0.2 * mass
+        if k > 200:  # a second later
+            low, high = observer.estimate(GRAVITY, now).mass_interval
+            assert low <= mass <= high
+
+
 def test_friction_that_turns_round_while_the_errors_are_learnt_is_not_taken_for_stiffness(shape):
     """The robot is its model; its load cells are at the capstans, so that friction adds to or takes from what they read."""
     tip, shape = shape
@@ -290,6 +331,26 @@ def test_what_a_slow_tracker_has_seen_of_a_force_is_kept_between_its_samples(sha
     found = observer.estimate(GRAVITY, now)
     assert np.linalg.norm((found.force - force)[:2]) < 0.1 * np.linalg.norm(force)
     assert np.sqrt(found.covariance[2, 2]) < 1.0
+
+
+def test_the_force_at_a_tip_far_away_is_averaged_until_it_changes():
+    """The model follows a noisy tracker of 5 Hz; the robot yields along z by 5 mm/N and across by 400 mm/N."""
+    needed, random = NeededForce(LoadEstimationOptions(kind="force")), np.random.default_rng(7)
+    compliance, errors, lately_errors = np.diag([0.4, 0.4, 0.005]), [], []
+    lately = collections.deque(maxlen=40)
+    for k in range(600):
+        now, true = 0.05 * k, np.array([0.15, 0.01 if k >= 500 else 0.0, 0.0])
+        if k % 4 == 0:
+            needed.tip_measured(now)
+            force = true + np.linalg.solve(compliance, 5e-4 * random.normal(size=3))
+        lately.append(force)
+        needed.add(now, force, np.mean(lately, axis=0), compliance)
+        errors.append(needed.mean - true)
+        lately_errors.append(np.mean(lately, axis=0) - true)
+    along, short = (float(np.mean(np.abs(np.array(one)[200:500, 2]))) for one in (errors, lately_errors))
+    assert along < 0.6 * short
+    # A change across, where the tip tells much, is followed as fast as before.
+    assert abs(np.array(errors)[545:, 1]).max() < 0.002
 
 
 def test_what_friction_hides_does_not_depend_on_the_rate_of_the_samples():

@@ -29,6 +29,7 @@ from gravcomp.load_estimation.options import LoadEstimationOptions
 from gravcomp.load_estimation.sensitivity import HeldRobot, Sensitivity
 
 _ITERATIONS = 6
+_LATELY = 2.0  # times in which friction may turn round
 _SAME = 1e-3  # of the standard deviation of the load: a change that ends the iteration
 
 
@@ -48,6 +49,7 @@ class LoadFilter:
         self.covariance = np.diag(np.square(deviations))
         self._sag, self._floor = sag, options.tension_floor * limits.tension_max
         self._largest = limits.tension_max
+        self._left, self._weight = 0.0, 0.0  # sums of H^T S^-1 r and H^T S^-1 H
 
     @property
     def load(self) -> np.ndarray:
@@ -59,12 +61,19 @@ class LoadFilter:
         """Covariance (k, k) of the load."""
         return self.covariance[: self._k, : self._k]
 
+    @property
+    def unexplained(self) -> np.ndarray:
+        """Variance (k, k) of a payload by what it leaves unexplained of the last measurements; zeros for a force, which walks."""
+        left = self._left / self._weight if self._weight > 0.0 else 0.0
+        return np.full((self._k, self._k), left**2)
+
     def set_load(self, load: np.ndarray, covariance: np.ndarray) -> None:
         """Let the load be `load` (k,) with this covariance (k, k); what is known of the errors stays."""
         self.state[: self._k] = load
         self.covariance[: self._k] = 0.0
         self.covariance[:, : self._k] = 0.0
         self.covariance[: self._k, : self._k] = covariance
+        self._left = self._weight = 0.0
 
     def covariance_by_tip(self, robot: HeldRobot, carried: np.ndarray, off: np.ndarray, deviation: float) -> np.ndarray:
         """Return the covariance (3, 3) N^2 of the force `carried` (3,) N that a model needs at a measured tip.
@@ -83,6 +92,7 @@ class LoadFilter:
     def open_load(self, deviation: float) -> None:
         """Let the load be anything of this standard deviation around what it was."""
         self.covariance[: self._k, : self._k] = deviation**2 * np.eye(self._k)
+        self._left = self._weight = 0.0
 
     def copy(self) -> "LoadFilter":
         """Return a filter in the same state; the steps of one do not change the other."""
@@ -101,6 +111,8 @@ class LoadFilter:
         step, kept = np.zeros(len(self.state)), np.ones(len(self.state))
         if options.kind == "payload":
             self._fade(np.exp(-2.0 * elapsed / options.payload_time), deviation)
+            kept_sums = float(np.exp(-elapsed / (_LATELY * options.friction_time)))
+            self._left, self._weight = kept_sums * self._left, kept_sums * self._weight
         else:
             kept[:k] = np.exp(-elapsed / options.change_time)
         kept[friction] = np.exp(-elapsed / options.friction_time)
@@ -183,6 +195,10 @@ class LoadFilter:
             spread = rows @ self.covariance @ rows.T + noise
             if iteration == 0:
                 distance = float(innovation @ np.linalg.solve(spread, innovation))
+                if self._options.kind == "payload" and not self.learning:
+                    weighted = np.linalg.solve(spread, rows[:, 0])
+                    self._left += float(weighted @ innovation)
+                    self._weight += float(weighted @ rows[:, 0])
             gain = np.linalg.solve(spread, rows @ self.covariance).T
             if not self.learning:
                 gain[k:] = 0.0

@@ -26,6 +26,7 @@ from gravcomp.full_model.wrench import Wrench
 from gravcomp.load_estimation.anchored_follower import AnchoredFollower, Answer, Worker
 from gravcomp.load_estimation.estimate import LoadEstimate
 from gravcomp.load_estimation.load_filter import LoadFilter
+from gravcomp.load_estimation.needed_force import NeededForce
 from gravcomp.load_estimation.options import LoadEstimationOptions
 from gravcomp.load_estimation.predictions import Prediction, Predictions
 from gravcomp.load_estimation.sensitivity import HeldRobot
@@ -62,6 +63,8 @@ class LoadObserver:
         self._scale = 0.0  # of the load: N, or kg of a payload
         self._learns_from, self._zero_until, self.zeroed, self._released = -np.inf, -np.inf, False, False
         self._last_change: tuple[float, np.ndarray] | None = None
+        self._needed = NeededForce(self.options)
+        self._rests_at = np.inf  # s, when a robot whose load has changed is at rest
         self._applied, self._applied_at = np.zeros(self._numbers), -np.inf
         self._seen: dict[str, float] = {}
         self._outliers: dict[str, int] = {}
@@ -105,8 +108,9 @@ class LoadObserver:
             if self.options.kind == "payload":
                 self._scale /= STANDARD_GRAVITY
         if self._is_anchored:  # what was published last is kept until more is measured
-            self._filter.set_load(*self._predictions.needed())
+            self._filter.set_load(*self._needed_load)
             self._before.clear()
+            self._needed.reset()
         self._remember(Prediction(stamp, shape.tip_position, shape.cable_tension, robot, carried, shape.gravity, None))
 
     def _predict_anchored(self, answer: Answer) -> None:
@@ -121,6 +125,7 @@ class LoadObserver:
         self._remember(
             Prediction(asked.stamp, shape.tip_position, shape.cable_tension, robot, found.carried, shape.gravity, covariance)
         )
+        self._needed.add(asked.stamp, found.carried, self._predictions.needed(), robot.under(np.zeros(3)).tip_force)
 
     def _remember(self, prediction: Prediction) -> None:
         """Add a prediction, and release the load when it is known at what scale, and no zero is being learnt."""
@@ -144,7 +149,7 @@ class LoadObserver:
         if self._filter is not None:
             self._filter.set_load(np.zeros(self._numbers), np.zeros((self._numbers, self._numbers)))
             self._filter.learning = True
-        self._released, self.zeroed = False, True
+        self._released, self.zeroed, self._rests_at = False, True, np.inf
         self._applied[:] = 0.0
 
     def measure_tip(self, stamp: float, position: np.ndarray) -> None:
@@ -154,6 +159,8 @@ class LoadObserver:
             return
         if self._follower is not None:
             self._follower.anchor(stamp, position)
+            if self._follower.measured_at == stamp:
+                self._needed.tip_measured(stamp)
         then = self._predictions.at(stamp)
         if then is None or self._filter is None:
             return
@@ -238,10 +245,10 @@ class LoadObserver:
         sentence = self._said(now, sources)
         if self._filter is None:
             return LoadEstimate(np.zeros(3), np.full((3, 3), np.inf), 0.0, np.inf, False, sources, sentence)
-        load, covariance = self._filter.load, self._filter.load_covariance
+        load, covariance = self._filter.load, self._filter.load_covariance + self._filter.unexplained
         payload, force, spread = self.options.kind == "payload", direction @ load, direction @ covariance @ direction.T
         if self._is_anchored:
-            force, spread = self._predictions.needed()
+            force, spread = self._needed_load
         return LoadEstimate(
             force=force,
             covariance=spread,
@@ -281,11 +288,17 @@ class LoadObserver:
         return "no measurement lately: the last estimate is kept"
 
     def _take(self, source: str, then: Prediction, step: Callable[[LoadFilter], float], gate: float) -> None:
-        """Let the filter take a measurement; an outlier is left out, and several in a row mean that the load has changed."""
+        """Let the filter take a measurement; an outlier is left out, and several in a row mean that the load has changed.
+
+        A robot whose load has changed moves. What is measured meanwhile is a first estimate, which that at rest replaces.
+        """
         assert self._filter is not None
         if self._filter.learning and then.stamp < self._learns_from:
             self._seen[source] = then.stamp
             return
+        if then.stamp >= self._rests_at:
+            self._filter.open_load(self._scale)
+            self._rests_at = np.inf
         taken = self._filter.copy()
         if step(taken) > gate:
             self._outliers[source] = self._outliers.get(source, 0) + 1
@@ -294,12 +307,23 @@ class LoadObserver:
             taken = self._filter.copy()
             if self._released:
                 taken.open_load(self._scale)
+                self._rests_at = then.stamp + self.options.friction_time
             step(taken)
         self._filter, self._outliers[source] = taken, 0
         self._seen[source] = then.stamp
 
     def _direction(self, gravity: np.ndarray) -> np.ndarray:
         return gravity[:, None] if self.options.kind == "payload" else np.eye(3)
+
+    @property
+    def _needed_load(self) -> tuple[np.ndarray, np.ndarray]:
+        """The force (3,) N that the measured tip needs, its covariance (3, 3). The newest prediction is of the anchored model.
+
+        Far bent, friction and stretch of the cables are not those that were learnt.
+        """
+        newest = self._predictions.newest
+        assert newest is not None and newest.covariance is not None
+        return self._needed.mean, newest.covariance
 
     @property
     def _is_anchored(self) -> bool:

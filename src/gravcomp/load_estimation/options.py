@@ -68,6 +68,13 @@ class LoadEstimationOptions:
         description="time in which what was measured of a payload loses its weight; a payload that changes by more than friction"
         " hides shows in the sensors, and the estimate begins again",
     )
+    force_time: float = parameter(
+        20.0,
+        unit="s",
+        minimum=0.01,
+        maximum=1e5,
+        description="time over which the force that bends a robot far is averaged, as long as the tips that are measured agree",
+    )
     zero_time: float = parameter(
         3.0,
         unit="s",

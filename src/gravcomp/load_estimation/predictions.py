@@ -73,13 +73,7 @@ class Predictions:
             return then.robot.by_winding(behind.robot)
         return then.tip - behind.tip, then.tension - behind.tension
 
-    def needed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the force (3,) N that the anchored model has carried lately, on average, and its covariance (3, 3).
-
-        Far bent, friction and stretch of the cables are not those that were learnt: the force is what the measured tip needs.
-        The newest prediction is of the anchored model.
-        """
-        covariance = self._kept[-1].covariance
-        assert covariance is not None
+    def needed(self) -> np.ndarray:
+        """Return the force (3,) N that the anchored model has carried lately, on average. There is a prediction of that model."""
         force: np.ndarray = np.mean([entry.carried for entry in self._kept if entry.anchored], axis=0)
-        return force, covariance
+        return force
