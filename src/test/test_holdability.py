@@ -196,7 +196,7 @@ def test_a_robot_that_is_not_the_same_from_every_side_has_fewer_symmetries(chang
     assert len(symmetries(robot, rest_target(robot))) == number
 
 
-def test_a_target_beside_the_axis_has_no_symmetries():
+def test_a_target_off_the_axis_has_no_symmetries():
     assert len(symmetries(arm(), rest_target(arm(), 0.3, 0.0))) == 1
 
 

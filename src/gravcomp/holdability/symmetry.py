@@ -78,7 +78,7 @@ def _round(robot: Robot) -> bool:
 
 
 def _on_axis(robot: Robot, target: Target) -> bool:
-    """Whether nothing of the target is beside the axis."""
+    """Whether all of the target lies on the axis."""
     places = np.vstack([target.tip_position / robot.length, target.direction_or_zeros, target.backbone_position / robot.length])
     return bool((np.abs(places[:, :2]) < _SAME).all())
 
